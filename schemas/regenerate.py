@@ -1,0 +1,33 @@
+"""Regenerate the codeless plugin in resources/ from schema.usda: `python -m echousd.schemas.regenerate` (needs jinja2)."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+SCHEMA = Path(__file__).with_name("schema.usda")
+RESOURCES = SCHEMA.parent / "resources"
+FILES = ("generatedSchema.usda", "plugInfo.json")
+
+
+def regenerate(target: Path = RESOURCES) -> None:
+    """Write generatedSchema.usda and plugInfo.json of schema.usda to the folder `target`.
+
+    Raises RuntimeError with usdGenSchema's own words where it fails (for one, when jinja2 is not installed).
+    """
+    target.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-m", "pxr.Usd.usdGenSchema", str(SCHEMA), str(target)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"usdGenSchema failed on {SCHEMA}:\n{done.stdout}{done.stderr}")
+    # A codeless plugin has no library and lies beside its resources: fill in what a C++ build would.
+    info = target / "plugInfo.json"
+    text = info.read_text("utf-8")
+    for placeholder, value in (("LIBRARY_PATH", ""), ("RESOURCE_PATH", "resources"), ("ROOT", "..")):
+        text = text.replace(f"@PLUG_INFO_{placeholder}@", value)
+    info.write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    regenerate()
