@@ -1,0 +1,196 @@
+"""Scene graphs as tensors: many rooms packed as one disjoint graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+
+import torch
+from torch import Tensor
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import vocabulary
+
+
+@dataclass(frozen=True, eq=False)
+class GraphBatch:
+    """S scene graphs with N nodes and E triplets in all, packed as one disjoint graph.
+
+    Arguments:
+        category: (N,) int64, class id of each node (position in the vocabulary's categories).
+        triplets: (E, 3) int64, [subject, predicate, object]; subject and object index the packed nodes.
+        scene: (N,) int64, number of the scene that a node belongs to, never decreasing.
+        room_type: (S,) int64, position in the vocabulary's room types.
+        floor: (S, 2) float32, x and z extent of the floor's bounding box in metres, NaN = unknown.
+        names: N node names, or None.
+
+    Raises:
+        ValueError: a tensor has the wrong shape, dtype or device.
+    """
+
+    category: Tensor
+    triplets: Tensor
+    scene: Tensor
+    room_type: Tensor
+    floor: Tensor
+    names: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        nodes, scenes = len(self.category), len(self.room_type)
+        expected: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
+            "category": ((nodes,), torch.int64),
+            "triplets": ((len(self.triplets), 3), torch.int64),
+            "scene": ((nodes,), torch.int64),
+            "room_type": ((scenes,), torch.int64),
+            "floor": ((scenes, 2), torch.float32),
+        }
+        for name, (shape, dtype) in expected.items():
+            tensor = getattr(self, name)
+            if tuple(tensor.shape) != shape or tensor.dtype != dtype:
+                found = f"{tuple(tensor.shape)} {tensor.dtype}"
+                raise ValueError(f"GraphBatch.{name} is {found}, expected {shape} {dtype}")
+            if tensor.device != self.category.device:
+                raise ValueError(f"GraphBatch.{name} is on {tensor.device}, category on {self.category.device}")
+        if self.names is not None and len(self.names) != nodes:
+            raise ValueError(f"GraphBatch.names has {len(self.names)} names for {nodes} nodes")
+
+    @classmethod
+    def single(
+        cls,
+        category: Sequence[int] | Tensor,
+        triplets: Sequence[Sequence[int]] | Tensor = (),
+        *,
+        room_type: int = 0,
+        floor: Sequence[float] | None = None,
+        names: Sequence[str] | None = None,
+    ) -> GraphBatch:
+        """One scene graph from plain lists; arguments as in the class, `floor` None = unknown."""
+        nodes = torch.as_tensor(category, dtype=torch.int64).reshape(-1)
+        return cls(
+            category=nodes,
+            triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
+            scene=torch.zeros_like(nodes),
+            room_type=torch.tensor([room_type]),
+            floor=torch.tensor([[torch.nan, torch.nan] if floor is None else list(floor)], dtype=torch.float32),
+            names=None if names is None else tuple(names),
+        )
+
+    @classmethod
+    def from_room(cls, room: RoomBoxes, *, triplets: Sequence[Sequence[int]] | Tensor | None = None) -> GraphBatch:
+        """The graph of a labelled room (`triplets` overrides its relations); raises `UnknownWord`."""
+        words = vocabulary()
+        relations = room.relations if triplets is None else triplets
+        known = len(room.floor_polygon) > 0
+        extent = (room.floor_polygon.max(0) - room.floor_polygon.min(0)).tolist() if known else None
+        return cls.single(
+            [words.category_id(word) for word in room.categories],
+            torch.as_tensor([] if relations is None else relations, dtype=torch.int64).reshape(-1, 3),
+            room_type=words.room_type_id(room.room_type),
+            floor=extent,
+        )
+
+    @classmethod
+    def pack(cls, graphs: Iterable[GraphBatch]) -> GraphBatch:
+        """Put graphs behind one another as one disjoint graph; names survive when every graph has them."""
+        graphs = list(graphs)
+        if not graphs:
+            raise ValueError("GraphBatch.pack needs at least one graph, got none")
+        triplets, scenes, nodes, count = [], [], 0, 0
+        for graph in graphs:
+            triplets.append(graph.triplets + graph.triplets.new_tensor([nodes, 0, nodes]))
+            scenes.append(graph.scene + count)
+            nodes += graph.num_nodes
+            count += graph.num_scenes
+        names = [graph.names for graph in graphs]
+        return cls(
+            category=torch.cat([graph.category for graph in graphs]),
+            triplets=torch.cat(triplets),
+            scene=torch.cat(scenes),
+            room_type=torch.cat([graph.room_type for graph in graphs]),
+            floor=torch.cat([graph.floor for graph in graphs]),
+            names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
+        )
+
+    def unpack(self) -> list[GraphBatch]:
+        """One graph per scene, the inverse of `pack`."""
+        counts = self.node_counts.tolist()
+        owner = self.scene[self.triplets[:, 0]]
+        out, start = [], 0
+        for number, count in enumerate(counts):
+            triplets = self.triplets[owner == number]
+            out.append(
+                GraphBatch(
+                    category=self.category[start : start + count],
+                    triplets=triplets - triplets.new_tensor([start, 0, start]),
+                    scene=torch.zeros_like(self.scene[start : start + count]),
+                    room_type=self.room_type[number : number + 1],
+                    floor=self.floor[number : number + 1],
+                    names=None if self.names is None else self.names[start : start + count],
+                )
+            )
+            start += count
+        return out
+
+    @property
+    def num_nodes(self) -> int:
+        """N."""
+        return len(self.category)
+
+    @property
+    def num_scenes(self) -> int:
+        """S."""
+        return len(self.room_type)
+
+    @property
+    def node_counts(self) -> Tensor:
+        """(S,) int64, nodes of each scene."""
+        return torch.bincount(self.scene, minlength=self.num_scenes)
+
+    def to(self, device: torch.device | str) -> GraphBatch:
+        """The same batch on another device."""
+        moved = {f.name: getattr(self, f.name).to(device) for f in fields(self) if f.name != "names"}
+        return replace(self, **moved)
+
+    def with_triplets(self, triplets: Tensor) -> GraphBatch:
+        """The same nodes with other relations; `triplets` (E, 3) int64."""
+        return replace(self, triplets=triplets)
+
+    def check(self, *, categories: int | None = None, predicates: int = 16, room_types: int | None = None) -> None:
+        """Check the values against a vocabulary's sizes (None = the shipped one).
+
+        Raises:
+            ValueError: no node, an unknown class, predicate or room type id, an end that is no node, a relation of
+                an object to itself or across scenes, scenes out of order, or an impossible floor; the message names
+                the entry at fault.
+        """
+        categories = len(vocabulary().categories) if categories is None else categories
+        room_types = len(vocabulary().room_types) if room_types is None else room_types
+        if not self.num_nodes:
+            raise ValueError("graph has no nodes, at least one is needed")
+        _within("category of node", self.category, categories)
+        _within("room type of scene", self.room_type, room_types)
+        _within("scene of node", self.scene, self.num_scenes)
+        if bool((self.scene[1:] < self.scene[:-1]).any()):
+            raise ValueError("GraphBatch.scene decreases: the nodes of a scene must stand together, in scene order")
+        _within("predicate of triplet", self.triplets[:, 1], predicates)
+        _within("subject of triplet", self.triplets[:, 0], self.num_nodes)
+        _within("object of triplet", self.triplets[:, 2], self.num_nodes)
+        subject, target = self.triplets[:, 0], self.triplets[:, 2]
+        for text, wrong in (
+            ("relates a node to itself", subject == target),
+            ("crosses scenes", self.scene[subject] != self.scene[target]),
+        ):
+            if bool(wrong.any()):
+                at = int(wrong.nonzero()[0])
+                raise ValueError(f"triplet {at} {self.triplets[at].tolist()} {text}")
+        bad = torch.isinf(self.floor) | (self.floor <= 0)
+        if bool(bad.any()):
+            at = int(bad.nonzero()[0, 0])
+            raise ValueError(f"floor of scene {at} is {self.floor[at].tolist()} m, expected > 0 or NaN (unknown)")
+
+
+def _within(what: str, values: Tensor, size: int) -> None:
+    wrong = (values < 0) | (values >= size)
+    if bool(wrong.any()):
+        at = int(wrong.nonzero()[0])
+        raise ValueError(f"{what} {at} is {int(values[at])}, allowed: 0..{size - 1}")

@@ -1,0 +1,94 @@
+"""GraphBatch: lossless packing and the text of its errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echomodel.graph import GraphBatch
+from echomodel.roomboxes import RoomBoxes
+
+
+@st.composite
+def graphs(draw: st.DrawFn) -> GraphBatch:
+    nodes = draw(st.integers(1, 6))
+    ends = st.tuples(st.integers(0, nodes - 1), st.integers(0, 15), st.integers(0, nodes - 1))
+    triplets = draw(st.lists(ends.filter(lambda t: t[0] != t[2]), max_size=8)) if nodes > 1 else []
+    floor = draw(st.one_of(st.none(), st.just((4.0, 3.0))))
+    categories = draw(st.lists(st.integers(0, 45), min_size=nodes, max_size=nodes))
+    return GraphBatch.single(
+        categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, names=[f"n{i}" for i in range(nodes)]
+    )
+
+
+def equal(a: GraphBatch, b: GraphBatch) -> bool:
+    same = all(torch.equal(getattr(a, k), getattr(b, k)) for k in ("category", "triplets", "scene", "room_type"))
+    return same and torch.equal(a.floor.nan_to_num(-1), b.floor.nan_to_num(-1)) and a.names == b.names
+
+
+@settings(max_examples=60)
+@given(st.lists(graphs(), min_size=1, max_size=5))
+def test_pack_unpack_is_lossless(singles: list[GraphBatch]) -> None:
+    packed = GraphBatch.pack(singles)
+    packed.check()
+    assert packed.num_scenes == len(singles)
+    assert packed.node_counts.tolist() == [g.num_nodes for g in singles]
+    assert all(equal(a, b) for a, b in zip(packed.unpack(), singles, strict=True))
+    assert equal(GraphBatch.pack(packed.unpack()), packed)
+
+
+def test_pack_of_packed_graphs_and_missing_names() -> None:
+    one = GraphBatch.single([1, 2], [[0, 1, 1]], names=["a", "b"])
+    bare = GraphBatch.single([3, 4, 5], [[2, 5, 0]])
+    packed = GraphBatch.pack([GraphBatch.pack([one, bare]), bare])
+    assert packed.names is None
+    assert packed.triplets.tolist() == [[0, 1, 1], [4, 5, 2], [7, 5, 5]]
+    assert packed.scene.tolist() == [0, 0, 1, 1, 1, 2, 2, 2]
+
+
+def test_room_becomes_a_graph() -> None:
+    room = RoomBoxes(
+        id="r", room_type="living", floor_polygon=np.array([[0, 0], [5, 0], [5, 3], [0, 3.0]]), height=2.6,
+        categories=("sofa_3", "bookcase"), size=np.ones((2, 3)), position=np.zeros((2, 3)), yaw=np.zeros(2),
+        relations=np.array([[0, 1, 1]]),
+    )  # fmt: skip
+    with pytest.raises(ValueError, match="unknown category 'sofa_3x'"):
+        GraphBatch.from_room(RoomBoxes(**{**room.__dict__, "categories": ("sofa_3x", "bookcase")}))
+    room = RoomBoxes(**{**room.__dict__, "categories": ("couch", "bookcase")})
+    graph = GraphBatch.from_room(room)
+    assert graph.floor.tolist() == [[5.0, 3.0]]
+    assert graph.room_type.tolist() == [1]
+    assert graph.triplets.tolist() == [[0, 1, 1]]
+    assert GraphBatch.from_room(room, triplets=[]).triplets.shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("graph", "text"),
+    [
+        (GraphBatch.single([]), "graph has no nodes"),
+        (GraphBatch.single([46]), r"category of node 0 is 46, allowed: 0\.\.45"),
+        (GraphBatch.single([1, 2], [[0, 16, 1]]), r"predicate of triplet 0 is 16, allowed: 0\.\.15"),
+        (GraphBatch.single([1, 2], [[0, 1, 2]]), r"object of triplet 0 is 2, allowed: 0\.\.1"),
+        (GraphBatch.single([1, 2], [[1, 1, 1]]), r"triplet 0 \[1, 1, 1\] relates a node to itself"),
+        (GraphBatch.single([1], room_type=7), "room type of scene 0 is 7"),
+        (GraphBatch.single([1], floor=(0.0, 2.0)), r"floor of scene 0 is \[0.0, 2.0\] m"),
+        (
+            GraphBatch.pack([GraphBatch.single([1]), GraphBatch.single([1])]).with_triplets(torch.tensor([[0, 1, 1]])),
+            "crosses scenes",
+        ),
+    ],
+)
+def test_bad_values_are_named(graph: GraphBatch, text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        graph.check()
+
+
+def test_bad_shapes_are_named() -> None:
+    one = torch.ones(1).long()
+    with pytest.raises(ValueError, match=r"GraphBatch.scene is \(2,\) torch.int64, expected \(1,\)"):
+        GraphBatch(one, torch.zeros(0, 3).long(), torch.zeros(2).long(), one, torch.ones(1, 2))
+    with pytest.raises(ValueError, match="at least one graph"):
+        GraphBatch.pack([])
