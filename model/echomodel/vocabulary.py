@@ -24,7 +24,12 @@ class Category:
 
 @dataclass(frozen=True)
 class Predicate:
-    """A relation with its SG-FRONT id and spelling and its logic (`inverse` is None where there is none)."""
+    """A relation with its SG-FRONT id and spelling and its logic.
+
+    `inverse` is None where no predicate says the same of the swapped pair. `order` names the order that the predicate
+    belongs to (left and right share one) and `rank` is 1 where the subject comes after the object in it, -1 where before.
+    `swapped` are words that mean this predicate with subject and object exchanged; they are named in errors only.
+    """
 
     name: str
     id: int
@@ -32,7 +37,10 @@ class Predicate:
     inverse: str | None
     symmetric: bool
     transitive: bool
+    order: str | None
+    rank: int
     aliases: tuple[str, ...] = ()
+    swapped: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -98,6 +106,10 @@ class Vocabulary:
         index, key = self._index[kind], normalised(word)
         if key in index:
             return index[key]
+        if kind == "predicate":
+            for predicate in self.predicates:
+                if key in predicate.swapped:
+                    raise UnknownWord(f"unknown predicate {word!r}: swap the two objects and say {predicate.name}")
         near = list(dict.fromkeys(self._name(kind, index[m]) for m in difflib.get_close_matches(key, index, n=3)))
         hint = f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(self._names(kind))}"
         known = " (seen in real rooms, not supported)" if kind == "category" and key in self.unsupported else ""
@@ -122,7 +134,7 @@ def vocabulary() -> Vocabulary:
     raw = json.loads(resources.files("echomodel").joinpath("vocabulary.json").read_text("utf-8"))
 
     def frozen(entry: dict) -> dict:
-        return {**entry, "aliases": tuple(entry["aliases"])}
+        return {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
 
     return Vocabulary(
         categories=tuple(Category(**frozen(entry)) for entry in raw["categories"]),

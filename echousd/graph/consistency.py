@@ -1,0 +1,108 @@
+"""Do the relations of a graph contradict each other? Every message names the relations that do."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+
+from echomodel.vocabulary import vocabulary
+
+Triple = tuple[str, str, str]
+
+
+class GraphError(ValueError):
+    """A scene graph, or a file that holds one, is not valid; one line that says what was found, where and what is allowed."""
+
+
+def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
+    """Raise `GraphError` at the first fault among `triples`, each (subject, predicate, object) with canonical predicates.
+
+    Faults: an endpoint that is none of `names`, a self relation, a relation stated twice, and a cycle in one of the
+    orders that the vocabulary defines (left and right are one order along the room's z axis, bigger, smaller and `in`
+    are one order of volumes ...), of which "A left B, B left A" and "A bigger B, A smaller B" are the shortest cases.
+    """
+    known, seen = set(names), set()
+    for subject, predicate, object_ in triples:
+        for role, name in (("subject", subject), ("object", object_)):
+            if name not in known:
+                raise GraphError(
+                    f"relation '{subject} {predicate} {object_}': {role} {name!r} is no object of this graph, "
+                    f"allowed: {listed(sorted(known))}"
+                )
+        if subject == object_:
+            raise GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself")
+        if (subject, predicate, object_) in seen:
+            raise GraphError(f"relation '{subject} {predicate} {object_}' is stated twice")
+        seen.add((subject, predicate, object_))
+    for order, edges in ordered_edges(triples).items():
+        cycle = find_cycle(edges)
+        if cycle:
+            said = [f"'{' '.join(edges[pair])}'" for pair in cycle]
+            if len(said) == 2:
+                raise GraphError(f"{said[0]} contradicts {said[1]} ({order} order)")
+            raise GraphError(f"{', '.join(said[:-1])} and {said[-1]} contradict each other: a cycle in the {order} order")
+
+
+def ordered_edges(triples: Iterable[Triple]) -> dict[str, dict[tuple[str, str], Triple]]:
+    """Per order of the vocabulary, the pairs (less, more) with the triple that says so."""
+    words = vocabulary()
+    orders: dict[str, dict[tuple[str, str], Triple]] = defaultdict(dict)
+    for subject, predicate, object_ in triples:
+        entry = words.predicate(predicate)
+        if entry.order:
+            pair = (object_, subject) if entry.rank > 0 else (subject, object_)
+            orders[entry.order].setdefault(pair, (subject, predicate, object_))
+    return orders
+
+
+def find_cycle(edges: Mapping[tuple[str, str], object]) -> list[tuple[str, str]]:
+    """A shortest cycle through the first node found to lie on one, as its edges in order; empty if there is none.
+
+    Nodes without a predecessor or without a successor cannot lie on a cycle, so they are peeled off first (Kahn).
+    """
+    after: dict[str, list[str]] = defaultdict(list)
+    before: dict[str, list[str]] = defaultdict(list)
+    for less, more in edges:
+        after[less].append(more)
+        before[more].append(less)
+    left = set(after) | set(before)
+    for forward, backward in ((after, before), (before, after)):
+        degree = {node: sum(n in left for n in backward[node]) for node in left}
+        ready = [node for node in left if degree[node] == 0]
+        while ready:
+            node = ready.pop()
+            left.discard(node)
+            for other in forward[node]:
+                if other in left:
+                    degree[other] -= 1
+                    if degree[other] == 0:
+                        ready.append(other)
+    cycles = (_shortest_return(start, after, left) for start in after if start in left)
+    return next((cycle for cycle in cycles if cycle), [])
+
+
+def _shortest_return(start: str, after: Mapping[str, list[str]], allowed: set[str]) -> list[tuple[str, str]]:
+    """Breadth-first search from `start` back to itself."""
+    came_from: dict[str, str] = {}
+    level = [start]
+    while level:
+        following = []
+        for node in level:
+            for other in after.get(node, ()):
+                if other == start:
+                    path = [(node, start)]
+                    while node != start:
+                        path.append((came_from[node], node))
+                        node = came_from[node]
+                    return path[::-1]
+                if other in allowed and other not in came_from:
+                    came_from[other] = node
+                    following.append(other)
+        level = following
+    return []
+
+
+def listed(words: Sequence[str], most: int = 12) -> str:
+    """`a, b, c` and, past `most` words, how many more there are."""
+    more = f" and {len(words) - most} more" if len(words) > most else ""
+    return ", ".join(words[:most]) + more
