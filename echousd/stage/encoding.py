@@ -1,0 +1,126 @@
+"""How a scene graph is written in USD: type names, properties and the values they hold. The one place that knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from pxr import Gf, Sdf, Vt
+
+if TYPE_CHECKING:
+    from echousd.graph import Node, RoomSpec
+
+GRAPH_TYPE = "EchoSceneGraph"
+RELATION_TYPE = "EchoRelation"
+NODE_API = "EchoNodeAPI"
+LABELS_API = "SemanticsLabelsAPI:category"
+LABELS = "semantics:labels:category"
+
+GRAPH_NAME = "SceneGraph"
+OBJECTS_NAME = "Objects"
+
+ROOM = "echo:room"
+VOCABULARY = "echo:vocabulary"
+VOCABULARY_NAME = "echo-1"
+ROOM_TYPE = "echo:roomType"
+FLOOR_POLYGON = "echo:floorPolygon"
+FLOOR_SIZE = "echo:floorSize"
+HEIGHT = "echo:height"
+
+SUBJECT = "echo:subject"
+PREDICATE = "echo:predicate"
+OBJECT = "echo:object"
+CONFIDENCE = "echo:confidence"
+
+CATEGORY = "echo:category"
+STYLE = "echo:style"
+SIZE = "echo:size"
+POSITION = "echo:position"
+YAW = "echo:yaw"
+LOCKED = "echo:locked"
+FREE = "echo:attributes:"  # namespace of a node's free attributes
+
+_TYPES = Sdf.ValueTypeNames
+VALUE_TYPES = {
+    VOCABULARY: _TYPES.Token,
+    ROOM_TYPE: _TYPES.Token,
+    FLOOR_POLYGON: _TYPES.Double2Array,
+    FLOOR_SIZE: _TYPES.Double2,
+    HEIGHT: _TYPES.Double,
+    PREDICATE: _TYPES.Token,
+    CONFIDENCE: _TYPES.Double,
+    CATEGORY: _TYPES.Token,
+    STYLE: _TYPES.Token,
+    SIZE: _TYPES.Double3,
+    POSITION: _TYPES.Double3,
+    YAW: _TYPES.Double,
+    LOCKED: _TYPES.Bool,
+    LABELS: _TYPES.TokenArray,
+}
+
+class StageError(ValueError):
+    """A stage, layer or prim does not hold what it should; one line with what was found, where and what is allowed."""
+
+
+def room_values(room: RoomSpec) -> dict[str, Any]:
+    """The authored properties of an EchoSceneGraph, in USD's types, for the `RoomSpec` `room`."""
+    values: dict[str, Any] = {VOCABULARY: VOCABULARY_NAME, ROOM_TYPE: room.type}
+    if room.floor_polygon is not None:
+        values[FLOOR_POLYGON] = Vt.Vec2dArray([Gf.Vec2d(*corner) for corner in room.floor_polygon])
+    if room.size is not None:
+        values[FLOOR_SIZE] = Gf.Vec2d(*room.size)
+    if room.height is not None:
+        values[HEIGHT] = float(room.height)
+    return values
+
+
+def node_values(node: Node) -> dict[str, Any]:
+    """The authored properties of a node's prim, in USD's types, for the `Node` `node`."""
+    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category])}
+    if node.style is not None:
+        values[STYLE] = node.style
+    if node.size is not None:
+        values[SIZE] = Gf.Vec3d(*node.size)
+    if node.position is not None:
+        values[POSITION] = Gf.Vec3d(*node.position)
+    if node.yaw is not None:
+        values[YAW] = float(node.yaw)
+    if node.locked:
+        values[LOCKED] = True
+    for key, value in node.attributes.items():
+        values[FREE + key] = value
+    return values
+
+
+def value_type(name: str, value: Any) -> Sdf.ValueTypeName:
+    """The type that the property `name` is authored with; free attributes are bool, int64, double or string."""
+    known = VALUE_TYPES.get(name)
+    if known is not None:
+        return known
+    if isinstance(value, bool):
+        return _TYPES.Bool
+    if isinstance(value, int):
+        return _TYPES.Int64
+    return _TYPES.Double if isinstance(value, float) else _TYPES.String
+
+
+def numbers(value: Any, count: int, where: str) -> tuple[float, ...]:
+    """`count` finite numbers out of a USD vector; raises StageError that names `where`."""
+    try:
+        out = tuple(float(item) for item in value)
+    except (TypeError, ValueError):
+        out = ()
+    if len(out) != count or not all(map(math.isfinite, out)):
+        raise StageError(f"{where} is {value!r}, allowed: {count} finite numbers")
+    return out
+
+
+def relation_name(subject: str, predicate: str, object_: str, taken: Iterable[str] = ()) -> str:
+    """The prim name of a relation; numbered where names with double underscores make two relations meet."""
+    name = base = f"{subject}__{predicate}__{object_}"
+    number = 2
+    while name in taken:
+        name = f"{base}_{number}"
+        number += 1
+    return name

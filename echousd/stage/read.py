@@ -1,0 +1,234 @@
+"""Read scene graphs from a composed stage: through references, instances, variants and sublayers."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+from pxr import Sdf, Usd
+
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.stage import encoding as usd
+from echousd.stage.encoding import StageError
+
+
+@dataclass
+class RoomPrims:
+    """The prims of one room: its own, its scene graph's, and those of nodes and relations in the stage's order."""
+
+    room: Usd.Prim
+    graph: Usd.Prim
+    nodes: list[Usd.Prim] = field(default_factory=list)
+    relations: list[Usd.Prim] = field(default_factory=list)
+
+
+def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
+    """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
+
+    A stage without a scene graph becomes one all the same if its prims carry semantics labels and bounds
+    (`foreign_graph`). Raises StageError, and GraphError's text with the file's name, for what is not valid.
+    """
+    stage = opened(stage)
+    rooms = find_rooms(stage)
+    if room is None and len(rooms) == 1:
+        return room_graph(rooms[0])
+    if room is None and not rooms:
+        from echousd.stage.foreign import foreign_graph
+
+        return foreign_graph(stage)
+    wanted = [prims for prims in rooms if room is not None and str(prims.room.GetPath()) == str(room)]
+    if not wanted:
+        where = source(stage)
+        names = ", ".join(str(prims.room.GetPath()) for prims in rooms)
+        if room is None:
+            raise StageError(f"{where}: {len(rooms)} rooms, say which one: {names}")
+        raise StageError(f"{where}: no room {room!r}, " + (f"allowed: {names}" if rooms else "the stage has no scene graph"))
+    return room_graph(wanted[0])
+
+
+def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
+    """Every room's graph by the prim path of the room, in the stage's order; empty where there is none."""
+    return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(opened(stage))}
+
+
+def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:
+    """The stage itself, or the one in the file at that path."""
+    if isinstance(stage, Usd.Stage):
+        return stage
+    from echousd.stage.files import open_stage
+
+    return open_stage(stage)
+
+
+def source(stage: Usd.Stage) -> str:
+    """What an error message calls the stage: its file, or the identifier of its anonymous root layer."""
+    layer = stage.GetRootLayer()
+    return layer.realPath or layer.identifier
+
+
+def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
+    """All rooms of a stage in one traversal; a node or relation belongs to the closest room above it."""
+    graphs: list[Usd.Prim] = []
+    nodes: list[Usd.Prim] = []
+    relations: list[Usd.Prim] = []
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
+        type_name = prim.GetTypeName()
+        if type_name == usd.RELATION_TYPE:
+            relations.append(prim)
+        elif type_name == usd.GRAPH_TYPE:
+            graphs.append(prim)
+        elif usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
+            nodes.append(prim)
+    rooms = {prims.room.GetPath(): prims for prims in (_room_of(graph) for graph in graphs)}
+    if len(rooms) < len(graphs):
+        raise StageError(f"{source(stage)}: two EchoSceneGraph prims describe the same room, allowed: one per room")
+    by_graph = {prims.graph.GetPath(): prims for prims in rooms.values()}
+    for prim in nodes:
+        owner = _closest(prim.GetPath(), rooms)
+        if owner:
+            owner.nodes.append(prim)
+    for prim in relations:
+        owner = _closest(prim.GetPath(), by_graph)
+        if owner:
+            owner.relations.append(prim)
+    return list(rooms.values())
+
+
+def _room_of(graph: Usd.Prim) -> RoomPrims:
+    targets = graph.GetRelationship(usd.ROOM).GetTargets() if graph.HasRelationship(usd.ROOM) else []
+    if len(targets) > 1:
+        raise StageError(f"{place(graph)}: {usd.ROOM} has {len(targets)} targets, allowed: at most one")
+    room = graph.GetStage().GetPrimAtPath(targets[0]) if targets else graph.GetParent()
+    if not room:
+        raise StageError(f"{place(graph)}: {usd.ROOM} points to <{targets[0]}>, where no prim is")
+    return RoomPrims(room, graph)
+
+
+def _closest(path: Sdf.Path, owners: dict[Sdf.Path, RoomPrims]) -> RoomPrims | None:
+    while path != Sdf.Path.emptyPath:
+        if path in owners:
+            return owners[path]
+        path = path.GetParentPath()
+    return None
+
+
+def place(prim: Usd.Prim) -> str:
+    """`file: <prim path>` for error messages."""
+    return f"{source(prim.GetStage())}: <{prim.GetPath()}>"
+
+
+def room_graph(prims: RoomPrims) -> SceneGraph:
+    """The graph of one room; raises StageError that names the prim at fault."""
+    names = node_names(prims)
+    nodes = tuple(_node(prim, names[prim.GetPath()]) for prim in prims.nodes)
+    read = (relation_of(prim, names) for prim in prims.relations)
+    relations = tuple(relation for relation in read if relation)
+    try:
+        return SceneGraph(room=room_spec(prims.graph), nodes=nodes, relations=relations)
+    except GraphError as error:
+        raise StageError(f"{place(prims.graph)}: {error}") from None
+
+
+def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
+    """Path to node name (the prim's own name); raises StageError where two prims of one room share a name."""
+    names: dict[Sdf.Path, str] = {}
+    seen: dict[str, Sdf.Path] = {}
+    for prim in prims.nodes:
+        path, name = prim.GetPath(), prim.GetName()
+        if name in seen:
+            raise StageError(
+                f"{source(prim.GetStage())}: two nodes are called {name!r}: <{seen[name]}> and <{path}>, "
+                "allowed: a name of its own for each node of a room"
+            )
+        seen[name] = names[path] = path if name not in seen else path
+        names[path] = name
+    return names
+
+
+def room_spec(graph: Usd.Prim) -> RoomSpec:
+    """The `RoomSpec` that an EchoSceneGraph prim holds."""
+    vocabulary = value(graph, usd.VOCABULARY)
+    if vocabulary not in (None, usd.VOCABULARY_NAME):
+        raise StageError(
+            f"{place(graph)}: {usd.VOCABULARY} is {vocabulary!r}, allowed: {usd.VOCABULARY_NAME}"
+        )
+    corners, size, height = (value(graph, name) for name in (usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT))
+    try:
+        return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height)
+    except GraphError as error:
+        raise StageError(f"{place(graph)}: {error}") from None
+
+
+def _node(prim: Usd.Prim, name: str) -> Node:
+    fields: dict[str, Any] = {"attributes": {}}
+    for field_name, attribute in _FIELDS.items():
+        found = value(prim, attribute)
+        if found is not None:
+            fields[field_name] = found
+    for attribute in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1]):
+        found = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
+        if found is not None:
+            fields["attributes"][attribute.GetName().removeprefix(usd.FREE)] = found
+    if "category" not in fields:
+        labels = value(prim, usd.LABELS)
+        if not labels:
+            raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
+        fields["category"] = labels[0]
+    try:
+        return Node(name, **fields)
+    except GraphError as error:
+        raise StageError(f"{place(prim)}: {error}") from None
+
+
+_FIELDS = {
+    "category": usd.CATEGORY,
+    "style": usd.STYLE,
+    "size": usd.SIZE,
+    "position": usd.POSITION,
+    "yaw": usd.YAW,
+    "locked": usd.LOCKED,
+}
+
+
+def value(prim: Usd.Prim, name: str) -> Any:
+    """The value of an attribute, None where there is none."""
+    return prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
+
+
+def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
+    """The relation that a prim states, None where one of its ends has been deactivated; raises StageError."""
+    subject = _end(prim, usd.SUBJECT, names)
+    object_ = _end(prim, usd.OBJECT, names)
+    if subject is None or object_ is None:
+        return None
+    predicate, confidence = value(prim, usd.PREDICATE), value(prim, usd.CONFIDENCE)
+    if predicate is None:
+        raise StageError(f"{place(prim)}: {usd.PREDICATE} has no value, allowed: one predicate")
+    try:
+        return Relation(subject, predicate, object_, 1.0 if confidence is None else confidence)
+    except GraphError as error:
+        raise StageError(f"{place(prim)}: {error}") from None
+
+
+def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
+    targets = prim.GetRelationship(name).GetTargets()
+    if len(targets) != 1:
+        found = f"{len(targets)} targets" + (f" ({', '.join(map(str, targets))})" if targets else "")
+        raise StageError(f"{place(prim)}: {name} has {found}, allowed: exactly one")
+    node = names.get(targets[0])
+    if node is None and not _deactivated(prim.GetStage(), targets[0]):
+        there = prim.GetStage().GetPrimAtPath(targets[0])
+        why = f"which is no node of this room (no {usd.NODE_API})" if there else "where no prim is"
+        raise StageError(f"{place(prim)}: {name} points to <{targets[0]}>, {why}, allowed: a node of the room")
+    return node
+
+
+def _deactivated(stage: Usd.Stage, path: Sdf.Path) -> bool:
+    """Whether a prim at or above `path` is there but not active."""
+    while path != Sdf.Path.absoluteRootPath and not path.isEmpty:
+        prim = stage.GetPrimAtPath(path)
+        if prim:
+            return not prim.IsActive()
+        path = path.GetParentPath()
+    return False

@@ -1,0 +1,161 @@
+"""Author a scene graph in bulk: Sdf specs within one change block, no stage needed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from pxr import Sdf, Usd
+
+from echousd.stage import encoding as usd
+
+if TYPE_CHECKING:
+    from echousd.graph import Node, Relation, SceneGraph
+
+LAYER_DOC = """Scene graph of a room: what it holds and how its objects relate.
+Directions are the room's: front is +X, behind -X, left -Z, right +Z, up +Y. Lengths are metres, angles radians.
+To take a relation out, say `active = false` on its prim in a stronger layer."""
+
+_UNIFORM = Sdf.VariabilityUniform
+
+
+def graph_layer(graph: SceneGraph, *, root: str = "/Room", identifier: str = ".usda") -> Sdf.Layer:
+    """A new anonymous layer that holds `graph` at the prim path `root` and nothing else.
+
+    Authors: `root` (Xform, kind assembly, defaultPrim), `SceneGraph` (EchoSceneGraph) with one EchoRelation per
+    relation, `Objects` (Xform, kind group) with one Xform + EchoNodeAPI + SemanticsLabelsAPI:category per node,
+    upAxis Y, metersPerUnit 1. `identifier` is the anonymous layer's tag; its extension chooses usda or usdc.
+    """
+    layer = Sdf.Layer.CreateAnonymous(identifier)
+    layer.documentation = LAYER_DOC
+    author(layer, graph, Sdf.Path(root))
+    return layer
+
+
+def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/Room") -> None:
+    """Author `graph` at the prim path `root` of a layer, or of a stage's edit target (a variant's, too).
+
+    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`).
+    Raises StageError for a root that is no absolute prim path, nothing authored.
+    """
+    path = prim_path(root)
+    stage = target if isinstance(target, Usd.Stage) else None
+    layer = stage.GetEditTarget().GetLayer() if stage else target
+    if _holds_graph(stage, layer, path):
+        from echousd.stage.update import update_graph
+
+        update_graph(target, graph, room=root)
+        return
+    spec_path = stage.GetEditTarget().MapToSpecPath(path) if stage else path
+    author(layer, graph, spec_path)
+
+
+def prim_path(root: str | Sdf.Path) -> Sdf.Path:
+    """`root` as an absolute prim path; raises StageError."""
+    text = str(root)
+    if not Sdf.Path.IsValidPathString(text) or not Sdf.Path(text).IsAbsoluteRootOrPrimPath() or text == "/":
+        raise usd.StageError(f"room {text!r} is no prim path, allowed: an absolute path of identifiers such as /Room")
+    return Sdf.Path(text)
+
+
+def _holds_graph(stage: Usd.Stage | None, layer: Sdf.Layer, room: Sdf.Path) -> bool:
+    if stage:
+        prim = stage.GetPrimAtPath(room)
+        return bool(prim) and any(child.GetTypeName() == usd.GRAPH_TYPE for child in prim.GetChildren())
+    spec = layer.GetPrimAtPath(room)
+    return bool(spec) and any(child.typeName == usd.GRAPH_TYPE for child in spec.nameChildren)
+
+
+def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:
+    """Author all specs of `graph` below the spec path `room`, which may lie in a variant; keep what is there already."""
+    scene_path = room.StripAllVariantSelections()
+    objects_path = scene_path.AppendChild(usd.OBJECTS_NAME)
+    with Sdf.ChangeBlock():
+        room_spec = define(layer, room, "Xform")
+        if not room_spec.kind:
+            room_spec.kind = "assembly"
+        if room.IsRootPrimPath() and not layer.defaultPrim:
+            layer.defaultPrim = room.name
+        root = layer.pseudoRoot
+        for key, value in (("metersPerUnit", 1.0), ("upAxis", "Y")):
+            if room.IsRootPrimPath() and not root.HasInfo(key):
+                root.SetInfo(key, value)
+        graph_spec = define(layer, room.AppendChild(usd.GRAPH_NAME), usd.GRAPH_TYPE)
+        relate(graph_spec, usd.ROOM, scene_path)
+        for name, value in usd.room_values(graph.room).items():
+            put(graph_spec, name, value)
+        author_relations(graph_spec, graph.relations, objects_path)
+        objects = define(layer, room.AppendChild(usd.OBJECTS_NAME), "Xform")
+        if not objects.kind:
+            objects.kind = "group"
+        for node in graph.nodes:
+            author_node(objects, node)
+
+
+def author_relations(parent: Sdf.PrimSpec, relations: tuple[Relation, ...], objects: Sdf.Path) -> None:
+    """One EchoRelation prim per relation below `parent`, all ends being children of `objects`."""
+    taken: set[str] = set()
+    ends = {name: objects.AppendChild(name) for r in relations for name in (r.subject, r.object)}
+    for relation in relations:
+        name = usd.relation_name(relation.subject, relation.predicate, relation.object, taken)
+        taken.add(name)
+        author_relation(parent, name, relation, ends[relation.subject], ends[relation.object])
+
+
+def author_relation(
+    parent: Sdf.PrimSpec, name: str, relation: Relation, subject: Sdf.Path, object_: Sdf.Path
+) -> Sdf.PrimSpec:
+    """One EchoRelation prim called `name` below `parent`."""
+    spec = Sdf.PrimSpec(parent, name, Sdf.SpecifierDef, usd.RELATION_TYPE)
+    relate(spec, usd.SUBJECT, subject)
+    relate(spec, usd.OBJECT, object_)
+    put(spec, usd.PREDICATE, relation.predicate)
+    if relation.confidence != 1.0:
+        put(spec, usd.CONFIDENCE, float(relation.confidence))
+    return spec
+
+
+def author_node(parent: Sdf.PrimSpec, node: Node) -> Sdf.PrimSpec:
+    """One Xform with EchoNodeAPI and SemanticsLabelsAPI:category below `parent`, called like the node."""
+    spec = define(parent.layer, parent.path.AppendChild(node.name), "Xform")
+    apply_apis(spec)
+    for name, value in usd.node_values(node).items():
+        put(spec, name, value)
+    return spec
+
+
+def apply_apis(spec: Sdf.PrimSpec) -> None:
+    """Prepend EchoNodeAPI and SemanticsLabelsAPI:category to the prim's API schemas, keeping those it has."""
+    listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
+    have = [*listed.explicitItems, *listed.prependedItems, *listed.appendedItems]
+    missing = [name for name in (usd.NODE_API, usd.LABELS_API) if name not in have]
+    if not missing:
+        return
+    if listed.isExplicit:
+        listed.explicitItems = [*missing, *listed.explicitItems]
+    else:
+        listed.prependedItems = [*missing, *listed.prependedItems]
+    spec.SetInfo("apiSchemas", listed)
+
+
+def define(layer: Sdf.Layer, path: Sdf.Path, type_name: str) -> Sdf.PrimSpec:
+    """The prim spec at `path`, made a `def` of `type_name` unless it has a type of its own."""
+    spec = layer.GetPrimAtPath(path) or Sdf.CreatePrimInLayer(layer, path)
+    spec.specifier = Sdf.SpecifierDef
+    if not spec.typeName:
+        spec.typeName = type_name
+    return spec
+
+
+def put(spec: Sdf.PrimSpec, name: str, value: Any) -> None:
+    """Author the default value of one property of the encoding."""
+    attribute = spec.properties.get(name)
+    if attribute is None:
+        custom = name.startswith(usd.FREE)
+        attribute = Sdf.AttributeSpec(spec, name, usd.value_type(name, value), _UNIFORM, custom)
+    attribute.default = value
+
+
+def relate(spec: Sdf.PrimSpec, name: str, target: Sdf.Path) -> None:
+    """Author a relationship with exactly one target."""
+    relationship = spec.properties.get(name) or Sdf.RelationshipSpec(spec, name, False, _UNIFORM)
+    relationship.targetPathList.explicitItems = [target]
