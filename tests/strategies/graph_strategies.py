@@ -1,0 +1,70 @@
+"""Hypothesis strategies for valid scene graphs: `graphs()`, and their parts."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from echomodel.vocabulary import vocabulary
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+
+WORDS = vocabulary()
+names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,12}", fullmatch=True)
+numbers = st.floats(-1e6, 1e6, allow_nan=False)
+metres = st.floats(1e-3, 1e3)
+texts = st.text(
+    st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20
+).filter(lambda text: bool(text.strip()))
+scalars = st.one_of(
+    st.booleans(),
+    st.integers(-(2**63), 2**63 - 1),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20),
+)
+
+
+@st.composite
+def rooms(draw: st.DrawFn) -> RoomSpec:
+    """A room with a polygon, with extents or with neither."""
+    kind = draw(st.sampled_from([kind.name for kind in WORDS.room_types]))
+    height = draw(st.none() | metres)
+    width, depth = draw(metres), draw(metres)
+    floor = draw(st.sampled_from(["none", "size", "polygon"]))
+    if floor == "polygon":
+        corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
+        return RoomSpec(kind, floor_polygon=corners, height=height)
+    return RoomSpec(kind, size=(width, depth) if floor == "size" else None, height=height)
+
+
+@st.composite
+def nodes(draw: st.DrawFn, name: str) -> Node:
+    """A node with any of its optional fields."""
+    return Node(
+        name,
+        draw(st.sampled_from([category.name for category in WORDS.categories])),
+        style=draw(st.none() | texts),
+        size=draw(st.none() | st.tuples(metres, metres, metres)),
+        position=draw(st.none() | st.tuples(numbers, numbers, numbers)),
+        yaw=draw(st.none() | numbers),
+        locked=draw(st.booleans()),
+        attributes=draw(st.dictionaries(names, scalars, max_size=3)),
+    )
+
+
+@st.composite
+def graphs(draw: st.DrawFn, min_nodes: int = 1, max_nodes: int = 7) -> SceneGraph:
+    """A valid graph: in each order of the vocabulary the relations follow one drawn ranking of the nodes."""
+    chosen = draw(st.lists(names, min_size=min_nodes, max_size=max_nodes, unique=True))
+    orders = sorted({predicate.order for predicate in WORDS.predicates if predicate.order})
+    ranking = {order: draw(st.permutations(chosen)) for order in orders}
+    relations: dict[tuple[str, str, str], Relation] = {}
+    if len(chosen) > 1:
+        pairs = st.lists(st.sampled_from(chosen), min_size=2, max_size=2, unique=True)
+        stated = st.tuples(pairs, st.sampled_from(WORDS.predicates), st.sampled_from([1.0, 0.5]) | st.floats(0, 1))
+        for (subject, object_), predicate, confidence in draw(st.lists(stated, max_size=12)):
+            if predicate.order:
+                rank = ranking[predicate.order].index
+                if (rank(subject) - rank(object_)) * predicate.rank < 0:
+                    subject, object_ = object_, subject
+            relation = Relation(subject, predicate.name, object_, confidence)
+            relations[relation.triple] = relation
+    return SceneGraph(draw(rooms()), tuple(draw(nodes(name)) for name in chosen), tuple(relations.values()))
