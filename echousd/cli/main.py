@@ -3,23 +3,93 @@
 from __future__ import annotations
 
 import importlib
+import sys
+import traceback
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
 
 import typer
 
 app = typer.Typer(
     name="echousd",
     help="Author indoor scenes in USD from semantic scene graphs.",
-    no_args_is_help=True,
+    epilog="Exit codes: 0 done, 1 a check failed, 2 bad input, 70 a fault of echousd itself.",
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
 )
 
 # Each topic's module defines `register(app)`; it must not import torch or pxr at module level (start-up time).
-TOPICS = ()
+TOPICS: tuple[str, ...] = ()
+
+BAD_INPUT, INTERRUPTED, OWN_FAULT = 2, 130, 70
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from echousd import __version__
+
+        typer.echo(f"echousd {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
+    debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error; may stand anywhere."),
+) -> None:
+    """Author indoor scenes in USD from semantic scene graphs."""
 
 
 def main() -> None:
     """Entry point of the `echousd` command."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line (without the program's name) and return its exit code; errors go to stderr as one line."""
+    arguments = list(arguments)
+    own = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    debug = "--debug" in own
+    arguments = [word for word in own if word != "--debug"] + arguments[len(own) :]
+    try:
+        result = command().main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except BrokenPipeError:  # `echousd graph room.usda | head`: nobody reads on
+        sys.stdout = None  # type: ignore[assignment]  # the interpreter would flush it once more
+        return 0
+    except (typer.Abort, KeyboardInterrupt):
+        return _complain("interrupted", INTERRUPTED, debug)
+    except Exception as error:
+        return _complain(*_explained(error), debug)
+
+
+@cache
+def command() -> Any:
+    """The root command (a click group) with the commands of all topics."""
     for topic in TOPICS:
         importlib.import_module(f"echousd.cli.{topic}").register(app)
-    app()
+    return typer.main.get_command(app)
+
+
+def _explained(error: Exception) -> tuple[str, int]:
+    """One line and the exit code for an error."""
+    if hasattr(error, "format_message"):  # a wrong command line
+        context = getattr(error, "ctx", None)
+        hint = f" (try: {context.command_path} --help)" if context is not None else ""
+        return error.format_message().rstrip(".") + hint, BAD_INPUT
+    if isinstance(error, OSError) and error.strerror:
+        where = f"{error.filename}: " if error.filename is not None else ""
+        return where + error.strerror, BAD_INPUT
+    if isinstance(error, ValueError | OSError | ImportError):
+        return str(error), BAD_INPUT
+    return f"unexpected {type(error).__name__}: {error} (a fault of echousd; --debug shows where)", OWN_FAULT
+
+
+def _complain(message: str, code: int, debug: bool) -> int:
+    if debug:
+        traceback.print_exc()
+    typer.secho("error:", fg="red", bold=True, err=True, nl=False)
+    typer.echo(f" {' '.join(message.split())}", err=True)
+    return code

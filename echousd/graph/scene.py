@@ -415,9 +415,9 @@ class SceneGraph(_Model):
 
     def to_stage(self, path: str | os.PathLike[str]) -> None:
         """Write a stage that holds this graph; raises where `path` cannot be written."""
-        from echousd.stage import graph_layer
+        from echousd.stage import graph_layer, save_layer
 
-        graph_layer(self).Export(os.fspath(path))
+        save_layer(graph_layer(self), path)
 
 
 def bounding_extents(corners: tuple[Point, ...]) -> Point:
