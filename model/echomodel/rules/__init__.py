@@ -1,0 +1,7 @@
+"""Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for repair and guidance."""
+
+from echomodel.rules.labels import label_relations, label_rooms
+from echomodel.rules.margins import margins, measured, verdicts
+from echomodel.rules.sets import RULE_SETS, RuleSet, rule_set
+
+__all__ = ["RULE_SETS", "RuleSet", "label_relations", "label_rooms", "margins", "measured", "rule_set", "verdicts"]

@@ -1,0 +1,217 @@
+"""Rules: the published measurements number by number, the strict ones against slow twins, and labelling."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file
+from shapely import affinity
+from shapely.geometry import Polygon, box
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_relations, label_rooms, margins, measured, verdicts
+from echomodel.rules.geometry import pairs
+from echomodel.vocabulary import vocabulary
+
+FIXTURE = Path(__file__).parent / "fixtures" / "metrics_constraints.safetensors"
+P = {predicate.name: predicate.id for predicate in vocabulary().predicates}
+
+
+def boxes_of(size, position, yaw=None, dtype=torch.float64):
+    size, position = torch.as_tensor(size, dtype=dtype), torch.as_tensor(position, dtype=dtype)
+    return SimpleNamespace(
+        size=size,
+        position=position,
+        yaw=torch.zeros(len(size), dtype=dtype) if yaw is None else torch.as_tensor(yaw, dtype=dtype),
+    )
+
+
+def random_boxes(count, seed):
+    rng = np.random.default_rng(seed)
+    position = rng.uniform(-2, 2, (count, 3)) * [1, 0, 1] + rng.choice([0.0, 0.5, 1.8], (count, 1)) * [0, 1, 0]
+    return boxes_of(rng.uniform(0.2, 2.5, (count, 3)), position, rng.choice([0, np.pi / 2, 0.4, -2.0], count))
+
+
+def all_triplets(count, predicates):
+    return torch.tensor([[i, p, j] for i in range(count) for j in range(count) if i != j for p in predicates])
+
+
+def room_of(categories, size, position, yaw=None, **more):
+    floor = np.array([[-2, 2], [2, 2], [2, -2], [-2, -2]], float)
+    yaw = np.zeros(len(categories)) if yaw is None else np.asarray(yaw, float)
+    return RoomBoxes(
+        "r", "bedroom", floor, 2.6, tuple(categories), np.asarray(size, float), np.asarray(position, float), yaw, **more
+    )
+
+
+def test_sgfront_agrees_with_published_verdicts():
+    data = load_file(FIXTURE)
+    boxes = SimpleNamespace(size=data["boxes"][:, :3], position=data["boxes"][:, 3:], yaw=torch.rand(14))
+    kept = verdicts(boxes, data["triples"], rules="sgfront").long()
+    assert torch.equal(kept, data["per_triple"])
+    i, j = torch.meshgrid(torch.arange(14), torch.arange(14), indexing="ij")
+    pair = pairs(boxes, i.reshape(-1), j.reshape(-1), torch.zeros(14, 3), oriented=False)
+    assert torch.allclose(pair.overlap_ratio.double(), data["overlap_over_min_volume"].reshape(-1), atol=1e-6)
+    distance = data["min_corner_distance"].reshape(-1).nan_to_num(0)
+    assert torch.allclose(pair.corner_distance, distance, atol=2e-6)
+
+
+def footprint(boxes, k):
+    x, _, z = boxes.size[k].tolist()
+    # shapely's (x, y) plane holds (x, z): a yaw about +Y turns x towards -z.
+    turned = affinity.rotate(box(-x / 2, -z / 2, x / 2, z / 2), -float(boxes.yaw[k]), (0, 0), use_radians=True)
+    return affinity.translate(turned, float(boxes.position[k, 0]), float(boxes.position[k, 2]))
+
+
+def slow_overlap(boxes, i, j):
+    area = footprint(boxes, i).intersection(footprint(boxes, j)).area
+    low = max(float(boxes.position[k, 1]) for k in (i, j))
+    high = min(float(boxes.position[k, 1] + boxes.size[k, 1]) for k in (i, j))
+    return area * max(high - low, 0.0) / min(float(boxes.size[k].prod()) for k in (i, j))
+
+
+def test_oriented_geometry_agrees_with_shapely():
+    boxes = random_boxes(40, 1)
+    subject, _, object_ = all_triplets(40, [1]).T
+    pair = pairs(boxes, subject, object_, torch.zeros(40, 3), oriented=True)
+    for row, (i, j) in enumerate(zip(subject.tolist(), object_.tolist(), strict=True)):
+        assert float(pair.overlap_ratio[row]) == pytest.approx(slow_overlap(boxes, i, j), abs=2e-4)
+        a, b = footprint(boxes, i), footprint(boxes, j)
+        assert (float(pair.footprint_penetration[row]) > 1e-9) == (a.intersection(b).area > 1e-9)
+        nearest = min(np.hypot(*np.subtract(p, q)) for p in a.exterior.coords for q in b.exterior.coords)
+        tops = [[float(boxes.position[k, 1]), float(boxes.position[k, 1] + boxes.size[k, 1])] for k in (i, j)]
+        rise = min(abs(u - v) for u in tops[0] for v in tops[1])
+        assert float(pair.corner_distance[row]) == pytest.approx(np.hypot(nearest, rise), abs=1e-5)
+
+
+@pytest.mark.parametrize("yaw", [0.0, np.pi / 2, 0.3])
+def test_overlap_of_coinciding_and_touching_boxes(yaw):
+    size = [[1.0, 1, 2], [1.0, 1, 2], [1.0, 1, 2], [0.5, 1, 2]]
+    along = np.array([np.cos(yaw), 0, -np.sin(yaw)])  # the box's own x axis
+    position = [np.zeros(3), np.zeros(3), along * 1.0, along * 0.25]
+    boxes = boxes_of(size, np.array(position), [yaw, yaw, yaw, yaw])
+    pair = pairs(boxes, torch.tensor([0, 0, 0]), torch.tensor([1, 2, 3]), torch.zeros(4, 3), oriented=True)
+    assert pair.overlap_area.tolist() == pytest.approx([2.0, 0.0, 1.0], abs=1e-4)
+    polygons = [Polygon(footprint(boxes, 0)).intersection(footprint(boxes, k)).area for k in (1, 2, 3)]
+    assert pair.overlap_area.tolist() == pytest.approx(polygons, abs=1e-4)
+
+
+def test_strict_rules_say_what_the_words_say():
+    # 0 bed in the middle, 1 nightstand at its left (-z), 2 lamp on the nightstand, 3 lamp hanging over the bed.
+    boxes = boxes_of(
+        [[2.0, 1.0, 1.8], [0.5, 0.5, 0.5], [0.2, 0.4, 0.2], [0.6, 0.5, 0.6]],
+        [[0, 0, 0], [-0.6, 0, -1.3], [-0.6, 0.5, -1.3], [0, 2.0, 0.1]],
+    )
+    told = {
+        (1, "left", 0): 1, (0, "right", 1): 1, (1, "right", 0): 0,
+        (1, "behind", 0): 1, (0, "front", 1): 1, (3, "front", 0): 0,
+        (2, "standing_on", 1): 1, (2, "standing_on", 0): 0, (3, "standing_on", 0): 0,
+        (3, "above", 0): 1, (3, "above", 1): 0, (2, "above", 1): 0,
+        (0, "bigger_than", 1): 1, (1, "smaller_than", 0): 1, (1, "bigger_than", 0): 0,
+        (3, "taller_than", 0): 1, (0, "shorter_than", 3): 1, (1, "close_by", 0): 1, (3, "close_by", 1): 0,
+        (0, "same_style_as", 1): -1, (0, "in", 1): -1,
+    }  # fmt: skip
+    triplets = torch.tensor([[s, P[p], o] for s, p, o in told])
+    assert verdicts(boxes, triplets).tolist() == list(told.values())
+    margin = margins(boxes, triplets)
+    assert [(m >= 0) == (v != 0) for m, v in zip(margin.tolist(), told.values(), strict=True)] == [True] * len(told)
+
+
+def test_symmetry_is_about_the_axes_of_the_rooms_centre():
+    boxes = boxes_of(np.ones((3, 3)), [[1 + 5, 0, 0.5], [-1 + 5, 0, 0.5], [-1 + 5, 0, -0.5]])
+    triplets = torch.tensor([[0, 12, 1], [0, 12, 2]])
+    assert verdicts(boxes, triplets, center=torch.tensor([5.0, 0.0])).tolist() == [1, 0]
+    assert verdicts(boxes, triplets, center=torch.tensor([5.0, 0.0]), rules="sgfront").tolist() == [1, 1]
+    assert verdicts(boxes, triplets).tolist() == [0, 0]
+    with pytest.raises(ValueError, match="center has 2 rows but scene is missing"):
+        margins(boxes, triplets, center=torch.zeros(2, 2))
+
+
+def test_scene_batches_equal_single_scenes():
+    one, two = random_boxes(7, 3), random_boxes(5, 4)
+    both = SimpleNamespace(**{k: torch.cat([getattr(one, k), getattr(two, k)]) for k in ("size", "position", "yaw")})
+    triplets = [all_triplets(7, range(1, 13)), all_triplets(5, range(1, 13))]
+    joined = torch.cat([triplets[0], triplets[1] + torch.tensor([7, 0, 7])])
+    center = torch.tensor([[0.3, -0.2], [1.0, 0.5]], dtype=torch.float64)
+    scene = torch.tensor([0] * 7 + [1] * 5)
+    for rules in ("strict", "sgfront"):
+        got = margins(both, joined, rules=rules, scene=scene, center=center)
+        single = [margins(b, t, rules=rules, center=c) for b, t, c in zip((one, two), triplets, center, strict=True)]
+        assert torch.equal(got, torch.cat(single))
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_margins_are_finite_and_their_gradient_improves_them(rules):
+    boxes = random_boxes(8, 5)
+    boxes.position[1], boxes.size[1], boxes.yaw[1] = boxes.position[0], boxes.size[0], boxes.yaw[0]  # a coincidence
+    for leaf in (boxes.size, boxes.position, boxes.yaw):
+        leaf.requires_grad_(True)
+    triplets = all_triplets(8, sorted(measured(rules)))
+    margin = margins(boxes, triplets, rules=rules)
+    assert torch.isfinite(margin).all()
+    loss = torch.relu(0.01 - margin).sum()
+    loss.backward()
+    leaves = [leaf for leaf in (boxes.size, boxes.position, boxes.yaw) if leaf.grad is not None]
+    assert len(leaves) >= 2
+    assert all(torch.isfinite(leaf.grad).all() for leaf in leaves)
+    with torch.no_grad():
+        for leaf in leaves:
+            leaf -= 1e-5 * leaf.grad
+        assert torch.relu(0.01 - margins(boxes, triplets, rules=rules)).sum() < loss
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_labels_are_exactly_what_the_rules_accept(rules):
+    boxes = random_boxes(9, 7)
+    room = room_of(["chair"] * 9, boxes.size.numpy(), boxes.position.numpy(), boxes.yaw.numpy())
+    labels = label_relations(room, rules=rules)
+    kept = verdicts(room, torch.from_numpy(labels), rules=rules)
+    assert (kept != 0).all()
+    if rules == "strict":
+        every = all_triplets(9, sorted(measured(rules)))
+        satisfied = {tuple(t) for t, m in zip(every.tolist(), margins(room, every).tolist(), strict=True) if m > 3e-4}
+        assert satisfied <= {tuple(t) for t in labels.tolist()}
+
+
+def test_labels_from_style_category_and_model():
+    room = room_of(
+        ["double_bed", "nightstand", "kids_bed", "nightstand"],
+        np.ones((4, 3)),
+        [[0, 0, 0], [1, 0, 1], [-1, 0, 1], [1, 0, -1]],
+        styles=(3, 3, -1, 4),
+        models=("a", "b", "c", "b"),
+    )
+    labels = {tuple(t) for t in label_relations(room).tolist()}
+    assert (0, P["same_style_as"], 1) in labels
+    assert (1, P["same_style_as"], 3) in labels  # one model
+    assert (1, P["same_material_as"], 3) in labels
+    assert (0, P["same_material_as"], 1) not in labels
+    assert (0, P["same_super_category_as"], 2) in labels
+    assert (0, P["same_style_as"], 2) not in labels
+    assert (1, P["symmetrical_to"], 3) in labels
+    assert (0, P["symmetrical_to"], 2) not in labels  # another class
+
+
+def test_dropping_is_seeded_and_joined_labels_equal_single_ones():
+    rooms = [room_of(["chair"] * n, b.size.numpy(), b.position.numpy(), b.yaw.numpy()) for n in (6, 1, 8) for b in
+             [random_boxes(n, n)]]  # fmt: skip
+    assert [len(edges) == 0 for edges in label_rooms(rooms)] == [False, True, False]
+    for room, edges in zip(rooms, label_rooms(rooms), strict=True):
+        assert np.array_equal(edges, label_relations(room))
+    full = label_relations(rooms[2])
+    half = label_relations(rooms[2], drop=0.5, rng=np.random.default_rng(1))
+    assert {tuple(t) for t in half.tolist()} < {tuple(t) for t in full.tolist()}
+    assert 0.35 < len(half) / len(full) < 0.65
+    assert np.array_equal(half, label_relations(rooms[2], drop=0.5, rng=np.random.default_rng(1)))
+
+
+def test_errors_name_what_is_allowed():
+    room = room_of(["chair"], np.ones((1, 3)), np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="unknown rules 'loose': allowed are strict, sgfront"):
+        label_relations(room, rules="loose")
+    with pytest.raises(ValueError, match=r"drop is 1\.5: allowed is a probability, 0 to 1"):
+        label_relations(room, drop=1.5)
+    with pytest.raises(ValueError, match="needs rng"):
+        label_relations(room, drop=0.5)
