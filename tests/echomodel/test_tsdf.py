@@ -18,7 +18,9 @@ def test_a_box_of_any_aspect_gives_the_distance_to_the_normalised_cube():
     exact = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
     assert grid.shape == (64, 64, 64)
     assert grid.dtype == np.float32
-    assert np.abs(grid - np.clip(exact / TRUNCATION, -1, 1)).max() < 0.03
+    error = np.abs(grid * TRUNCATION - np.clip(exact, -TRUNCATION, TRUNCATION))
+    assert error.mean() < 0.005
+    assert error.max() < 0.2  # voxels; at the edges the nearest sample may lie on the other face
 
 
 def test_a_surface_goes_there_and_back():
