@@ -53,7 +53,7 @@ def label_rooms(
     owner = np.searchsorted(starts, found[:, 0], side="right") - 1
     found -= np.stack([starts[owner], np.zeros_like(owner), starts[owner]], -1)
     out = []
-    for number, room in enumerate(rooms):
+    for number in range(len(rooms)):
         edges = found[owner == number]
         if drop > 0.0 and rng is not None:
             edges = edges[rng.random(len(edges)) >= drop]
