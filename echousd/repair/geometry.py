@@ -1,0 +1,221 @@
+"""Oriented boxes, pairs of boxes and the floor as signed distances with gradients (numpy, vectorised over pairs).
+
+A box is (size, bottom-centre position, yaw about +Y). Gradients are taken with respect to the six free
+numbers of a box, in the order of `COLUMNS`: position x, y, z in metres and the logarithms of the sizes x, y, z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+COLUMNS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Signed distances that should be >= 0 and their gradients.
+
+    Arguments:
+        value: (r,) float, metres.
+        gradient: (r, n, 6) float, derivative of each value by the numbers of each of the n boxes.
+    """
+
+    value: np.ndarray
+    gradient: np.ndarray
+
+
+def axes(yaw: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) float: unit vectors in (x, z) of the width axis [:, 0] and of the front [:, 1]."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), 1)
+
+
+def corners(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """(n, 4, 2) float: footprint corners in (x, z), in order around the box."""
+    u = axes(yaw)
+    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.5
+    half = signs[None] * size[:, None, [0, 2]]
+    return position[:, None, [0, 2]] + half @ u
+
+
+def pair_indices(n: int) -> np.ndarray:
+    """(n (n - 1) / 2, 2) int: every pair once."""
+    return np.stack(np.triu_indices(n, 1), -1)
+
+
+def pair_gaps(
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray, order: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gap of every pair along its candidate separating axes (separating axis theorem for upright boxes).
+
+    Arguments:
+        size, position: (n, 3) float, metres; yaw: (n,) float, radians; pairs: (p, 2) int.
+        order: (p, 2) float, sign that (second - first) must have in x and in z, 0 = either; an axis that runs along
+            x or z then counts as separating on that side only.
+
+    Returns: gap (p, 5) float, metres: along the two horizontal axes of the first box, the two of the second, and
+        the vertical; direction (p, 4, 2) float: horizontal axis pointing from the first box to the second;
+        reach (p, 4, 2, 2) float: how much of the half width and half depth of each of the two boxes counts.
+    """
+    i, j = pairs[:, 0], pairs[:, 1]
+    u = axes(yaw)
+    axis = np.concatenate((u[i], u[j]), 1)
+    offset = (position[j] - position[i])[:, [0, 2]]
+    along = np.einsum("pad,pd->pa", axis, offset)
+    sign = np.where(along < 0, -1.0, 1.0)
+    if order is not None:
+        for d in (0, 1):
+            wanted = np.where(np.abs(axis[..., d]) > 0.9, np.sign(axis[..., d]) * order[:, None, d], 0.0)
+            sign = np.where(wanted != 0, wanted, sign)
+    direction = axis * sign[..., None]
+    reach = np.stack((np.abs(np.einsum("pad,pkd->pak", axis, u[i])), np.abs(np.einsum("pad,pkd->pak", axis, u[j]))), 2)
+    half = 0.5 * np.stack((size[i][:, [0, 2]], size[j][:, [0, 2]]), 1)
+    horizontal = sign * along - np.einsum("pabk,pbk->pa", reach, half)
+    top = position[:, 1] + size[:, 1]
+    vertical = np.maximum(position[j, 1] - top[i], position[i, 1] - top[j])
+    return np.concatenate((horizontal, vertical[:, None]), 1), direction, reach
+
+
+def separation(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """(p,) float: distance of each pair along its best axis in metres, negative = depth of penetration."""
+    return pair_gaps(size, position, yaw, pairs)[0].max(1) if len(pairs) else np.zeros(0)
+
+
+def separation_rows(
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    pairs: np.ndarray,
+    order: np.ndarray,
+    handicap: np.ndarray,
+) -> tuple[Rows, np.ndarray]:
+    """Separation of each pair along the axis that is best after subtracting a handicap.
+
+    Arguments:
+        size, position, yaw, pairs, order: as in `pair_gaps`.
+        handicap: (p, 5) float, metres by which an axis must be better to be chosen (inf = never).
+
+    Returns: the rows, and the chosen axis (p,) int.
+    """
+    gap, direction, reach = pair_gaps(size, position, yaw, pairs, order)
+    chosen = (gap - handicap).argmax(1)
+    p = np.arange(len(pairs))
+    value = gap[p, chosen]
+    gradient = np.zeros((len(pairs), len(size), COLUMNS))
+    flat = np.minimum(chosen, 3)
+    horizontal = chosen < 4
+    i, j = pairs[:, 0], pairs[:, 1]
+    push = direction[p, flat] * horizontal[:, None]
+    for end, column, sign in ((i, 0, -1.0), (j, 1, 1.0)):
+        gradient[p, end, 0] = sign * push[:, 0]
+        gradient[p, end, 2] = sign * push[:, 1]
+        shrink = -0.5 * reach[p, flat, column] * size[end][:, [0, 2]] * horizontal[:, None]
+        gradient[p, end, 3] = shrink[:, 0]
+        gradient[p, end, 5] = shrink[:, 1]
+    first_below = position[j, 1] + 0.5 * size[j, 1] >= position[i, 1] + 0.5 * size[i, 1]
+    lower, upper = np.where(first_below, i, j), np.where(first_below, j, i)
+    up = ~horizontal
+    gradient[p[up], upper[up], 1] = 1.0
+    gradient[p[up], lower[up], 1] = -1.0
+    gradient[p[up], lower[up], 4] = -size[lower[up], 1]
+    return Rows(value, gradient), chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """The floor polygon, counter-clockwise seen with z up on paper.
+
+    Arguments:
+        polygon: (k, 2) float, x and z of the corners, metres.
+        normal: (k, 2) float, unit vector into the room for the wall from corner i to corner i + 1.
+        reflex: (m, 2) float, corners that point into the room.
+    """
+
+    polygon: np.ndarray
+    normal: np.ndarray
+    reflex: np.ndarray
+
+
+def floor_from_polygon(polygon: np.ndarray) -> Floor:
+    """The floor with its walls' normals; raises ValueError for fewer than three corners or no area."""
+    polygon = np.asarray(polygon, float).reshape(-1, 2)
+    keep = np.linalg.norm(polygon - np.roll(polygon, -1, 0), axis=1) > 1e-6
+    polygon = polygon[keep]
+    following = np.roll(polygon, -1, 0)
+    area = 0.5 * float((polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]).sum())
+    if len(polygon) < 3 or abs(area) < 1e-6:
+        raise ValueError(f"floor polygon with {len(polygon)} different corners and area {abs(area):g} m2: not a floor")
+    if area < 0:
+        polygon = polygon[::-1].copy()
+    edge = np.roll(polygon, -1, 0) - polygon
+    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+    before = np.roll(edge, 1, 0)
+    turn = before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
+    return Floor(polygon, np.stack((-edge[:, 1], edge[:, 0]), -1), polygon[turn < -1e-6])
+
+
+def inside(floor: Floor, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Signed distance of points to the floor's border, positive inside.
+
+    Arguments:
+        points: (m, 2) float, x and z, metres.
+
+    Returns: distance (m,) float; gradient (m, 2) float, the direction in which it grows.
+    """
+    start = floor.polygon
+    edge = np.roll(start, -1, 0) - start
+    offset = points[:, None] - start
+    t = np.clip((offset * edge).sum(-1) / (edge * edge).sum(-1), 0.0, 1.0)
+    away = offset - t[..., None] * edge
+    distance = np.linalg.norm(away, axis=-1)
+    nearest = distance.argmin(1)
+    m = np.arange(len(points))
+    depth = distance[m, nearest]
+    end = start + edge
+    above = start[:, 1] > points[:, 1:]
+    crosses = above != (end[:, 1] > points[:, 1:])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = start[:, 0] + (points[:, 1:] - start[:, 1]) / edge[:, 1] * edge[:, 0]
+    within = (crosses & (points[:, :1] < x)).sum(1) % 2 == 1
+    sign = np.where(within, 1.0, -1.0)
+    gradient = np.where(
+        depth[:, None] > 1e-9,
+        sign[:, None] * away[m, nearest] / np.maximum(depth, 1e-9)[:, None],
+        floor.normal[nearest],
+    )
+    return sign * depth, gradient
+
+
+def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[Rows, np.ndarray]:
+    """Every footprint corner inside the floor and every reflex corner of the floor outside the footprints.
+
+    Returns: the rows, and the object that each row is about (r,) int.
+    """
+    n, u = len(size), axes(yaw)
+    corner = corners(size, position, yaw)
+    distance, gradient = inside(floor, corner.reshape(-1, 2))
+    who = np.repeat(np.arange(n), 4)
+    lever = corner.reshape(-1, 2) - position[who][:, [0, 2]]
+    local = np.einsum("rkd,rd->rk", u[who], lever)
+    rows = np.zeros((len(who), n, COLUMNS))
+    r = np.arange(len(who))
+    rows[r, who, 0], rows[r, who, 2] = gradient[:, 0], gradient[:, 1]
+    pull = np.einsum("rkd,rd->rk", u[who], gradient) * local
+    rows[r, who, 3], rows[r, who, 5] = pull[:, 0], pull[:, 1]
+    if not len(floor.reflex):
+        return Rows(distance, rows), who
+    offset = floor.reflex[None] - position[:, None, [0, 2]]
+    local = np.einsum("nkd,nmd->nmk", u, offset)
+    excess = np.abs(local) - 0.5 * size[:, None, [0, 2]]
+    axis = excess.argmax(-1)
+    value = np.take_along_axis(excess, axis[..., None], -1)[..., 0]
+    who2 = np.repeat(np.arange(n), len(floor.reflex))
+    axis, sign = axis.ravel(), np.sign(np.take_along_axis(local, axis[..., None], -1)).ravel()
+    rows2 = np.zeros((len(who2), n, COLUMNS))
+    r = np.arange(len(who2))
+    direction = -sign[:, None] * u[who2, axis]
+    rows2[r, who2, 0], rows2[r, who2, 2] = direction[:, 0], direction[:, 1]
+    rows2[r, who2, 3 + 2 * axis] = -0.5 * size[who2, 2 * axis]
+    return Rows(np.concatenate((distance, value.ravel())), np.concatenate((rows, rows2))), np.concatenate((who, who2))

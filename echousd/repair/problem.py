@@ -1,0 +1,212 @@
+"""A room to be repaired: what is fixed, what stands on what, which wall each piece leans on, who may overlap whom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from echomodel.vocabulary import vocabulary
+from echousd.repair.belonging import CARRIERS, WALL_FURNITURE, allowed_overlap, support
+from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, pair_gaps, pair_indices
+
+ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
+WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
+WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
+CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Everything about one room that stays the same while its boxes move.
+
+    Arguments:
+        categories: n canonical category words.
+        triplets: (e, 3) int, [subject, predicate id, object], those that the rules measure.
+        fixed: (n,) bool, boxes that must not move; rigid: (n,) bool, boxes that must keep their size.
+        floor: the floor polygon, or None where the room has none.
+        height: height of the ceiling in metres, or None.
+        carrier: (n,) int, the object that each one stands on, or `ON_FLOOR`, `ON_CEILING`, `FREE`.
+        wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
+        pairs: (p, 2) int, pairs that must not collide; allowed: (p,) float, depth that each pair may overlap, metres.
+        order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
+        lift: (p,) bool, pairs that may pass over one another.
+    """
+
+    categories: tuple[str, ...]
+    triplets: np.ndarray
+    fixed: np.ndarray
+    rigid: np.ndarray
+    floor: Floor | None
+    height: float | None
+    carrier: np.ndarray
+    wall: np.ndarray
+    pairs: np.ndarray
+    allowed: np.ndarray
+    order: np.ndarray
+    lift: np.ndarray
+
+
+def pose(
+    categories: Sequence[str],
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    triplets: np.ndarray,
+    *,
+    floor_polygon: np.ndarray | None,
+    height: float | None,
+    fixed: np.ndarray,
+    rigid: np.ndarray,
+    turned: np.ndarray,
+) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The problem of a room, with its boxes put at their height and wall furniture turned square to its wall.
+
+    Arguments:
+        turned: (n,) bool, boxes that must keep their yaw.
+        The others as `echousd.repair.repair_boxes`.
+
+    Returns: the problem, position (n, 3) and yaw (n,) to start from.
+    """
+    words = tuple(canonical(word) for word in categories)
+    floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
+    n = len(words)
+    carrier = carriers(words, size, position, yaw, triplets)
+    position, yaw = settle(size, position, carrier, height, fixed), yaw.copy()
+    wall = np.full((n, 2, 2), np.nan)
+    if floor is not None:
+        wall = lean(words, size, position, yaw, floor, carrier)
+        turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
+        yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
+    pairs = pair_indices(n)
+    i, j = pairs[:, 0], pairs[:, 1]
+    apart = ~(fixed[i] & fixed[j]) & (carrier[i] != j) & (carrier[j] != i)
+    pairs = pairs[apart]
+    problem = Problem(
+        words,
+        triplets,
+        fixed,
+        rigid,
+        floor,
+        height,
+        carrier,
+        wall,
+        pairs,
+        allowed_overlap(words, size, pairs),
+        required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
+        np.zeros(len(pairs), bool),
+    )
+    vertical = pair_gaps(size, position, yaw, pairs)[0][:, 4] if len(pairs) else np.zeros(0)
+    return replace(problem, lift=vertical > -0.02), position, yaw
+
+
+def canonical(word: str) -> str:
+    """The vocabulary's name for a word, or the word itself."""
+    try:
+        return vocabulary().category(word).name
+    except ValueError:
+        return word
+
+
+def required_order(n: int, triplets: np.ndarray) -> np.ndarray:
+    """(n, n, 2) float: sign that left, right, front and behind ask of (second - first) in x and in z."""
+    order = np.zeros((n, n, 2))
+    for name, column, sign in (("left", 1, 1.0), ("right", 1, -1.0), ("front", 0, -1.0), ("behind", 0, 1.0)):
+        chosen = triplets[triplets[:, 1] == vocabulary().predicate_id(name)]
+        order[chosen[:, 0], chosen[:, 2], column] = sign
+        order[chosen[:, 2], chosen[:, 0], column] = -sign
+    return order
+
+
+def carriers(
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray
+) -> np.ndarray:
+    """What each object stands on: as the relations say, else the nearest carrier for what rests on tables.
+
+    Returns: (n,) int as `Problem.carrier`; never a cycle.
+    """
+    n = len(categories)
+    kinds = [support(word) for word in categories]
+    out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(kind, FREE) for kind in kinds], int)
+    told = triplets[triplets[:, 1] == vocabulary().predicate_id("standing_on")]
+    for subject, _, target in told:
+        if subject != target and not _reaches(out, int(target), int(subject)):
+            out[subject] = target
+    for i in range(n):
+        if kinds[i] != "table" or out[i] >= 0:
+            continue
+        offsets = position[i][[0, 2]] - position[:, [0, 2]]
+        local = np.abs(np.einsum("nkd,nd->nk", axes(yaw), offsets)) - 0.5 * size[:, [0, 2]]
+        distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.linalg.norm(offsets, axis=1)
+        for k in range(n):
+            if k == i or categories[k] not in CARRIERS or _reaches(out, k, i):
+                distance[k] = np.inf
+        best = int(distance.argmin())
+        if distance[best] < CARRIER_REACH:
+            out[i] = best
+        else:
+            out[i] = FREE if position[i, 1] > 0.3 and categories[i] == "tv" else ON_FLOOR
+    return out
+
+
+def _reaches(carrier: np.ndarray, start: int, goal: int) -> bool:
+    while start >= 0:
+        if start == goal:
+            return True
+        start = int(carrier[start])
+    return False
+
+
+def settle(
+    size: np.ndarray, position: np.ndarray, carrier: np.ndarray, height: float | None, fixed: np.ndarray
+) -> np.ndarray:
+    """(n, 3) float: positions with each bottom on the floor or its carrier's top, and ceiling things at the ceiling."""
+    out = position.copy()
+    done = fixed.copy()
+
+    def put(i: int) -> float:
+        if not done[i]:
+            done[i] = True
+            if carrier[i] >= 0:
+                out[i, 1] = put(int(carrier[i]))
+            elif carrier[i] == ON_FLOOR:
+                out[i, 1] = 0.0
+            elif carrier[i] == ON_CEILING and height is not None:
+                out[i, 1] = height - size[i, 1]
+        return float(out[i, 1] + size[i, 1])
+
+    for i in range(len(size)):
+        put(i)
+    return out
+
+
+def lean(
+    categories: Sequence[str],
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    floor: Floor,
+    carrier: np.ndarray,
+) -> np.ndarray:
+    """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none."""
+    out = np.full((len(categories), 2, 2), np.nan)
+    front = axes(yaw)[:, 1]
+    start, end = floor.polygon, np.roll(floor.polygon, -1, 0)
+    along = end - start
+    length = np.linalg.norm(along, axis=1)
+    along = along / length[:, None]
+    corner = corners(size, position, yaw)
+    for i, word in enumerate(categories):
+        leaning = (word in WALL_FURNITURE and carrier[i] == ON_FLOOR) or support(word) == "wall"
+        if not leaning:
+            continue
+        facing = floor.normal @ front[i] > np.cos(WALL_TURN)
+        gap = ((corner[i][None] - start[:, None]) * floor.normal[:, None]).sum(-1).min(1)
+        at = ((position[i][[0, 2]] - start) * along).sum(1)
+        beside = (at > -0.2) & (at < length + 0.2)
+        distance = np.where(facing & beside & (gap < WALL_REACH) & (gap > -1.5), np.abs(gap), np.inf)
+        best = int(distance.argmin())
+        if np.isfinite(distance[best]):
+            out[i] = start[best], floor.normal[best]
+    return out

@@ -1,0 +1,228 @@
+"""Repair: move and size sampled boxes as little as possible until the room keeps its graph and nothing collides."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echomodel.vocabulary import vocabulary
+from echousd.repair.constraints import relation_margins
+from echousd.repair.problem import pose, settle
+from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
+from echousd.repair.solver import RepairConfig, solve
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
+    from echousd.graph import Relation, SceneGraph
+
+SMALLEST = 0.02  # metres: no side of a sampled box is shorter
+DEFAULT_HEIGHT = 2.8
+
+
+@dataclass(frozen=True, eq=False)
+class RepairedBoxes:
+    """What became of the boxes of one room.
+
+    Arguments:
+        size, position: (n, 3) float, metres; yaw: (n,) float, radians.
+        verdict: (e,) int8, 1 kept, 0 broken, -1 not measured; margin: (e,) float, metres or ratio.
+        conflicts: groups of demands that contradict each other.
+        collisions: (pair, depth in metres) of boxes that still collide; outside: (object, depth in metres).
+        moved: (n,) float, metres; resized: (n,) float, largest relative change of a side; seconds: time spent.
+    """
+
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+    verdict: np.ndarray
+    margin: np.ndarray
+    conflicts: tuple[Conflict, ...]
+    collisions: tuple[tuple[tuple[int, int], float], ...]
+    outside: tuple[tuple[int, float], ...]
+    moved: np.ndarray
+    resized: np.ndarray
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class RepairResult:
+    """The repaired room in the words of its graph.
+
+    Arguments:
+        boxes: N boxes in the order of the graph's nodes.
+        kept, broken, unmeasured: relations of the graph by verdict.
+        conflicts: for what could not be met, sentences that name the relations and other demands in conflict.
+        collisions: (name, name, depth in metres); outside: (name, depth in metres).
+        moved: name -> metres; resized: name -> largest relative change of a side.
+        seconds: time spent.
+    """
+
+    boxes: Boxes
+    kept: tuple[Relation, ...]
+    broken: tuple[Relation, ...]
+    unmeasured: tuple[Relation, ...]
+    conflicts: tuple[str, ...]
+    collisions: tuple[tuple[str, str, float], ...]
+    outside: tuple[tuple[str, float], ...]
+    moved: dict[str, float]
+    resized: dict[str, float]
+    seconds: float
+
+
+def repair(
+    graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: RepairConfig | None = None
+) -> RepairResult:
+    """Repair the sampled boxes of a graph: see `repair_boxes`.
+
+    Nodes that are locked or have a position stay where they are, nodes with a size keep it, nodes with a yaw keep it.
+
+    Arguments:
+        graph: the graph that the boxes were sampled for.
+        boxes: N boxes in the order of its nodes, metres and radians, in the frame of the room's floor.
+        rules: `strict` or `sgfront`.
+
+    Raises:
+        ValueError: as `repair_boxes`, or another number of boxes than nodes.
+    """
+    import torch
+
+    from echomodel.boxes import Boxes
+
+    nodes, words = graph.nodes, vocabulary()
+    if len(boxes) != len(nodes):
+        raise ValueError(f"{len(boxes)} boxes for a graph of {len(nodes)} objects: need one box per object")
+    index = {node.name: i for i, node in enumerate(nodes)}
+    triplets = np.array(
+        [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations], int
+    ).reshape(-1, 3)
+    done = repair_boxes(
+        [node.category for node in nodes],
+        np.asarray(boxes.size, float),
+        np.asarray(boxes.position, float),
+        np.asarray(boxes.yaw, float),
+        triplets,
+        floor_polygon=floor_of(graph),
+        height=graph.room.height or DEFAULT_HEIGHT,
+        fixed=np.array([node.locked or node.position is not None for node in nodes]),
+        rigid=np.array([node.locked or node.size is not None for node in nodes]),
+        turned=np.array([node.locked or node.yaw is not None for node in nodes]),
+        rules=rules,
+        config=config,
+    )
+    names = graph.names
+    by_verdict = {
+        v: tuple(r for r, found in zip(graph.relations, done.verdict, strict=True) if found == v) for v in (1, 0, -1)
+    }
+    return RepairResult(
+        boxes=Boxes(
+            torch.as_tensor(done.size, dtype=torch.float32),
+            torch.as_tensor(done.position, dtype=torch.float32),
+            torch.as_tensor(done.yaw, dtype=torch.float32),
+        ),
+        kept=by_verdict[1],
+        broken=by_verdict[0],
+        unmeasured=by_verdict[-1],
+        conflicts=tuple(sentence(conflict, graph) for conflict in done.conflicts),
+        collisions=tuple((names[i], names[j], depth) for (i, j), depth in done.collisions),
+        outside=tuple((names[i], depth) for i, depth in done.outside),
+        moved=dict(zip(names, done.moved.tolist(), strict=True)),
+        resized=dict(zip(names, done.resized.tolist(), strict=True)),
+        seconds=done.seconds,
+    )
+
+
+def floor_of(graph: SceneGraph) -> np.ndarray | None:
+    """(k, 2) float, the room's floor polygon, the rectangle around the origin of its size, or None."""
+    if graph.room.floor_polygon is not None:
+        return np.asarray(graph.room.floor_polygon, float)
+    if graph.room.size is None:
+        return None
+    x, z = np.asarray(graph.room.size, float) / 2
+    return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
+
+
+def repair_boxes(
+    categories: Sequence[str],
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    triplets: np.ndarray,
+    *,
+    floor_polygon: np.ndarray | None = None,
+    height: float | None = None,
+    fixed: np.ndarray | None = None,
+    rigid: np.ndarray | None = None,
+    turned: np.ndarray | None = None,
+    rules: str = "strict",
+    config: RepairConfig | None = None,
+) -> RepairedBoxes:
+    """Move and size boxes as little as possible until relations, collisions, floor, walls and support are right.
+
+    Arguments:
+        categories: n category words (words outside the vocabulary stand on the floor and belong to nothing).
+        size, position: (n, 3) float, metres, position = centre of the bottom face; yaw: (n,) float, radians.
+        triplets: (e, 3) int, [subject, predicate id, object].
+        floor_polygon: (k, 2) float, x and z, metres; None = no walls.
+        height: of the ceiling, metres; None = ceiling things keep their height.
+        fixed, rigid, turned: (n,) bool, boxes that must keep their position, size, yaw.
+        rules: `strict` or `sgfront`.
+
+    Raises:
+        ValueError: a box that is not finite, a floor without area, or unknown rules.
+    """
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.rules import measured, verdicts
+
+    started = time.perf_counter()
+    n = len(categories)
+    bad = ~(np.isfinite(size).all(1) & np.isfinite(position).all(1) & np.isfinite(yaw))
+    if bad.any():
+        at = int(np.flatnonzero(bad)[0])
+        raise ValueError(
+            f"box {at} ({categories[at]}) is not finite: size {size[at]}, position {position[at]}, yaw {yaw[at]}"
+        )
+    triplets = np.asarray(triplets, int).reshape(-1, 3)
+    none = np.zeros(n, bool)
+    fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
+    centre = np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2
+    judged = np.isin(triplets[:, 1], sorted(measured(rules)))
+    start_size = np.where(rigid[:, None], size, np.maximum(size, SMALLEST))
+    problem, start, turn = pose(
+        categories,
+        start_size,
+        position,
+        yaw,
+        triplets,
+        floor_polygon=floor_polygon,
+        height=height,
+        fixed=fixed,
+        rigid=rigid,
+        turned=turned,
+    )
+    problem = replace(problem, triplets=triplets[judged])
+    found = solve(problem, start_size, start, turn, rules=rules, centre=centre, config=config or RepairConfig())
+    # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
+    end = settle(found.size, found.position, problem.carrier, None, fixed)
+    ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)
+    boxes = Boxes(*(t.float() for t in ends))
+    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre))
+    margin, _ = relation_margins(found.size, end, turn, triplets, rules=rules, centre=centre)
+    return RepairedBoxes(
+        size=found.size,
+        position=end,
+        yaw=turn,
+        verdict=verdict.numpy(),
+        margin=margin,
+        conflicts=conflicts(problem, found, np.flatnonzero(judged)),
+        collisions=collisions(problem, found.size, end, turn),
+        outside=outside(problem, found.size, end, turn),
+        moved=np.linalg.norm(end - position, axis=1),
+        resized=np.abs(found.size / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
+        seconds=time.perf_counter() - started,
+    )

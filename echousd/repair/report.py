@@ -1,0 +1,105 @@
+"""What a repaired room still gets wrong: collisions, objects outside, and the demands that contradict each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echousd.repair.constraints import COLLISION, FLOOR, RELATION
+from echousd.repair.geometry import floor_rows, separation
+from echousd.repair.problem import Problem
+from echousd.repair.solver import Solution
+
+if TYPE_CHECKING:
+    from echousd.graph import SceneGraph
+
+TOUCH = 0.01  # metres: deeper than this into another box is a collision, further than this outside is outside
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Demands of one room that cannot all be met, by number.
+
+    Arguments:
+        relations: rows of the triplets; pairs: objects that would collide; outside: objects that would leave the floor.
+    """
+
+    relations: tuple[int, ...]
+    pairs: tuple[tuple[int, int], ...]
+    outside: tuple[int, ...]
+
+
+def collisions(
+    problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray
+) -> tuple[tuple[tuple[int, int], float], ...]:
+    """Pairs of boxes that run into each other deeper than they may, deepest first, with the excess depth in metres."""
+    if not len(problem.pairs):
+        return ()
+    depth = -(separation(size, position, yaw, problem.pairs) + problem.allowed)
+    order = np.argsort(-depth)
+    return tuple(
+        ((int(problem.pairs[p, 0]), int(problem.pairs[p, 1])), float(depth[p])) for p in order if depth[p] > TOUCH
+    )
+
+
+def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[tuple[int, float], ...]:
+    """Objects that leave the floor, with the depth in metres."""
+    if problem.floor is None:
+        return ()
+    rows, who = floor_rows(problem.floor, size, position, yaw)
+    depth = np.zeros(len(size))
+    np.maximum.at(depth, who, -rows.value)
+    return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())
+
+
+def conflicts(problem: Problem, found: Solution, rows: np.ndarray) -> tuple[Conflict, ...]:
+    """Groups of demands that could not all be met: violated constraints that share objects that could have moved.
+
+    At the least violation the contradicting constraints press against each other and share it, so that the violated
+    constraints around one object are the contradiction.
+
+    Arguments:
+        rows: (e,) int, number in the caller's triplets of each of the problem's triplets.
+    """
+    at = found.at
+    violated = np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR)))
+    touched = [
+        frozenset(np.flatnonzero(np.abs(at.gradient[r].reshape(len(problem.fixed), -1)).sum(1) > 0)) for r in violated
+    ]
+    groups: list[tuple[set[int], list[int]]] = []
+    for row, objects in zip(violated.tolist(), touched, strict=True):
+        movable = {int(i) for i in objects if not (problem.fixed[i] and problem.rigid[i])}
+        joined, members = set(movable), [row]
+        apart = []
+        for other, numbers in groups:
+            if other & joined:
+                joined |= other
+                members = numbers + members
+            else:
+                apart.append((other, numbers))
+        groups = [*apart, (joined, members)]
+    first = {kind: int(np.argmax(at.kind == kind)) for kind in (RELATION, COLLISION)}
+    objects_of = dict(zip(violated.tolist(), touched, strict=True))
+    return tuple(
+        Conflict(
+            tuple(int(rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
+            tuple(
+                (int(problem.pairs[r - first[COLLISION], 0]), int(problem.pairs[r - first[COLLISION], 1]))
+                for r in members
+                if at.kind[r] == COLLISION
+            ),
+            tuple(sorted({int(i) for r in members if at.kind[r] == FLOOR for i in objects_of[r]})),
+        )
+        for _, members in groups
+    )
+
+
+def sentence(conflict: Conflict, graph: SceneGraph) -> str:
+    """The conflict in the words of the graph."""
+    names = graph.names
+    parts = [f"'{graph.relations[r]}'" for r in conflict.relations]
+    parts += [f"{names[i]} and {names[j]} apart" for i, j in conflict.pairs]
+    parts += [f"{names[i]} on the floor's area" for i in conflict.outside]
+    return "cannot hold together: " + ", ".join(parts) if len(parts) > 1 else f"cannot be met: {parts[0]}"

@@ -1,0 +1,214 @@
+"""Least movement that satisfies the constraints: sequential quadratic programming with an active-set inner solver.
+
+Each round linearises every constraint (`constraints.linearise`) and solves
+min 1/2 |step|^2_W + sum_r rho_r/2 violation_r^2, whose minimum is found exactly by Newton steps over the active set
+because the objective is piecewise quadratic. The weights rho are so large that a constraint which can be met is met.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from echousd.repair.constraints import (
+    CEILING,
+    COLLISION,
+    FLOOR,
+    OVERHANG,
+    RELATION,
+    SUPPORT,
+    WALL,
+    Linearised,
+    linearise,
+)
+from echousd.repair.geometry import COLUMNS
+from echousd.repair.problem import Problem
+
+
+@dataclass(frozen=True)
+class RepairConfig:
+    """How far and how hard boxes are pushed.
+
+    Arguments:
+        move: metres that cost as much as `stretch`.
+        stretch: change of the logarithm of a size that costs as much as `move`.
+        slack: metres or ratio by which relations are to hold.
+        rounds: most linearisations per attempt.
+        attempts: how often a stuck room is tried again with other separating axes.
+        seconds: no further attempt is started after this time.
+    """
+
+    move: float = 0.3
+    stretch: float = 0.12
+    slack: float = 0.004
+    rounds: int = 16
+    attempts: int = 4
+    seconds: float = 0.22
+
+
+# Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
+STIFFNESS = {RELATION: 1e5, COLLISION: 1e5, FLOOR: 1e5, WALL: 3e2, SUPPORT: 1e5, CEILING: 1e3, OVERHANG: 1e4}
+LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.25, 0.25, 0.25])
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where an attempt ended.
+
+    Arguments:
+        size, position: (n, 3) float, metres.
+        at: constraints linearised there; score: sum of the violations of the hard constraints; rounds: linearisations.
+    """
+
+    size: np.ndarray
+    position: np.ndarray
+    at: Linearised
+    score: float
+    rounds: int
+
+
+def solve(
+    problem: Problem,
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    *,
+    rules: str,
+    centre: np.ndarray,
+    config: RepairConfig,
+) -> Solution:
+    """Move and size boxes until the constraints hold; the best attempt where they cannot all hold.
+
+    Arguments:
+        size, position: (n, 3) float, metres, boxes to start from; yaw: (n,) float, radians.
+        rules, centre: as `constraints.relation_margins`.
+    """
+    start = time.perf_counter()
+    handicap = np.zeros((len(problem.pairs), 5))
+    handicap[:, 4] = np.where(problem.lift, 0.0, np.inf)
+    best: Solution | None = None
+    for _ in range(config.attempts):
+        found = _descend(problem, size, position, yaw, handicap, rules=rules, centre=centre, config=config)
+        if best is None or found.score < best.score:
+            best = found
+        stuck = (found.at.kind == COLLISION) & (found.at.value < -0.01)
+        if not stuck.any() or time.perf_counter() - start > config.seconds:
+            break
+        colliding = np.flatnonzero(stuck) - int(np.argmax(found.at.kind == COLLISION))
+        handicap[colliding, found.at.axis[colliding]] += 0.4
+    assert best is not None
+    return best
+
+
+def _descend(
+    problem: Problem,
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    handicap: np.ndarray,
+    *,
+    rules: str,
+    centre: np.ndarray,
+    config: RepairConfig,
+) -> Solution:
+    n = len(size)
+    free = np.stack([~problem.fixed] * 3 + [~problem.rigid] * 3, 1).ravel()
+    weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
+    origin = np.concatenate((position, np.log(size)), 1)
+    stiffnesses = np.array([STIFFNESS[kind] for kind in range(len(STIFFNESS))])
+    state = origin.copy()
+    best: Solution | None = None
+    for number in range(config.rounds + 1):
+        now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
+        at = linearise(
+            problem, now_size, now_position, yaw, rules=rules, centre=centre, handicap=handicap, slack=config.slack
+        )
+        score = violation(at)
+        if best is None or score < best.score - 1e-9:
+            best = Solution(now_size, now_position, at, score, number)
+        settled = number > 0 and score < 1e-9 and _soft(at) < 0.05
+        if number == config.rounds or settled or number - best.rounds > 6:
+            break
+        # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
+        damping = 1.0 if number < 6 else 4.0 * (number - 5)
+        step = newton(
+            at.gradient[:, free],
+            at.value,
+            at.equal,
+            stiffnesses[at.kind],
+            weight,
+            (state - origin).ravel()[free],
+            damping,
+        )
+        full = np.zeros(n * COLUMNS)
+        full[free] = step
+        state = state + np.clip(full.reshape(n, COLUMNS), -LARGEST_STEP, LARGEST_STEP)
+    assert best is not None
+    return best
+
+
+def violation(at: Linearised) -> float:
+    """Sum of the violations of relations, collisions, floor and overhang, beyond a tolerance of 2 mm."""
+    hard = ~at.equal
+    return float(np.maximum(-at.value[hard] - 0.002, 0.0).sum())
+
+
+def _soft(at: Linearised) -> float:
+    wall = at.kind == WALL
+    return float(np.abs(at.value[wall]).max()) if wall.any() else 0.0
+
+
+def newton(
+    gradient: np.ndarray,
+    value: np.ndarray,
+    equal: np.ndarray,
+    stiffness: np.ndarray,
+    weight: np.ndarray,
+    moved: np.ndarray,
+    damping: float,
+) -> np.ndarray:
+    """Exact minimiser of 1/2 |moved + d|^2_W + damping' |d|^2 + sum rho/2 hinge(-(value + gradient d))^2 over d.
+
+    Arguments:
+        gradient: (r, m) float; value, stiffness: (r,) float; equal: (r,) bool.
+        weight, moved: (m,) float: price of and present distance from the starting boxes.
+        damping: factor >= 1 on the price of this step.
+
+    Returns: d (m,) float.
+    """
+    extra = (damping - 1.0) * weight
+    # Rows that no step of the allowed length can violate never become active.
+    far = value - 0.6 * np.abs(gradient).sum(1) > 0
+    keep = equal | ~far
+    gradient, value, equal, stiffness = gradient[keep], value[keep], equal[keep], stiffness[keep]
+    step = np.zeros(len(weight))
+
+    def cost(d: np.ndarray) -> tuple[float, np.ndarray]:
+        residual = value + gradient @ d
+        active = equal | (residual < 0)
+        total = 0.5 * (weight * (moved + d) ** 2).sum() + 0.5 * (extra * d * d).sum()
+        return total + 0.5 * (stiffness[active] * residual[active] ** 2).sum(), active
+
+    now, active = cost(step)
+    for _ in range(20):
+        rows = gradient[active]
+        scaled = rows * stiffness[active, None]
+        hessian = rows.T @ scaled
+        hessian[np.diag_indices_from(hessian)] += weight + extra
+        target = cho_solve(cho_factor(hessian, check_finite=False), -scaled.T @ value[active] - weight * moved)
+        direction, length = target - step, 1.0
+        for _ in range(12):
+            after, following = cost(step + length * direction)
+            if after <= now + 1e-12:
+                break
+            length *= 0.5
+        else:
+            return step
+        same = length == 1.0 and bool((following == active).all())
+        step, now, active = step + length * direction, after, following
+        if same:
+            break
+    return step
