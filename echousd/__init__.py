@@ -33,7 +33,7 @@ __all__ = [
     "Relation",
     "RoomSpec",
     "SceneGraph",
-    "generate",  # noqa: F822
+    "generate",
     "read_graph",
     "read_rooms",
     "write_graph",

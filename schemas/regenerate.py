@@ -1,7 +1,8 @@
-"""Regenerate the codeless plugin in resources/ from schema.usda: `python -m echousd.schemas.regenerate` (needs jinja2)."""
+"""Regenerate the plugin in resources/ from schema.usda: `python -m echousd.schemas.regenerate` (needs jinja2)."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,9 @@ def regenerate(target: Path = RESOURCES) -> None:
     """
     target.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "pxr.Usd.usdGenSchema", str(SCHEMA), str(target)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    # The installed plugin must not be loaded while it is generated anew.
+    environment = {key: text for key, text in os.environ.items() if key != "PXR_PLUGINPATH_NAME"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     if done.returncode:
         raise RuntimeError(f"usdGenSchema failed on {SCHEMA}:\n{done.stdout}{done.stderr}")
     # A codeless plugin has no library and lies beside its resources: fill in what a C++ build would.

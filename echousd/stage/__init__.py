@@ -2,7 +2,20 @@
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer
+from echousd.stage.foreign import foreign_graph, relations_from_boxes
 from echousd.stage.read import read_graph, read_rooms
+from echousd.stage.update import update_graph
 from echousd.stage.write import graph_layer, write_graph
 
-__all__ = ["StageError", "graph_layer", "open_stage", "read_graph", "read_rooms", "save_layer", "write_graph"]
+__all__ = [
+    "StageError",
+    "foreign_graph",
+    "graph_layer",
+    "open_stage",
+    "read_graph",
+    "read_rooms",
+    "relations_from_boxes",
+    "save_layer",
+    "update_graph",
+    "write_graph",
+]

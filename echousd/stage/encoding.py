@@ -59,6 +59,7 @@ VALUE_TYPES = {
     LABELS: _TYPES.TokenArray,
 }
 
+
 class StageError(ValueError):
     """A stage, layer or prim does not hold what it should; one line with what was found, where and what is allowed."""
 

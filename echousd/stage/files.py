@@ -6,11 +6,12 @@ import os
 import tempfile
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
 
-EXTENSIONS = (".usd", ".usda", ".usdc")
+WRITABLE = (".usd", ".usda", ".usdc")
+READABLE = (*WRITABLE, ".usdz")
 
 
 def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
@@ -18,27 +19,42 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     path = Path(path)
     if not path.exists():
         raise StageError(f"{path}: no such file")
+    if path.is_dir():
+        raise StageError(f"{path}: a folder, allowed: a file, {', '.join(READABLE)}")
+    if path.suffix not in READABLE:
+        raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(READABLE)}")
+    silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well
     try:
         stage = Usd.Stage.Open(str(path))
     except Tf.ErrorException as error:
-        raise StageError(f"{path}: not a USD file that can be read ({first_line(error)})") from None
-    errors = stage.GetCompositionErrors() if hasattr(stage, "GetCompositionErrors") else []
+        raise StageError(f"{path}: not a USD file that can be read ({said(error)})") from None
+    finally:
+        silence.TakeUncoalescedDiagnostics()
+        del silence
+    errors = stage.GetCompositionErrors()
     if errors:
-        raise StageError(f"{path}: does not compose: {errors[0]}")
+        raise StageError(f"{path}: does not compose: {one_line(str(errors[0]))}")
     return stage
 
 
-def first_line(error: Tf.ErrorException) -> str:
-    """What USD says about an error, without file and line of its own source."""
-    said = [entry.commentary.strip().splitlines()[0] for entry in error.args if getattr(entry, "commentary", "")]
-    return said[0] if said else str(error).strip().splitlines()[0]
+def said(error: Tf.ErrorException) -> str:
+    """The most specific thing that USD says about an error, in one line."""
+    texts = [str(getattr(entry, "commentary", "")).strip() for entry in error.args]
+    specific = [text for text in texts if text and not text.startswith("Failed to open layer")]
+    return one_line(specific[-1] if specific else "no layer of a known format")
+
+
+def one_line(text: str, most: int = 200) -> str:
+    """The first line of `text`, cut to `most` characters."""
+    line = text.strip().splitlines()[0]
+    return line if len(line) <= most else line[: most - 3] + "..."
 
 
 def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
     """Write a layer to `path` (.usd, .usda or .usdc) by a temporary file beside it and a rename; raises StageError."""
     path = Path(path)
-    if path.suffix not in EXTENSIONS:
-        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(EXTENSIONS)}")
+    if path.suffix not in WRITABLE:
+        raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(WRITABLE)}")
     if not path.parent.is_dir():
         raise StageError(f"{path}: the folder {path.parent} does not exist")
     try:
@@ -49,8 +65,10 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
     try:
         if not layer.Export(temporary):
             raise StageError(f"{path}: cannot be written")
-        os.replace(temporary, path)
+        Path(temporary).replace(path)
     except (OSError, Tf.ErrorException) as error:
-        raise StageError(f"{path}: cannot be written ({error})") from None
+        raise StageError(
+            f"{path}: cannot be written ({said(error) if isinstance(error, Tf.ErrorException) else error.strerror})"
+        ) from None
     finally:
         Path(temporary).unlink(missing_ok=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
-from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 
@@ -31,25 +31,29 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
     """
     stage = opened(stage)
     rooms = find_rooms(stage)
-    if room is None and len(rooms) == 1:
-        return room_graph(rooms[0])
-    if room is None and not rooms:
-        from echousd.stage.foreign import foreign_graph
+    if rooms or room is not None:
+        return room_graph(the_room(stage, room, rooms))
+    from echousd.stage.foreign import foreign_graph
 
-        return foreign_graph(stage)
-    wanted = [prims for prims in rooms if room is not None and str(prims.room.GetPath()) == str(room)]
-    if not wanted:
-        where = source(stage)
-        names = ", ".join(str(prims.room.GetPath()) for prims in rooms)
-        if room is None:
-            raise StageError(f"{where}: {len(rooms)} rooms, say which one: {names}")
-        raise StageError(f"{where}: no room {room!r}, " + (f"allowed: {names}" if rooms else "the stage has no scene graph"))
-    return room_graph(wanted[0])
+    return foreign_graph(stage)
 
 
 def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
     """Every room's graph by the prim path of the room, in the stage's order; empty where there is none."""
     return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(opened(stage))}
+
+
+def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None = None) -> RoomPrims:
+    """The room at the prim path `room`, or the only one; raises StageError that lists the rooms there are."""
+    rooms = find_rooms(stage) if rooms is None else rooms
+    found = rooms if room is None else [prims for prims in rooms if str(prims.room.GetPath()) == str(room)]
+    if len(found) == 1:
+        return found[0]
+    paths = ", ".join(str(prims.room.GetPath()) for prims in rooms)
+    if found:
+        raise StageError(f"{source(stage)}: {len(rooms)} rooms, say which one of {paths}")
+    what = f"no room {str(room)!r}" if room is not None else "no scene graph (no EchoSceneGraph prim)"
+    raise StageError(f"{source(stage)}: {what}" + (f", allowed: {paths}" if rooms else ""))
 
 
 def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:
@@ -121,7 +125,7 @@ def place(prim: Usd.Prim) -> str:
 def room_graph(prims: RoomPrims) -> SceneGraph:
     """The graph of one room; raises StageError that names the prim at fault."""
     names = node_names(prims)
-    nodes = tuple(_node(prim, names[prim.GetPath()]) for prim in prims.nodes)
+    nodes = tuple(read_node(prim, names[prim.GetPath()]) for prim in prims.nodes)
     read = (relation_of(prim, names) for prim in prims.relations)
     relations = tuple(relation for relation in read if relation)
     try:
@@ -141,7 +145,7 @@ def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
                 f"{source(prim.GetStage())}: two nodes are called {name!r}: <{seen[name]}> and <{path}>, "
                 "allowed: a name of its own for each node of a room"
             )
-        seen[name] = names[path] = path if name not in seen else path
+        seen[name] = path
         names[path] = name
     return names
 
@@ -150,9 +154,7 @@ def room_spec(graph: Usd.Prim) -> RoomSpec:
     """The `RoomSpec` that an EchoSceneGraph prim holds."""
     vocabulary = value(graph, usd.VOCABULARY)
     if vocabulary not in (None, usd.VOCABULARY_NAME):
-        raise StageError(
-            f"{place(graph)}: {usd.VOCABULARY} is {vocabulary!r}, allowed: {usd.VOCABULARY_NAME}"
-        )
+        raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {vocabulary!r}, allowed: {usd.VOCABULARY_NAME}")
     corners, size, height = (value(graph, name) for name in (usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT))
     try:
         return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height)
@@ -160,7 +162,8 @@ def room_spec(graph: Usd.Prim) -> RoomSpec:
         raise StageError(f"{place(graph)}: {error}") from None
 
 
-def _node(prim: Usd.Prim, name: str) -> Node:
+def read_node(prim: Usd.Prim, name: str) -> Node:
+    """The node that a prim states; raises StageError."""
     fields: dict[str, Any] = {"attributes": {}}
     for field_name, attribute in _FIELDS.items():
         found = value(prim, attribute)
@@ -192,8 +195,11 @@ _FIELDS = {
 
 
 def value(prim: Usd.Prim, name: str) -> Any:
-    """The value of an attribute, None where there is none."""
-    return prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
+    """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
+    found = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
+    if isinstance(found, str) and len(found) > MAX_TEXT:
+        raise StageError(f"{place(prim)}: {name} is a text of {len(found)} characters, allowed: {MAX_TEXT}")
+    return found
 
 
 def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:

@@ -66,7 +66,7 @@ def _holds_graph(stage: Usd.Stage | None, layer: Sdf.Layer, room: Sdf.Path) -> b
 
 
 def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:
-    """Author all specs of `graph` below the spec path `room`, which may lie in a variant; keep what is there already."""
+    """Author all specs of `graph` below the spec path `room` (in a variant, too); what is there already stays."""
     scene_path = room.StripAllVariantSelections()
     objects_path = scene_path.AppendChild(usd.OBJECTS_NAME)
     with Sdf.ChangeBlock():
@@ -151,7 +151,8 @@ def put(spec: Sdf.PrimSpec, name: str, value: Any) -> None:
     attribute = spec.properties.get(name)
     if attribute is None:
         custom = name.startswith(usd.FREE)
-        attribute = Sdf.AttributeSpec(spec, name, usd.value_type(name, value), _UNIFORM, custom)
+        varying = Sdf.VariabilityVarying if name == usd.LABELS else _UNIFORM
+        attribute = Sdf.AttributeSpec(spec, name, usd.value_type(name, value), varying, custom)
     attribute.default = value
 
 

@@ -1,0 +1,254 @@
+"""Change a scene graph where it stands: only the prims that differ are edited, everything foreign stays as it is.
+
+All questions are put to the composed stage first, then all edits are made as Sdf specs in the edit target's layer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from pxr import Sdf, Usd
+
+from echousd.graph import Node, Relation, SceneGraph
+from echousd.stage import encoding as usd
+from echousd.stage.encoding import StageError
+from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, the_room, value
+from echousd.stage.write import apply_apis, author_node, author_relation, define, put
+
+Edit = Callable[[], Any]
+_OWN_INFO = {"specifier", "typeName", "apiSchemas", "active"}
+
+
+def update_graph(target: Usd.Stage | Sdf.Layer, graph: SceneGraph, room: str | None = None) -> None:
+    """Make the graph of a room equal to `graph`, by edits in the stage's edit target (or in the layer).
+
+    Nodes and relations that are equal already are not touched. What goes is deleted if the layer alone holds it and
+    nothing but the graph's own properties is on the prim, and deactivated otherwise; what was deactivated comes back.
+    Raises StageError, nothing edited, if the room is not found, is an instance's, or is out of the edit target's reach.
+    """
+    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
+    prims = the_room(stage, room)
+    editor = _Editor(stage, prims)
+    edits = [*editor.room_edits(graph), *editor.node_edits(graph), *editor.relation_edits(graph)]
+    with Sdf.ChangeBlock():
+        for edit in edits:
+            edit()
+    editor.order(graph)
+
+
+class _Editor:
+    """The edits that lead from the graph of one room to another one, as functions to be called together."""
+
+    def __init__(self, stage: Usd.Stage, prims: RoomPrims) -> None:
+        if prims.graph.IsInstanceProxy():
+            raise StageError(f"{place(prims.graph)}: the room is an instance, allowed: rooms with instanceable = false")
+        self.stage, self.prims = stage, prims
+        self.target = stage.GetEditTarget()
+        self.layer = self.target.GetLayer()
+        self.names = node_names(prims)
+        self.nodes = {prim.GetName(): prim for prim in prims.nodes}
+        self.paths = {prim.GetName(): prim.GetPath() for prim in prims.nodes}
+        self.objects = prims.room.GetPath().AppendChild(usd.OBJECTS_NAME)
+        if prims.nodes and not stage.GetPrimAtPath(self.objects):
+            self.objects = prims.nodes[0].GetPath().GetParentPath()
+        self.spec_path(prims.graph.GetPath())
+
+    def spec_path(self, path: Sdf.Path) -> Sdf.Path:
+        mapped = self.target.MapToSpecPath(path)
+        if mapped.isEmpty:
+            raise StageError(f"<{path}> is out of reach of the edit target {self.layer.identifier}")
+        return mapped
+
+    def spec(self, path: Sdf.Path) -> Sdf.PrimSpec:
+        """The prim spec in the edit target's layer, an `over` where there was none."""
+        return Sdf.CreatePrimInLayer(self.layer, self.spec_path(path))
+
+    # -- the room and its nodes ----------------------------------------------------------------------------------------
+
+    def room_edits(self, graph: SceneGraph) -> list[Edit]:
+        names = (usd.ROOM_TYPE, usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT)
+        return self.value_edits(self.prims.graph, usd.room_values(graph.room), names)
+
+    def node_edits(self, graph: SceneGraph) -> list[Edit]:
+        wanted = {node.name: node for node in graph.nodes}
+        edits: list[Edit] = []
+        for name, prim in self.nodes.items():
+            if name not in wanted:
+                edits.append(self.removal(prim))
+            elif (old := read_node(prim, name)) != wanted[name]:
+                edits += self.changed_node(prim, old, wanted[name])
+        for name, node in wanted.items():
+            if name not in self.nodes:
+                edits += self.new_node(node)
+        return edits
+
+    def changed_node(self, prim: Usd.Prim, old: Node | None, new: Node) -> list[Edit]:
+        values = usd.node_values(new)
+        if old is not None and old.category == new.category:
+            del values[usd.LABELS], values[usd.CATEGORY]
+        free = [a.GetName() for a in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1])]
+        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.LOCKED, *free)
+        return self.value_edits(prim, values, names)
+
+    def new_node(self, node: Node) -> list[Edit]:
+        path = self.paths[node.name] = self.objects.AppendChild(node.name)
+        prim = self.stage.GetPrimAtPath(path)
+        if not prim:
+            return [lambda: author_node(define(self.layer, self.spec_path(self.objects), "Xform"), node)]
+        edits = [lambda: apply_apis(self.spec(path)), *self.changed_node(prim, None, node)]
+        if not prim.IsDefined() or not prim.GetTypeName():
+            edits.append(lambda: define(self.layer, self.spec_path(path), "Xform"))
+        return [*edits, *self.activation(prim)]
+
+    # -- relations -----------------------------------------------------------------------------------------------------
+
+    def relation_edits(self, graph: SceneGraph) -> list[Edit]:
+        held: dict[tuple[str, str, str], tuple[Usd.Prim, Relation]] = {}
+        for prim in self.prims.relations:
+            relation = relation_of(prim, self.names)
+            if relation:
+                held[relation.triple] = (prim, relation)
+        wanted = {relation.triple: relation for relation in graph.relations}
+        gone = {triple: entry for triple, entry in held.items() if triple not in wanted}
+        taken = {child.GetName() for child in self.prims.graph.GetAllChildren()}
+        asleep = self.inactive_relations()
+        edits: list[Edit] = []
+        for triple, relation in wanted.items():
+            if triple in held:
+                edits += self.confidence_edits(held[triple][0], held[triple][1].confidence, relation)
+                continue
+            replaced = next((old for old in gone if (old[0], old[2]) == (triple[0], triple[2])), None)
+            if triple in asleep:
+                prim = asleep[triple]
+                edits += [*self.activation(prim), *self.confidence_edits(prim, None, relation)]
+            elif replaced:
+                edits += self.other_predicate(*gone.pop(replaced), relation, taken)
+            else:
+                edits.append(self.new_relation(relation, taken))
+        return [*(self.removal(prim) for prim, _ in gone.values()), *edits]
+
+    def inactive_relations(self) -> dict[tuple[str, str, str], Usd.Prim]:
+        """Relations that somebody has deactivated, by triple: they come back by being activated."""
+        found: dict[tuple[str, str, str], Usd.Prim] = {}
+        ends = {path: name for name, path in self.paths.items()}
+        for prim in self.prims.graph.GetAllChildren():
+            if prim.GetTypeName() == usd.RELATION_TYPE and not prim.IsActive():
+                subject, object_ = (self.target_of(prim, name) for name in (usd.SUBJECT, usd.OBJECT))
+                if subject in ends and object_ in ends:
+                    found[ends[subject], value(prim, usd.PREDICATE), ends[object_]] = prim
+        return found
+
+    def target_of(self, prim: Usd.Prim, name: str) -> Sdf.Path | None:
+        targets = prim.GetRelationship(name).GetTargets()
+        return targets[0] if len(targets) == 1 else None
+
+    def confidence_edits(self, prim: Usd.Prim, old: float | None, relation: Relation) -> list[Edit]:
+        if old == relation.confidence:
+            return []
+        values = {} if relation.confidence == 1.0 else {usd.CONFIDENCE: float(relation.confidence)}
+        return self.value_edits(prim, values, (usd.CONFIDENCE,))
+
+    def other_predicate(self, prim: Usd.Prim, old: Relation, new: Relation, taken: set[str]) -> list[Edit]:
+        edits = self.value_edits(prim, {usd.PREDICATE: new.predicate}, (usd.PREDICATE,))
+        edits += self.confidence_edits(prim, old.confidence, new)
+        if self.only_here(prim) and prim.GetName() == usd.relation_name(*old.triple):
+            name = usd.relation_name(*new.triple, taken)
+            taken.add(name)
+            path = prim.GetPath()
+            edits.append(lambda: setattr(self.spec(path), "name", name))
+        return edits
+
+    def new_relation(self, relation: Relation, taken: set[str]) -> Edit:
+        name = usd.relation_name(*relation.triple, taken)
+        taken.add(name)
+        subject, object_ = self.paths[relation.subject], self.paths[relation.object]
+        parent = self.prims.graph.GetPath()
+        return lambda: author_relation(self.spec(parent), name, relation, subject, object_)
+
+    # -- one prim ------------------------------------------------------------------------------------------------------
+
+    def value_edits(self, prim: Usd.Prim, values: dict[str, Any], names: tuple[str, ...]) -> list[Edit]:
+        """Edits after which the attributes `names` of a prim hold `values`, those that are not in `values` nothing."""
+        path = prim.GetPath()
+        edits: list[Edit] = [
+            partial(self.put, path, name, new) for name, new in values.items() if value(prim, name) != new
+        ]
+        for name in names:
+            attribute = prim.GetAttribute(name)
+            if name not in values and attribute and attribute.HasAuthoredValue():
+                edits.append(partial(self.clear, attribute))
+        return edits
+
+    def put(self, path: Sdf.Path, name: str, new: Any) -> None:
+        put(self.spec(path), name, new)
+
+    def clear(self, attribute: Usd.Attribute) -> None:
+        """Take an attribute's value away: its spec where this layer alone holds it, else by a block over the others."""
+        prim_path, name = attribute.GetPrim().GetPath(), attribute.GetName()
+        own = self.layer.GetAttributeAtPath(self.spec_path(attribute.GetPath()))
+        others = [spec for spec in attribute.GetPropertyStack() if spec != own and spec.HasInfo("default")]
+        if own and not others:
+            owner = self.layer.GetPrimAtPath(self.spec_path(prim_path))
+            owner.RemoveProperty(own)
+        else:
+            spec = self.spec(prim_path)
+            own = own or Sdf.AttributeSpec(spec, name, attribute.GetTypeName(), Sdf.VariabilityUniform)
+            own.default = Sdf.ValueBlock()
+
+    def removal(self, prim: Usd.Prim) -> Edit:
+        path = self.spec_path(prim.GetPath())
+        if self.only_here(prim) and _holds_nothing_foreign(self.layer.GetPrimAtPath(path)):
+            return lambda: self.layer.GetPrimAtPath(path.GetParentPath()).nameChildren.__delitem__(path.name)
+        return lambda: setattr(Sdf.CreatePrimInLayer(self.layer, path), "active", False)
+
+    def activation(self, prim: Usd.Prim) -> list[Edit]:
+        if prim.IsActive():
+            return []
+        path = self.spec_path(prim.GetPath())
+        own = self.layer.GetPrimAtPath(path)
+        others = [spec for spec in prim.GetPrimStack() if spec != own and spec.HasInfo("active")]
+        if own and not others:
+            return [own.ClearActive]
+        return [lambda: setattr(Sdf.CreatePrimInLayer(self.layer, path), "active", True)]
+
+    def only_here(self, prim: Usd.Prim) -> bool:
+        """Whether the edit target's layer holds the only opinions about a prim."""
+        stack = prim.GetPrimStack()
+        return len(stack) == 1 and stack[0] == self.layer.GetPrimAtPath(self.spec_path(prim.GetPath()))
+
+    def order(self, graph: SceneGraph) -> None:
+        """Bring nodes and relations in the graph's order, where they are not, by `reorder nameChildren`."""
+        prims = next(prims for prims in find_rooms(self.stage) if prims.room == self.prims.room)
+        names = node_names(prims)
+        related = {}
+        for prim in prims.relations:
+            relation = relation_of(prim, names)
+            if relation:
+                related[relation.triple] = prim
+        wanted = (
+            ([prim.GetName() for prim in prims.nodes], list(graph.names), prims.nodes),
+            (
+                [related[t].GetName() for t in related],
+                [related[r.triple].GetName() for r in graph.relations],
+                prims.relations,
+            ),
+        )
+        for have, want, siblings in wanted:
+            parents = {prim.GetParent().GetPath() for prim in siblings}
+            if have != want and len(parents) == 1:
+                self.spec(parents.pop()).nameChildrenOrder = want
+
+
+def _holds_nothing_foreign(spec: Sdf.PrimSpec) -> bool:
+    """Whether a prim spec holds what this project authors for a node or a relation and nothing else."""
+    listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
+    apis = {*listed.explicitItems, *listed.prependedItems, *listed.appendedItems}
+    own = {*usd.VALUE_TYPES, usd.SUBJECT, usd.OBJECT}
+    return (
+        not spec.nameChildren
+        and set(spec.ListInfoKeys()) <= _OWN_INFO
+        and apis <= {usd.NODE_API, usd.LABELS_API}
+        and all(name in own or name.startswith(usd.FREE) for name in spec.properties.keys())  # noqa: SIM118
+    )
