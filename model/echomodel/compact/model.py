@@ -1,0 +1,134 @@
+"""The compact model as one module, and its weights files: parts, config, vocabulary and box statistics together."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from echomodel.boxes import BoxStatistics
+from echomodel.compact.latent import LatentGraph
+from echomodel.compact.layout import LayoutDenoiser
+from echomodel.config import CompactConfig, from_dict, to_json
+from echomodel.vocabulary import vocabulary
+
+FORMAT = "echousd-compact-1"
+_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser}
+PARTS = tuple(_MADE)
+
+
+class WeightsError(ValueError):
+    """A weights file that is not one, or whose tensors do not fit the configuration."""
+
+
+class CompactModel(nn.Module):
+    """Latent graph, layout denoiser, autoencoder and shape denoiser with the configuration and box statistics.
+
+    Arguments:
+        config: sizes.
+        statistics: normalisation of the boxes.
+        parts: which of `PARTS` to build.
+    """
+
+    def __init__(self, config: CompactConfig, statistics: BoxStatistics, parts: Iterable[str] = PARTS) -> None:
+        super().__init__()
+        self.config, self.statistics = config, statistics
+        self.parts = tuple(parts)
+        for name in self.parts:
+            self.add_module(name, _MADE[name](config))
+
+    latent: LatentGraph
+    layout: LayoutDenoiser
+
+    def part_tensors(self, part: str) -> dict[str, Tensor]:
+        """State of one part, keys with the part's name in front."""
+        return {f"{part}.{key}": value for key, value in getattr(self, part).state_dict().items()}
+
+
+def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half: bool = True) -> None:
+    """Write parts of a model with everything needed to use them; `half` stores floats as float16."""
+    tensors = {}
+    for part in parts:
+        for key, value in model.part_tensors(part).items():
+            stored = value.half() if half and value.is_floating_point() else value
+            tensors[key] = stored.detach().cpu().contiguous()
+    metadata = {
+        "format": FORMAT,
+        "config": to_json(model.config),
+        "statistics": json.dumps(model.statistics.to_json()),
+        "vocabulary": json.dumps(_words()),
+        "parts": json.dumps(list(parts)),
+    }
+    partial = path.with_suffix(".partial")
+    save_file(tensors, partial, metadata=metadata)
+    partial.replace(path)
+
+
+def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:
+    """Build the model that the files hold together and return it with a short hash of their contents.
+
+    Raises:
+        WeightsError: a file is missing, truncated or of another kind, two files disagree on the configuration, or
+            tensors are missing, unexpected or misshapen; the first of each are named.
+    """
+    if not paths:
+        raise WeightsError("no weights files found: install the package with its weights or name a file")
+    metadata, tensors, digest = {}, {}, hashlib.sha256()
+    for path in sorted(paths):
+        try:
+            with safe_open(path, "pt") as handle:
+                header = handle.metadata() or {}
+                tensors.update({key: handle.get_tensor(key) for key in handle.keys()})  # noqa: SIM118
+            digest.update(path.read_bytes())
+        except (OSError, SafetensorError) as error:
+            raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+        if header.get("format") != FORMAT:
+            raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
+        metadata[path] = header
+    first = next(iter(metadata))
+    _agree(metadata, first)
+    config = from_dict(CompactConfig, json.loads(metadata[first]["config"]))
+    parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
+    model = CompactModel(config, BoxStatistics.from_json(json.loads(metadata[first]["statistics"])), parts)
+    _fit(model, tensors, ", ".join(str(path) for path in metadata))
+    return model.to(device).eval(), digest.hexdigest()[:12]
+
+
+def _agree(metadata: dict[Path, dict[str, str]], first: Path) -> None:
+    words = json.dumps(_words())
+    for path, header in metadata.items():
+        for field in ("config", "statistics"):
+            if header.get(field) != metadata[first].get(field):
+                raise WeightsError(f"{path}: {field} differs from that of {first}, they are not one model")
+        if header.get("vocabulary") != words:
+            raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
+
+
+def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:
+    wanted = model.state_dict()
+    missing = sorted(wanted.keys() - tensors.keys())
+    unexpected = sorted(tensors.keys() - wanted.keys())
+    misshapen = [key for key in sorted(wanted.keys() & tensors.keys()) if wanted[key].shape != tensors[key].shape]
+    problems = [
+        f"{len(keys)} {text} ({', '.join(keys[:3])})"
+        for text, keys in (("missing", missing), ("unexpected", unexpected), ("misshapen", misshapen))
+        if keys
+    ]
+    if problems:
+        raise WeightsError(f"{where}: tensors do not fit the configuration: {'; '.join(problems)}")
+    model.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
+
+
+def _words() -> dict[str, list[str]]:
+    words = vocabulary()
+    return {
+        "categories": [entry.name for entry in words.categories],
+        "predicates": [entry.name for entry in words.predicates],
+        "room_types": [entry.name for entry in words.room_types],
+    }

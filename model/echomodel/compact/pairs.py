@@ -1,0 +1,94 @@
+"""Relations as merged messages: one message per ordered pair of objects, its predicates as a multi-hot vector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import torch
+from torch import Tensor
+
+from echomodel.graph import GraphBatch
+from echomodel.vocabulary import vocabulary
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """All P ordered pairs of different nodes of one scene, sorted by receiver.
+
+    Every object hears every other object of its room, as the published graph's `in` relations to the scene node make
+    possible; what a pair is told in the graph stands in `told`.
+
+    Arguments:
+        receiver, sender: (P,) int64, nodes.
+        told: (P, 2R) float32, predicates that hold from receiver to sender, then from sender to receiver.
+        scale: (N, 1) float32, 1 / sqrt(number of senders), the weight of a node's summed messages.
+    """
+
+    receiver: Tensor
+    sender: Tensor
+    told: Tensor
+    scale: Tensor
+
+    def without(self, node_mask: Tensor, told: Tensor) -> Pairs:
+        """The pairs between the nodes where `node_mask` (N,) bool is true, with `told` (P, 2R) in place of the old."""
+        keep = (node_mask[self.receiver] & node_mask[self.sender]).nonzero()[:, 0]
+        return Pairs(self.receiver[keep], self.sender[keep], told[keep], self.scale)
+
+
+def ordered_pairs(counts: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Receiver (P,), sender (P,) and scale (N, 1) of all ordered pairs of scenes with `counts` (S,) int64 nodes."""
+    starts = counts.cumsum(0) - counts
+    per_node = counts.repeat_interleave(counts)
+    receiver = torch.arange(len(per_node), device=counts.device).repeat_interleave(per_node)
+    first = starts.repeat_interleave(counts).repeat_interleave(per_node)
+    offset = torch.arange(len(receiver), device=counts.device) - (per_node.cumsum(0) - per_node).repeat_interleave(per_node)
+    sender = first + offset
+    different = receiver != sender
+    scale = (per_node - 1).clamp_min(1).float().rsqrt()[:, None]
+    return receiver[different], sender[different], scale
+
+
+def pairs_of(graph: GraphBatch, predicates: int = 16) -> Pairs:
+    """The pairs of a graph; parallel triplets merge, repeated ones count once, inverses are filled in."""
+    counts = graph.node_counts
+    receiver, sender, scale = ordered_pairs(counts)
+    index = pair_index(graph, counts)
+    # an inverse relation says the same the other way round: left(a, b) = right(b, a)
+    forward = torch.zeros(len(receiver), predicates, device=receiver.device)
+    inverse = inverse_predicates(predicates).to(receiver.device)
+    predicate = graph.triplets[:, 1]
+    forward[index[0], predicate] = 1
+    told_back = inverse[predicate] >= 0
+    forward[index[1][told_back], inverse[predicate][told_back]] = 1
+    backward = forward[reverse_pairs(receiver, sender, counts)]
+    return Pairs(receiver, sender, torch.cat([forward, backward], dim=1), scale)
+
+
+def pair_index(graph: GraphBatch, counts: Tensor) -> tuple[Tensor, Tensor]:
+    """Numbers of the pairs (subject, object) and (object, subject) of every triplet, two (E,) int64 tensors."""
+    subject, target = graph.triplets[:, 0], graph.triplets[:, 2]
+    return _pair_number(subject, target, graph.scene, counts), _pair_number(target, subject, graph.scene, counts)
+
+
+def reverse_pairs(receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:
+    """(P,) int64, number of the pair that goes the other way."""
+    scene = torch.arange(len(counts), device=counts.device).repeat_interleave(counts)
+    return _pair_number(sender, receiver, scene, counts)
+
+
+def _pair_number(receiver: Tensor, sender: Tensor, scene: Tensor, counts: Tensor) -> Tensor:
+    starts, before = counts.cumsum(0) - counts, (counts * (counts - 1)).cumsum(0) - counts * (counts - 1)
+    of = scene[receiver]
+    row, column = receiver - starts[of], sender - starts[of]
+    return before[of] + row * (counts[of] - 1) + column - (column > row).long()
+
+
+@cache
+def inverse_predicates(predicates: int = 16) -> Tensor:
+    """(R,) int64, the predicate that holds from object to subject, -1 where none follows."""
+    out = torch.full((predicates,), -1)
+    for predicate in vocabulary().predicates:
+        if predicate.inverse is not None:
+            out[predicate.id] = vocabulary().predicate_id(predicate.inverse)
+    return out

@@ -1,0 +1,192 @@
+"""Frozen, serialisable configurations of the compact echo model; they travel inside the weights files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from typing import Any, Literal, TypeVar, get_type_hints
+
+Objective = Literal["noise", "velocity", "flow"]
+Prediction = Literal["output", "sample"]
+Sampler = Literal["euler", "ddim", "ancestral", "dpm2m"]
+C = TypeVar("C")
+
+
+@dataclass(frozen=True)
+class LatentConfig:
+    """Graph encoder and graph manipulator (EchoScene 3.2).
+
+    Arguments:
+        width: channels of the latent node z.
+        layers: triplet-GCN layers of the encoder and of the manipulator each.
+    """
+
+    width: int = 96
+    layers: int = 2
+
+
+@dataclass(frozen=True)
+class LayoutConfig:
+    """Layout denoiser (EchoScene 3.3).
+
+    Arguments:
+        width: channels of a node.
+        layers: echo layers.
+        frequencies: octaves of the Fourier features of the noisy box.
+        objective: what the network is trained to predict; `flow` is rectified flow.
+        steps: default number of sampling steps.
+        sampler: default sampler.
+    """
+
+    width: int = 192
+    layers: int = 5
+    frequencies: int = 4
+    objective: Objective = "flow"
+    steps: int = 20
+    sampler: Sampler = "euler"
+
+
+@dataclass(frozen=True)
+class AutoencoderConfig:
+    """Autoencoder of 64^3 truncated signed distances.
+
+    Arguments:
+        patch: side of a patch in voxels; the latent grid has 64 / patch cells a side.
+        channels: channels of the latent.
+        width: channels of the refining convolutions of the decoder.
+        blocks: residual convolution blocks of the decoder.
+        levels: levels of the finite scalar quantisation per channel, 0 = continuous latent.
+    """
+
+    patch: int = 4
+    channels: int = 4
+    width: int = 64
+    blocks: int = 2
+    levels: int = 0
+
+
+@dataclass(frozen=True)
+class ShapeConfig:
+    """Latent shape denoiser (EchoScene 3.4).
+
+    Arguments:
+        width: channels of a token.
+        layers: transformer blocks.
+        heads: attention heads.
+        patch: side, in latent cells, of the patch that makes one token.
+        echo_width: channels of a node in the shape echo.
+        echo_layers: triplet-GCN layers of the shape echo.
+        echo: exchange information between the objects at every step (Table 4: off = no shape echo).
+        echo_time: give the echo the noise level (Table 4: off = no time embedding).
+        conditioning: how the echo reaches the tokens, `cross` attention or `concat` (Table 4).
+        objective, steps, sampler: as in `LayoutConfig`.
+    """
+
+    width: int = 256
+    layers: int = 6
+    heads: int = 4
+    patch: int = 4
+    echo_width: int = 128
+    echo_layers: int = 2
+    echo: bool = True
+    echo_time: bool = True
+    conditioning: Literal["cross", "concat"] = "cross"
+    objective: Objective = "flow"
+    prediction: Prediction = "sample"
+    steps: int = 25
+    sampler: Sampler = "euler"
+
+
+@dataclass(frozen=True)
+class CompactConfig:
+    """The compact echo model: sizes of its parts and of its vocabulary.
+
+    Arguments:
+        categories, predicates, room_types: sizes of the vocabulary.
+        rules: names of the rule sets that relations may be meant in.
+    """
+
+    categories: int = 46
+    predicates: int = 16
+    room_types: int = 5
+    rules: tuple[str, ...] = ("sgfront", "strict")
+    latent: LatentConfig = field(default_factory=LatentConfig)
+    layout: LayoutConfig = field(default_factory=LayoutConfig)
+    autoencoder: AutoencoderConfig = field(default_factory=AutoencoderConfig)
+    shape: ShapeConfig = field(default_factory=ShapeConfig)
+
+
+PRESETS = {"compact": CompactConfig()}
+
+
+def to_json(config: Any) -> str:
+    """A configuration as one line of JSON."""
+    return json.dumps(asdict(config), sort_keys=True)
+
+
+def from_json(kind: type[C], text: str) -> C:
+    """The configuration that `to_json` wrote; raises ValueError naming a field that is not known or has a wrong type."""
+    return from_dict(kind, json.loads(text))
+
+
+def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
+    """A configuration from nested plain values; fields left out keep their defaults.
+
+    Raises:
+        ValueError: a field is not known or its value has the wrong type.
+    """
+    if not isinstance(raw, dict):
+        raise ValueError(f"{where or kind.__name__} is {raw!r}, expected fields with values")
+    hints, names = get_type_hints(kind), [f.name for f in fields(kind)]  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, value in raw.items():
+        path = f"{where}.{name}" if where else name
+        if name not in names:
+            raise ValueError(f"unknown field {path!r}, allowed: {', '.join(names)}")
+        values[name] = _typed(hints[name], value, path)
+    return kind(**values)
+
+
+def with_settings(config: C, settings: list[str]) -> C:
+    """The configuration with `key.sub=value` settings applied; values are read as JSON, else as text.
+
+    Raises:
+        ValueError: a setting has no `=`, names no field or has a value of the wrong type.
+    """
+    raw: dict[str, Any] = json.loads(to_json(config))
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals:
+            raise ValueError(f"setting {setting!r} has no '=', expected key=value")
+        *parents, last = key.strip().split(".")
+        here: Any = raw
+        for parent in parents:
+            if not isinstance(here, dict) or parent not in here:
+                raise ValueError(f"setting {key!r}: no field {parent!r}")
+            here = here[parent]
+        if not isinstance(here, dict):
+            raise ValueError(f"setting {key!r}: {parents[-1]!r} has no fields")
+        try:
+            here[last] = json.loads(text)
+        except json.JSONDecodeError:
+            here[last] = text.strip()
+    return from_dict(type(config), raw)
+
+
+def _typed(hint: Any, value: Any, path: str) -> Any:
+    if is_dataclass(hint):
+        return from_dict(hint, value, path)  # type: ignore[arg-type]
+    origin, choices = getattr(hint, "__origin__", None), getattr(hint, "__args__", ())
+    if origin is Literal:
+        if value not in choices:
+            raise ValueError(f"{path} is {value!r}, allowed: {', '.join(map(str, choices))}")
+        return value
+    if origin is tuple:
+        if not isinstance(value, (list, tuple)) or not all(isinstance(v, choices[0]) for v in value):
+            raise ValueError(f"{path} is {value!r}, expected a list of {choices[0].__name__}")
+        return tuple(value)
+    if hint is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, hint) or (hint is int and isinstance(value, bool)):
+        raise ValueError(f"{path} is {value!r}, expected {hint.__name__}")
+    return value

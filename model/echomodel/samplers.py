@@ -1,0 +1,172 @@
+"""Samplers as pure functions: from noise to a sample, any subset of nodes held fixed at level 0.
+
+Every sampler has the same arguments. `predict(x, level)` returns the clean sample that the denoiser sees in x (N, ...)
+at a noise level per node (N,); `levels` (K + 1,) falls from 1 to 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from echomodel.config import Objective, Sampler
+from echomodel.objectives import expand
+from echomodel.schedule import alpha_sigma, sampling_levels
+
+Predict = Callable[[Tensor, Tensor], Tensor]
+Progress = Callable[[int, int], None]
+Step = Callable[[Tensor, Tensor, float, float], Tensor]
+
+
+def euler(predict: Predict, x: Tensor, levels: Tensor, objective: Objective, **options: object) -> Tensor:
+    """Euler steps along the straight line of rectified flow; for the other objectives the same as `ddim`."""
+    return ddim(predict, x, levels, objective, **options)  # type: ignore[arg-type]
+
+
+def ddim(
+    predict: Predict,
+    x: Tensor,
+    levels: Tensor,
+    objective: Objective,
+    *,
+    known: Tensor | None = None,
+    known_mask: Tensor | None = None,
+    generator: torch.Generator | None = None,
+    progress: Progress | None = None,
+) -> Tensor:
+    """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
+
+    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
+        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
+        return b * clean + r * (x - a * clean) / s
+
+    return _march(step, predict, x, levels, known, known_mask, progress)
+
+
+def ancestral(
+    predict: Predict,
+    x: Tensor,
+    levels: Tensor,
+    objective: Objective,
+    *,
+    known: Tensor | None = None,
+    known_mask: Tensor | None = None,
+    generator: torch.Generator | None = None,
+    progress: Progress | None = None,
+) -> Tensor:
+    """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
+
+    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
+        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
+        ratio = a / b
+        between = s * s - ratio * ratio * r * r
+        mean = (ratio * r * r * x + b * between * clean) / (s * s)
+        if end == 0:
+            return mean
+        noise = torch.randn(x.shape, generator=generator, dtype=x.dtype, device=x.device)
+        return mean + math.sqrt(max(between, 0.0)) * r / s * noise
+
+    return _march(step, predict, x, levels, known, known_mask, progress)
+
+
+def dpm2m(
+    predict: Predict,
+    x: Tensor,
+    levels: Tensor,
+    objective: Objective,
+    *,
+    known: Tensor | None = None,
+    known_mask: Tensor | None = None,
+    generator: torch.Generator | None = None,
+    progress: Progress | None = None,
+) -> Tensor:
+    """DPM-Solver++(2M) (Lu et al. 2022, Algorithm 2), first order in the first and the last step."""
+    last: list[tuple[Tensor, float]] = []
+
+    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
+        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
+        shrink = a * r / (b * s)  # exp(-h), h the step in log signal-to-noise ratio
+        h = -math.log(shrink) if shrink > 0 else math.inf
+        direction = clean
+        if last and math.isfinite(h) and math.isfinite(last[0][1]):
+            weight = h / (2 * last[0][1])
+            direction = (1 + weight) * clean - weight * last[0][0]
+        last[:] = [(clean, h)]
+        return (r / s) * x + b * (1 - shrink) * direction
+
+    return _march(step, predict, x, levels, known, known_mask, progress)
+
+
+SAMPLERS: dict[Sampler, Callable[..., Tensor]] = {"euler": euler, "ddim": ddim, "ancestral": ancestral, "dpm2m": dpm2m}
+
+
+def sample(
+    sampler: Sampler,
+    predict: Predict,
+    x: Tensor,
+    steps: int,
+    objective: Objective,
+    *,
+    known: Tensor | None = None,
+    known_mask: Tensor | None = None,
+    generator: torch.Generator | None = None,
+    progress: Progress | None = None,
+) -> Tensor:
+    """Run a sampler by name.
+
+    Arguments:
+        x: (N, ...) start, standard normal noise.
+        known, known_mask: (N, ...) values and (N,) bool, nodes that keep their values from first to last.
+        generator: source of the noise that `ancestral` adds.
+        progress: called with (steps done, steps) after every step.
+
+    Raises:
+        ValueError: the sampler is not known, or steps < 1.
+    """
+    if sampler not in SAMPLERS:
+        raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
+    levels = sampling_levels(steps)
+    options = {"known": known, "known_mask": known_mask, "generator": generator, "progress": progress}
+    return SAMPLERS[sampler](predict, x, levels, objective, **options)
+
+
+def guided(conditional: Predict, unconditional: Predict, scale: float) -> Predict:
+    """Classifier-free guidance (Ho and Salimans 2022): unconditional + scale (conditional - unconditional)."""
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        base = unconditional(x, level)
+        return base + scale * (conditional(x, level) - base)
+
+    return predict
+
+
+def _march(
+    step: Step,
+    predict: Predict,
+    x: Tensor,
+    levels: Tensor,
+    known: Tensor | None,
+    known_mask: Tensor | None,
+    progress: Progress | None,
+) -> Tensor:
+    times = levels.tolist()
+    free = torch.ones(len(x), dtype=x.dtype, device=x.device)
+    fixed = None
+    if known_mask is not None and known is not None:
+        free = (~known_mask).to(x.dtype)
+        fixed = expand(known_mask, x)
+        x = torch.where(fixed, known.to(x.dtype), x)
+    for number, (start, end) in enumerate(zip(times, times[1:], strict=False)):
+        moved = step(x, predict(x, free * start), start, end)
+        x = moved if fixed is None else torch.where(fixed, x, moved)
+        if progress is not None:
+            progress(number + 1, len(times) - 1)
+    return x
+
+
+def _strengths(level: float, objective: Objective) -> tuple[float, float]:
+    alpha, sigma = alpha_sigma(torch.tensor(level, dtype=torch.float64), objective)
+    return float(alpha), float(sigma)

@@ -1,0 +1,1 @@
+"""Training of the compact echo model: data in tensors, one module per stage, one trainer."""

@@ -1,0 +1,132 @@
+"""The layout stage: denoising boxes, with a hinge on the relations of the boxes it predicts (EchoScene 3.3)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.compact.model import CompactModel
+from echomodel.objectives import add_noise, clean_from, draw_levels, target
+from echomodel.rules import margins, verdicts
+from echomodel.samplers import sample
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
+from echomodel.vocabulary import vocabulary
+
+HINGED = frozenset(range(1, 13))
+SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
+
+
+def layout_loss(
+    model: CompactModel, batch: LayoutBatch, generator: torch.Generator, relation_weight: float
+) -> tuple[Tensor, dict[str, Tensor]]:
+    """Denoising loss of the unknown nodes plus the weighted relation hinge, and both apart."""
+    objective = model.config.layout.objective
+    clean = batch.boxes.encode(model.statistics)
+    known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
+    level = draw_levels(batch.graph.num_scenes, generator)[batch.graph.scene] * ~known
+    noise = torch.randn(clean.shape, generator=generator)
+    noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
+    graph = batch.graph
+    latent = model.latent(graph.category, batch.pairs, before=batch.before, added=batch.added, touched=batch.touched)
+    context = model.layout.context(graph, batch.pairs, latent, batch.rules)
+    output = model.layout(noisy, level, context)
+    free = (~known).float()
+    error = (output - target(clean, noise, level, objective)).square().mean(1)
+    denoising = (error * free).sum() / free.sum().clamp_min(1)
+    parts = {"denoising": denoising}
+    loss = denoising
+    if relation_weight:
+        predicted = clean_from(output, noisy, level, objective)
+        predicted = torch.where(known[:, None], clean, predicted)
+        parts["relations"] = relation_hinge(batch, predicted, level, known, model.statistics, model.config.rules)
+        loss = loss + relation_weight * parts["relations"]
+    return loss, parts
+
+
+def relation_hinge(
+    batch: LayoutBatch, vectors: Tensor, level: Tensor, known: Tensor, statistics: BoxStatistics, rules: tuple[str, ...]
+) -> Tensor:
+    """Mean over told relations of how far the predicted boxes miss them, weighted by (1 - level)^2."""
+    decoded = Boxes.decode(vectors, statistics)
+    size = decoded.size.clamp(0.02, 8.0)
+    boxes = Boxes(size, decoded.position, decoded.yaw)
+    pair, predicate = batch.predicates.nonzero(as_tuple=True)
+    measurable = ((predicate >= 1) & (predicate <= 12)).nonzero()[:, 0]
+    pair, predicate = pair[measurable], predicate[measurable]
+    triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
+    total, weights = vectors.new_zeros(()), vectors.new_zeros(())
+    own = batch.rules[batch.graph.scene[triplets[:, 0]]]
+    for number, name in enumerate(rules):
+        chosen = triplets[own == number]
+        if not len(chosen):
+            continue
+        ends = chosen[:, [0, 2]]
+        weight = (1 - level[ends].amax(1)).square() * ~known[ends].all(1)
+        margin = margins(boxes, chosen, rules=name)
+        total = total + ((SLACK - margin).clamp(0, 2) * weight).sum()
+        weights = weights + weight.sum()
+    return total / weights.clamp_min(1)
+
+
+def draw_known(scene: Tensor, scenes: int, generator: torch.Generator) -> Tensor:
+    """(N,) bool: in half of the scenes nothing is known, in the others a random share of the nodes."""
+    some = torch.rand(scenes, generator=generator) < 0.5
+    share = torch.rand(scenes, generator=generator) * some
+    return torch.rand(len(scene), generator=generator) < share[scene]
+
+
+class LayoutStage:
+    """What the trainer needs to know about layouts.
+
+    Arguments:
+        rooms, held: packed rooms to train on and to validate with.
+        nodes: node budget of a batch.
+        relation_weight: weight of the relation hinge.
+    """
+
+    trained = ("latent", "layout")
+
+    def __init__(self, rooms: PackedRooms, held: PackedRooms, nodes: int, relation_weight: float) -> None:
+        self.rooms, self.held, self.nodes, self.relation_weight = rooms, held, nodes, relation_weight
+
+    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of one random batch."""
+        return layout_loss(model, draw_batch(self.rooms, self.nodes, generator), generator, self.relation_weight)
+
+    @torch.no_grad()
+    def validate(self, model: CompactModel, rooms: int = 96) -> dict[str, float]:
+        """Share of kept relations per predicate and rule set on held-out rooms, half of the relations told, seeded."""
+        generator = torch.Generator().manual_seed(0)
+        out: dict[str, float] = {}
+        for number, name in enumerate(model.config.rules):
+            picked = (self.held.rules == number).nonzero()[:rooms, 0]
+            if not len(picked):
+                continue
+            batch = make_batch(self.held, picked, generator, train=False)
+            boxes = sample_boxes(model, batch, generator)
+            pair, predicate = batch.predicates.nonzero(as_tuple=True)
+            triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
+            kept = verdicts(boxes, triplets, rules=name)
+            for entry in vocabulary().predicates:
+                mine = kept[(predicate == entry.id) & (kept >= 0)]
+                if len(mine):
+                    out[f"{name}/{entry.name}"] = float(mine.float().mean())
+            out[f"{name}/all"] = float(kept[kept >= 0].float().mean())
+            truth = batch.boxes.size.log()
+            out[f"{name}/log_size_error"] = float((boxes.size.clamp_min(1e-2).log() - truth).abs().mean())
+        return out
+
+
+def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Generator) -> Boxes:
+    """Sample all boxes of a batch with the config's sampler and steps."""
+    layout = model.config.layout
+    latent = model.latent(batch.graph.category, batch.pairs)
+    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules)
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        return clean_from(model.layout(x, level, context), x, level, layout.objective)
+
+    noise = torch.randn(batch.graph.num_nodes, 8, generator=generator)
+    vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
+    return Boxes.decode(vectors, model.statistics)

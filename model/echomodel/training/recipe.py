@@ -1,0 +1,108 @@
+"""Recipes: small TOML files that say what to train, on what and for how long."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from echomodel.config import CompactConfig, from_dict, with_settings
+
+Stage = Literal["vqvae", "layout", "shape", "joint"]
+
+
+@dataclass(frozen=True)
+class OptimizerConfig:
+    """AdamW with a learning-rate schedule.
+
+    Arguments:
+        rate: peak learning rate.
+        schedule: `cosine` (warm-up, then to zero), `trapezoid` (warm-up, constant, linear to zero over `cooldown`
+            steps), or `paper` (1e-4, halved at 35k, 1e-5 at 70k, 5e-6 at 140k steps; `rate` scales it).
+        warmup, cooldown: steps.
+        decay: weight decay.
+        clip: largest norm of the gradient.
+        average: decay of the exponential moving average of the weights.
+    """
+
+    rate: float = 1e-3
+    schedule: Literal["cosine", "trapezoid", "paper"] = "cosine"
+    warmup: int = 500
+    cooldown: int = 2000
+    decay: float = 0.01
+    clip: float = 1.0
+    average: float = 0.9995
+
+    def rate_at(self, step: int, steps: int) -> float:
+        """Learning rate of step `step` (from 0) of `steps`."""
+        if self.schedule == "paper":
+            factors = ((35_000, 1.0), (70_000, 0.5), (140_000, 0.1), (math.inf, 0.05))
+            return self.rate * next(factor for limit, factor in factors if step < limit)
+        warm = min(1.0, (step + 1) / max(self.warmup, 1))
+        if self.schedule == "trapezoid":
+            return self.rate * min(warm, (steps - step) / max(self.cooldown, 1), 1.0)
+        return self.rate * warm * 0.5 * (1 + math.cos(math.pi * min(step / steps, 1.0)))
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One training run.
+
+    Arguments:
+        stage: `vqvae` (autoencoder), `layout`, `shape` or `joint` (both branches on one latent graph).
+        steps: optimiser steps.
+        seed: seed of the initial weights and of every batch.
+        rooms: packed rooms, a file that `echousd train` makes from a rooms file (see `training.rooms`).
+        held_rooms: packed rooms for validation.
+        shapes, held_shapes: shape sets.
+        start: weights files to start from (parts that are not trained stay as they are).
+        nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
+        relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
+        validate_every, save_every: steps.
+        precision: `float32` or `bfloat16` (autocast).
+        threads: CPU threads, 0 = as many as torch likes.
+        model: sizes of the model.
+        optimizer: how to step.
+    """
+
+    stage: Stage
+    steps: int
+    seed: int = 0
+    rooms: str = ""
+    held_rooms: str = ""
+    shapes: str = ""
+    held_shapes: str = ""
+    start: tuple[str, ...] = ()
+    nodes: int = 512
+    shapes_per_batch: int = 32
+    relation_weight: float = 0.5
+    validate_every: int = 2000
+    save_every: int = 1000
+    log_every: int = 50
+    precision: Literal["float32", "bfloat16"] = "float32"
+    threads: int = 0
+    model: CompactConfig = field(default_factory=CompactConfig)
+    optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
+
+
+def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:
+    """Read a recipe file and apply `key=value` settings; paths in it are relative to its folder.
+
+    Raises:
+        ValueError: the file is not TOML, or a field is unknown or has a wrong type; the message names file and field.
+    """
+    try:
+        raw = tomllib.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise ValueError(f"{path}: no such recipe") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: not a TOML file ({error})") from None
+    missing = [name for name in ("stage", "steps") if name not in raw]
+    if missing:
+        raise ValueError(f"{path}: field {missing[0]!r} is missing")
+    try:
+        return with_settings(from_dict(Recipe, raw), settings or [])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None

@@ -1,0 +1,230 @@
+"""Rooms packed into tensors for training: relations as bits per ordered pair, drawn, mirrored and thinned per batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
+from echomodel.graph import GraphBatch
+from echomodel.roomboxes import RoomBoxes
+
+PREDICATES = 16
+SWAPS_X = ((3, 4),)  # mirrored along x: front <-> behind
+SWAPS_Z = ((1, 2),)  # mirrored along z: left <-> right
+
+
+@dataclass(frozen=True, eq=False)
+class PackedRooms:
+    """R labelled rooms behind one another.
+
+    Arguments:
+        category (N,) int64, size, position (N, 3), yaw (N,) float32: as in `Boxes`, room frame.
+        style: (N,) int64, style group, -1 = unknown.
+        count: (R,) int64 nodes per room.
+        room_type: (R,) int64. floor: (R, 2) float32. rules: (R,) int64, rule set of the labels.
+        bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
+    """
+
+    category: Tensor
+    size: Tensor
+    position: Tensor
+    yaw: Tensor
+    style: Tensor
+    count: Tensor
+    room_type: Tensor
+    floor: Tensor
+    rules: Tensor
+    bits: Tensor
+
+    def __len__(self) -> int:
+        return len(self.count)
+
+    @classmethod
+    def build(cls, rooms: Sequence[RoomBoxes], rules: Sequence[int]) -> PackedRooms:
+        """Pack rooms whose `relations` are filled in; `rules` says by which rule set each was labelled."""
+        graphs = [GraphBatch.from_room(room) for room in rooms]
+        boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
+        return cls(
+            category=torch.cat([g.category for g in graphs]),
+            size=boxes.size,
+            position=boxes.position,
+            yaw=boxes.yaw,
+            style=torch.tensor([s for room in rooms for s in (room.styles or (-1,) * len(room))]),
+            count=torch.tensor([len(room) for room in rooms]),
+            room_type=torch.cat([g.room_type for g in graphs]),
+            floor=torch.cat([g.floor for g in graphs]),
+            rules=torch.tensor(list(rules)),
+            bits=torch.cat([_bits(g) for g in graphs]),
+        )
+
+    @property
+    def boxes(self) -> Boxes:
+        """All boxes."""
+        return Boxes(self.size, self.position, self.yaw)
+
+    def save(self, path: Path) -> None:
+        """Write a safetensors file."""
+        save_file({f.name: getattr(self, f.name).contiguous() for f in fields(self)}, path)
+
+    @classmethod
+    def load(cls, path: Path) -> PackedRooms:
+        """Read what `save` wrote; raises ValueError when a tensor is missing."""
+        tensors = load_file(path)
+        missing = [f.name for f in fields(cls) if f.name not in tensors]
+        if missing:
+            raise ValueError(f"{path}: not packed rooms, missing {', '.join(missing)}")
+        return cls(**{f.name: tensors[f.name] for f in fields(cls)})
+
+
+@dataclass(frozen=True, eq=False)
+class LayoutBatch:
+    """Scenes of one training step: `graph` without triplets, its `told` predicates as pairs, and the true boxes.
+
+    Arguments:
+        predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
+        before: relations of the pseudo graph before the edit (EchoScene 3.2, inverse strategy).
+        added, touched: (N,) bool, nodes missing from the pseudo graph, and all nodes that the edit meets.
+    """
+
+    graph: GraphBatch
+    boxes: Boxes
+    pairs: Pairs
+    predicates: Tensor
+    rules: Tensor
+    before: Pairs
+    added: Tensor
+    touched: Tensor
+
+
+def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator) -> LayoutBatch:
+    """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits."""
+    picked = torch.randint(len(rooms), (node_budget,), generator=generator)
+    fits = rooms.count[picked].cumsum(0) <= node_budget
+    fits[0] = True
+    return make_batch(rooms, picked[fits], generator)
+
+
+def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *, train: bool = True) -> LayoutBatch:
+    """The batch of the picked rooms (K,); without `train` nothing is mirrored and half of the relations is dropped."""
+    counts = rooms.count[picked]
+    nodes = _ranges(rooms.count.cumsum(0)[picked] - counts, counts)
+    all_pairs = rooms.count * (rooms.count - 1)
+    pair_counts = all_pairs[picked]
+    bits = rooms.bits[_ranges(all_pairs.cumsum(0)[picked] - pair_counts, pair_counts)]
+    scene = torch.arange(len(picked)).repeat_interleave(counts)
+    holds = (bits[:, None] >> torch.arange(PREDICATES)) & 1 == 1
+    position, yaw = rooms.position[nodes].clone(), rooms.yaw[nodes].clone()
+    floor = rooms.floor[picked].clone()
+    pair_scene = torch.arange(len(picked)).repeat_interleave(pair_counts)
+    keep = torch.full((len(picked),), 0.5)
+    if train:
+        holds = _mirror(holds, position, yaw, scene, pair_scene, generator)
+        keep = _keep_shares(holds, pair_scene, counts, generator)
+        floor[torch.rand(len(picked), generator=generator) < 0.25] = torch.nan
+    predicates = holds & (torch.rand(holds.shape, generator=generator) < keep[pair_scene, None])
+    receiver, sender, scale = ordered_pairs(counts)
+    pairs = Pairs(receiver, sender, _told(predicates.float(), receiver, sender, counts), scale)
+    graph = GraphBatch(
+        category=rooms.category[nodes], triplets=torch.zeros(0, 3, dtype=torch.int64), scene=scene,
+        room_type=rooms.room_type[picked], floor=floor,
+    )  # fmt: skip
+    before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
+    boxes = Boxes(rooms.size[nodes], position, yaw)
+    return LayoutBatch(graph, boxes, pairs, predicates, rooms.rules[picked], before, added, touched)
+
+
+def _bits(graph: GraphBatch) -> Tensor:
+    counts = graph.node_counts
+    receiver, sender, _ = ordered_pairs(counts)
+    number = torch.full((graph.num_nodes, graph.num_nodes), -1)
+    number[receiver, sender] = torch.arange(len(receiver))
+    hot = torch.zeros(len(receiver), PREDICATES, dtype=torch.int32)
+    hot[number[graph.triplets[:, 0], graph.triplets[:, 2]], graph.triplets[:, 1]] = 1
+    return (hot << torch.arange(PREDICATES, dtype=torch.int32)).sum(1, dtype=torch.int32)
+
+
+def _ranges(starts: Tensor, counts: Tensor) -> Tensor:
+    total = int(counts.sum())
+    return torch.arange(total) + (starts - counts.cumsum(0) + counts).repeat_interleave(counts)
+
+
+def _mirror(
+    holds: Tensor, position: Tensor, yaw: Tensor, scene: Tensor, pair_scene: Tensor, generator: torch.Generator
+) -> Tensor:
+    """Flip rooms along x and z (`position`, `yaw` in place) and swap the words that change their meaning."""
+    flip = torch.rand(int(scene[-1]) + 1, 2, generator=generator) < 0.5
+    along_x, along_z = flip[:, 0], flip[:, 1]
+    position[:, 0] *= 1 - 2 * along_x[scene].float()
+    position[:, 2] *= 1 - 2 * along_z[scene].float()
+    # the front (sin yaw, cos yaw) of an object is mirrored with the room
+    yaw *= 1 - 2 * along_x[scene].float()
+    turned = torch.pi - yaw
+    yaw.copy_(torch.where(along_z[scene], torch.remainder(turned + torch.pi, 2 * torch.pi) - torch.pi, yaw))
+    for mask, swaps in ((along_x[pair_scene], SWAPS_X), (along_z[pair_scene], SWAPS_Z)):
+        order = torch.arange(PREDICATES)
+        for a, b in swaps:
+            order[a], order[b] = b, a
+        holds = torch.where(mask[:, None], holds[:, order], holds)
+    return holds
+
+
+def _keep_shares(holds: Tensor, pair_scene: Tensor, counts: Tensor, generator: torch.Generator) -> Tensor:
+    """Share of relations to keep per room: half of the rooms as dense as SG-FRONT, half as sparse as graphs by hand."""
+    total = torch.zeros(len(counts)).index_add_(0, pair_scene, holds.sum(1).float())
+    dense = 0.3 + 0.7 * torch.rand(len(counts), generator=generator)
+    per_object = 4 * torch.rand(len(counts), generator=generator)
+    sparse = (per_object * counts / total.clamp_min(1)).clamp(max=1)
+    choice = torch.rand(len(counts), generator=generator)
+    return torch.where(choice < 0.6, dense, sparse)
+
+
+def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:
+    """Fill in inverses: (P, 16) float -> (P, 32) as in `pairs_of`."""
+    back = reverse_pairs(receiver, sender, counts)
+    inverse = inverse_predicates(PREDICATES)
+    has = inverse >= 0
+    flipped = torch.zeros_like(predicates)
+    flipped[:, inverse[has]] = predicates[:, has]
+    forward = torch.maximum(predicates, flipped[back])
+    return torch.cat([forward, forward[back]], dim=1)
+
+
+def _pseudo_edit(
+    pairs: Pairs, predicates: Tensor, counts: Tensor, pair_scene: Tensor, generator: torch.Generator
+) -> tuple[Pairs, Tensor, Tensor]:
+    """Draw per scene none, addition or relation change, and undo it in the pseudo graph (SPEC 4)."""
+    scenes = len(counts)
+    choice = torch.randint(3, (scenes,), generator=generator)
+    starts = counts.cumsum(0) - counts
+    removed = starts + (torch.rand(scenes, generator=generator) * counts).long()
+    nodes = int(counts.sum())
+    added = torch.zeros(nodes, dtype=torch.bool)
+    added[removed[(choice == 1) & (counts > 1)]] = True
+    touched = added.clone()
+    pair_counts = counts * (counts - 1)
+    first = pair_counts.cumsum(0) - pair_counts
+    changed = first + (torch.rand(scenes, generator=generator) * pair_counts).long()
+    changed = changed[(choice == 2) & (counts > 1)]
+    touched[pairs.receiver[changed]] = True
+    touched[pairs.sender[changed]] = True
+    wrong = torch.zeros(len(changed), PREDICATES)
+    wrong[torch.arange(len(changed)), torch.randint(1, 12, (len(changed),), generator=generator)] = 1
+    pseudo = predicates.float()
+    back = reverse_pairs(pairs.receiver, pairs.sender, counts)
+    pseudo[back[changed]] = 0
+    pseudo[changed] = wrong
+    told = _told(pseudo, pairs.receiver, pairs.sender, counts)
+    return pairs.without(~added, told), added, touched
+
+
+def room_seeds(seed: int, count: int) -> np.ndarray:
+    """Independent seeds for the rooms of a set: (count,) uint32."""
+    return np.random.SeedSequence(seed).generate_state(count)

@@ -1,0 +1,190 @@
+"""The trainer: one loop for all stages, seeded per step so that a resumed run continues bit for bit."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+from torch import Tensor, nn
+
+from echomodel.compact.model import CompactModel, save_weights
+from echomodel.config import to_json
+from echomodel.training.logs import RunLog, plot_log
+from echomodel.training.recipe import Recipe
+
+Report = Callable[[int, dict[str, float]], None]
+
+
+class TrainingStage(Protocol):
+    """What a stage brings: the parts that it trains, its loss and its validation."""
+
+    @property
+    def trained(self) -> tuple[str, ...]: ...
+
+    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]: ...
+
+    def validate(self, model: CompactModel) -> dict[str, float]: ...
+
+
+class _Loss(nn.Module):
+    """The loss as a module's forward pass, which is what DistributedDataParallel wraps."""
+
+    def __init__(self, model: CompactModel, stage: TrainingStage) -> None:
+        super().__init__()
+        self.model, self._stage = model, stage
+
+    def forward(self, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        return self._stage.loss(self.model, generator)
+
+
+class Trainer:
+    """Trains the stage's parts of a model and keeps checkpoint, log, curves and averaged weights in a folder.
+
+    Arguments:
+        recipe: what to do.
+        model: the model, initialised.
+        stage: losses and validation.
+        folder: where checkpoint.safetensors, weights.safetensors, log.csv and curves.png go.
+        resume: continue from the folder's checkpoint.
+        report: called with (step, values) whenever something is logged.
+
+    Raises:
+        ValueError: `resume` without a checkpoint, or a checkpoint of another recipe or model.
+    """
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        model: CompactModel,
+        stage: TrainingStage,
+        folder: Path,
+        *,
+        resume: bool = False,
+        report: Report | None = None,
+    ) -> None:
+        self.recipe, self.model, self.stage, self.folder = recipe, model, stage, folder
+        self.report = report or (lambda step, values: None)
+        self.rank, self.world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
+        for name in model.parts:
+            getattr(model, name).requires_grad_(name in stage.trained)
+        self.average = copy.deepcopy(model).requires_grad_(False).eval()
+        self.trained = {name: p for name, p in model.named_parameters() if p.requires_grad}
+        decayed = [p for p in self.trained.values() if p.ndim > 1]
+        others = [p for p in self.trained.values() if p.ndim <= 1]
+        settings = recipe.optimizer
+        self.optimizer = torch.optim.AdamW(
+            [{"params": decayed, "weight_decay": settings.decay}, {"params": others, "weight_decay": 0.0}],
+            lr=settings.rate,
+        )
+        self.step = 0
+        if resume:
+            self._load()
+
+    def run(self, until: int | None = None, seconds: float | None = None) -> int:
+        """Train to the recipe's last step, or to step `until`, or for so many seconds; returns the step reached."""
+        recipe, last = self.recipe, self.recipe.steps if until is None else min(until, self.recipe.steps)
+        loss_module: nn.Module = _Loss(self.model, self.stage)
+        if self.world > 1:
+            loss_module = nn.parallel.DistributedDataParallel(loss_module, find_unused_parameters=True)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        log = RunLog(self.folder, self.step) if self.rank == 0 else None
+        started, marked, sums = time.monotonic(), time.monotonic(), {}
+        self.model.train()
+        while self.step < last and (seconds is None or time.monotonic() - started < seconds):
+            values = self._train_step(loss_module)
+            for name, value in values.items():
+                sums[name] = sums.get(name, 0.0) + value
+            if self.rank or log is None:
+                continue
+            if self.step % recipe.log_every == 0:
+                means = {name: value / recipe.log_every for name, value in sums.items()}
+                means["steps_per_second"] = recipe.log_every / (time.monotonic() - marked)
+                log.write(self.step, means)
+                self.report(self.step, means)
+                marked, sums = time.monotonic(), {}
+            if self.step % recipe.validate_every == 0 or self.step == last:
+                scores = self.stage.validate(self.average)
+                log.write(self.step, scores)
+                self.report(self.step, scores)
+                plot_log(log.path, self.folder / "curves.png")
+            if self.step % recipe.save_every == 0 or self.step == last:
+                self.save()
+        if log is not None:
+            self.save()
+            log.close()
+        return self.step
+
+    def _train_step(self, loss_module: nn.Module) -> dict[str, float]:
+        settings = self.recipe.optimizer
+        for group in self.optimizer.param_groups:
+            group["lr"] = settings.rate_at(self.step, self.recipe.steps)
+        generator = step_generator(self.recipe.seed, self.step, self.rank)
+        with torch.autocast("cpu", torch.bfloat16, enabled=self.recipe.precision == "bfloat16"):
+            loss, parts = loss_module(generator)
+        loss.backward()
+        norm = nn.utils.clip_grad_norm_(list(self.trained.values()), settings.clip)
+        if not torch.isfinite(norm):
+            raise FloatingPointError(f"step {self.step}: gradient norm is {float(norm)}, loss {float(loss)}")
+        self.optimizer.step()
+        self.optimizer.zero_grad(set_to_none=True)
+        self.step += 1
+        # a young average would remember the initial weights for too long
+        decay = min(settings.average, (1 + self.step) / (10 + self.step))
+        averaged = dict(self.average.named_parameters())
+        with torch.no_grad():
+            torch._foreach_lerp_([averaged[name] for name in self.trained], list(self.trained.values()), 1 - decay)
+            for name, buffer in self.model.named_buffers():
+                self.average.get_buffer(name).copy_(buffer)
+        return {"loss": loss.item(), "norm": norm.item(), **{name: value.item() for name, value in parts.items()}}
+
+    def save(self) -> None:
+        """Write checkpoint and averaged weights (each beside its place, then renamed)."""
+        tensors = {f"model.{key}": value for key, value in self.model.state_dict().items()}
+        averaged = dict(self.average.named_parameters())
+        for name, parameter in self.trained.items():
+            tensors[f"average.{name}"] = averaged[name]
+            for key, value in self.optimizer.state[parameter].items():
+                tensors[f"optimizer.{key}.{name}"] = torch.as_tensor(value)
+        partial = self.folder / "checkpoint.partial"
+        metadata = {"step": str(self.step), "recipe": to_json(self.recipe)}
+        save_file({key: value.detach().contiguous().clone() for key, value in tensors.items()}, partial, metadata=metadata)
+        partial.replace(self.folder / "checkpoint.safetensors")
+        save_weights(self.folder / "weights.safetensors", self.average, self.stage.trained)
+
+    def _load(self) -> None:
+        path = self.folder / "checkpoint.safetensors"
+        if not path.exists():
+            raise ValueError(f"{path}: no checkpoint to resume from")
+        with safe_open(path, "pt") as handle:
+            metadata = handle.metadata()
+            tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
+        stage = json.loads(metadata["recipe"])["stage"]
+        if stage != self.recipe.stage:
+            raise ValueError(f"{path}: is a checkpoint of stage {stage!r}, the recipe's is {self.recipe.stage!r}")
+        try:
+            self.model.load_state_dict({k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")})
+        except RuntimeError as error:
+            raise ValueError(f"{path}: does not fit the recipe's model: {str(error).splitlines()[1].strip()}") from None
+        averaged = dict(self.average.named_parameters())
+        with torch.no_grad():
+            for name, parameter in self.trained.items():
+                averaged[name].copy_(tensors[f"average.{name}"])
+                self.optimizer.state[parameter] = {
+                    key: tensors[f"optimizer.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
+                }
+        self.step = int(metadata["step"])
+
+
+def step_generator(seed: int, step: int, rank: int = 0) -> torch.Generator:
+    """The source of all randomness of one step on one process."""
+    # a splitmix64 round spreads neighbouring (seed, step, rank) over the generator's states
+    mixed = (seed * 0x9E3779B97F4A7C15 + step * 0xBF58476D1CE4E5B9 + rank * 0x94D049BB133111EB + 1) % 2**63
+    return torch.Generator().manual_seed(mixed)
