@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -106,15 +105,11 @@ def value_type(name: str, value: Any) -> Sdf.ValueTypeName:
     return _TYPES.Double if isinstance(value, float) else _TYPES.String
 
 
-def numbers(value: Any, count: int, where: str) -> tuple[float, ...]:
-    """`count` finite numbers out of a USD vector; raises StageError that names `where`."""
-    try:
-        out = tuple(float(item) for item in value)
-    except (TypeError, ValueError):
-        out = ()
-    if len(out) != count or not all(map(math.isfinite, out)):
-        raise StageError(f"{where} is {value!r}, allowed: {count} finite numbers")
-    return out
+def plain(value: Any) -> Any:
+    """USD's vectors and arrays as tuples, anything else as it is."""
+    if isinstance(value, str) or not hasattr(value, "__len__"):
+        return value
+    return tuple(plain(item) for item in value)
 
 
 def relation_name(subject: str, predicate: str, object_: str, taken: Iterable[str] = ()) -> str:

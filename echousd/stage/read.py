@@ -199,7 +199,7 @@ def value(prim: Usd.Prim, name: str) -> Any:
     found = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
     if isinstance(found, str) and len(found) > MAX_TEXT:
         raise StageError(f"{place(prim)}: {name} is a text of {len(found)} characters, allowed: {MAX_TEXT}")
-    return found
+    return usd.plain(found)
 
 
 def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:

@@ -173,7 +173,7 @@ class _Editor:
         """Edits after which the attributes `names` of a prim hold `values`, those that are not in `values` nothing."""
         path = prim.GetPath()
         edits: list[Edit] = [
-            partial(self.put, path, name, new) for name, new in values.items() if value(prim, name) != new
+            partial(self.put, path, name, new) for name, new in values.items() if value(prim, name) != usd.plain(new)
         ]
         for name in names:
             attribute = prim.GetAttribute(name)
