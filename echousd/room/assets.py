@@ -1,0 +1,132 @@
+"""One piece of furniture as a USD asset: a light component layer with a payload, and the heavy geometry behind it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import fast_simplification
+import numpy as np
+import trimesh
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
+
+from echousd.room.looks import kind_of
+from echousd.room.surface import Surface
+
+LICENCE = "Apache-2.0"
+# Solids that may be wrapped in one hull; everything else has room below or inside that other things need.
+CONVEX = frozenset({"cabinet", "lamp_below", "table_lamp", "ceiling_lamp", "pendant_lamp", "wall_lamp", "plant", "tv", "ottoman", "stool"})
+COLLIDER_FACES = 400
+
+
+def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
+    """An empty stage in memory with the metadata that all our layers carry."""
+    stage = Usd.Stage.Open(Sdf.Layer.CreateAnonymous(kind))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+    layer = stage.GetRootLayer()
+    layer.defaultPrim = default_prim
+    if data:
+        layer.customLayerData = dict(data)
+    return stage
+
+
+def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.Layer:
+    """A copy of a stage's layer, finished where no stage looks on: that would try to load what is not on disk yet."""
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.TransferContent(stage.GetRootLayer())
+    with Sdf.ChangeBlock():
+        finish(layer)
+    return layer
+
+
+def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
+    """The layer as it would lie on disk; the same content gives the same bytes. `suffix`: `.usda` or `.usdc`."""
+    with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
+        path = Path(folder) / f"layer{suffix}"
+        if not layer.Export(str(path)):
+            raise OSError(f"cannot write a layer to {folder}")
+        return path.read_bytes()
+
+
+def write_mesh(stage: Usd.Stage, path: str, surface: Surface) -> UsdGeom.Mesh:
+    """Author a UsdGeomMesh with indexed normals and `st`, and one GeomSubset per material group where there are several."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(surface.points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(surface.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(surface.faces.ravel()))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(surface.extent))
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
+    normals.Set(Vt.Vec3fArray.FromNumpy(surface.normals))
+    normals.SetIndices(Vt.IntArray.FromNumpy(surface.normal_index))
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+    st.Set(Vt.Vec2fArray.FromNumpy(surface.st))
+    st.SetIndices(Vt.IntArray.FromNumpy(surface.st_index))
+    if len(surface.groups) > 1:
+        for name, faces in surface.groups.items():
+            subset = UsdGeom.Subset.Define(stage, f"{path}/{name}")
+            subset.CreateElementTypeAttr(UsdGeom.Tokens.face)
+            subset.CreateFamilyNameAttr("materialBind")
+            subset.CreateIndicesAttr(Vt.IntArray.FromNumpy(faces))
+        UsdGeom.Subset.SetFamilyType(mesh, "materialBind", UsdGeom.Tokens.partition)
+    return mesh
+
+
+def collider(mesh: trimesh.Trimesh, category: str) -> tuple[trimesh.Trimesh, str]:
+    """A light mesh for collisions and its UsdPhysics approximation, `convexHull` or `convexDecomposition`."""
+    if kind_of(category) in CONVEX:
+        hull = mesh.convex_hull
+        return _reduced(hull, 120).convex_hull, "convexHull"
+    return _reduced(mesh, COLLIDER_FACES), "convexDecomposition"
+
+
+def geometry_layer(name: str, surface: Surface, collision: trimesh.Trimesh, data: Mapping[str, Any]) -> Sdf.Layer:
+    """`<name>_geo`: the mesh `<name>_mesh` and, as a guide, `<name>_collider`."""
+    stage = new_stage(name, ".usdc", data)
+    UsdGeom.Xform.Define(stage, f"/{name}")
+    write_mesh(stage, f"/{name}/{name}_mesh", surface)
+    guide = UsdGeom.Mesh.Define(stage, f"/{name}/{name}_collider")
+    guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    guide.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    points = np.asarray(collision.vertices, np.float32)
+    guide.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    guide.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(collision.faces), 3, np.int32)))
+    guide.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.asarray(collision.faces, np.int32).ravel()))
+    guide.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
+    return stage.GetRootLayer()
+
+
+def component_layer(name: str, category: str, extent: np.ndarray, data: Mapping[str, Any]) -> Sdf.Layer:
+    """`<name>.usda`: kind, extentsHint, asset info and the payload `./<name>_geo.usdc`."""
+    stage = new_stage(name, ".usda", data)
+    prim = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
+    model = Usd.ModelAPI(prim)
+    model.SetKind(Kind.Tokens.component)
+    model.SetAssetName(name)
+    model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
+    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
+    prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
+    return without_stage(stage, lambda layer: _add_payload(layer, name))
+
+
+def _add_payload(layer: Sdf.Layer, name: str) -> None:
+    payload = Sdf.Payload(f"./{name}_geo.usdc", Sdf.Path(f"/{name}"))
+    layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)
+
+
+def _reduced(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
+    """The mesh with at most about `faces` triangles, used vertices only."""
+    if len(mesh.faces) > faces:
+        points, triangles = fast_simplification.simplify(
+            np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), target_count=faces, agg=5
+        )
+        mesh = trimesh.Trimesh(points, triangles, process=True)
+    out = mesh.copy()
+    out.update_faces(out.nondegenerate_faces())
+    out.remove_unreferenced_vertices()
+    return out

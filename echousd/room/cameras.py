@@ -1,0 +1,106 @@
+"""Lights and cameras that belong to a room: a soft sky, a ceiling light, a view from above and one from a corner."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom, UsdLux
+
+APERTURE = 36.0  # mm, width of the picture in the camera
+FOCAL_LENGTH = 30.0  # mm: 62 degrees across
+MARGIN = 1.06
+
+
+@dataclass(frozen=True)
+class Volume:
+    """What the cameras must see, in the frame of `/Room`: (3,) float lower and upper corners, metres."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle of the volume."""
+        return (self.lower + self.upper) / 2
+
+    def corners(self) -> np.ndarray:
+        """(8, 3) float corners."""
+        return np.stack(np.meshgrid(*np.stack([self.lower, self.upper], 1)), -1).reshape(-1, 3)
+
+
+def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world, column vectors; the camera looks along its -Z with +Y up."""
+    back = eye - target
+    back = back / np.linalg.norm(back)
+    right = np.cross((0.0, 1.0, 0.0), back)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, np.cross(back, right), back, eye
+    return matrix
+
+
+def perspective_view(volume: Volume, facing: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world of a view from the side that most furniture faces, seeing all of the volume.
+
+    Arguments:
+        volume: what must be in the picture.
+        facing: (2,) float, x and z of the furniture's mean front.
+    """
+    corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
+    side = corners[np.argmax(corners @ (facing + (1e-3, 2e-3)))]
+    direction = np.array([0.62 * side[0], 0.66, 0.78 * side[1]])
+    direction /= np.linalg.norm(direction)
+    target = volume.centre.copy()
+    half = APERTURE / 2 / FOCAL_LENGTH / MARGIN
+    matrix = view_matrix(target + direction, target)
+    local = (volume.corners() - target) @ matrix[:3, :3]  # in camera axes, seen from the target
+    # Distance at which every corner lies within the square picture.
+    need = np.abs(local[:, :2]).max(1) / half + local[:, 2]
+    return view_matrix(target + direction * max(float(need.max()), 1.0), target)
+
+
+def write_cameras(stage: Usd.Stage, volume: Volume, facing: np.ndarray) -> None:
+    """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`."""
+    UsdGeom.Scope.Define(stage, "/Room/Cameras")
+    top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
+    top.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+    width = float((volume.upper - volume.lower)[[0, 2]].max()) * MARGIN
+    for aperture in (top.CreateHorizontalApertureAttr(), top.CreateVerticalApertureAttr()):
+        aperture.Set(10 * width)  # tenths of a scene unit
+    height = float(volume.upper[1]) + 2.0
+    top.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height, float(volume.centre[2])))
+    top.AddRotateXOp().Set(-90.0)
+    top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
+    camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
+    matrix = perspective_view(volume, facing)
+    camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
+    camera.CreateFocalLengthAttr(FOCAL_LENGTH)
+    camera.CreateHorizontalApertureAttr(APERTURE)
+    camera.CreateVerticalApertureAttr(APERTURE)
+    distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
+    camera.CreateFocusDistanceAttr(distance)
+    camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 4 * distance + 10.0))
+
+
+def write_lights(stage: Usd.Stage, volume: Volume, height: float) -> None:
+    """Author `/Room/Lights`: a dome of radiance 0.6 and a warm ceiling panel.
+
+    Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under both lights
+    comes to about 1, so nothing is blown out. A host that wants nits scales both by one exposure.
+    """
+    UsdGeom.Scope.Define(stage, "/Room/Lights")
+    dome = UsdLux.DomeLight.Define(stage, "/Room/Lights/sky")
+    dome.CreateIntensityAttr(0.6)
+    dome.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
+    panel = UsdLux.RectLight.Define(stage, "/Room/Lights/ceiling")
+    side = 0.45 * (volume.upper - volume.lower)[[0, 2]]
+    width, depth = (max(float(s), 0.5) for s in side)
+    panel.CreateWidthAttr(width)
+    panel.CreateHeightAttr(depth)
+    # A panel of radiance L and area A lights the floor below it with about L A / h².
+    panel.CreateIntensityAttr(round(min(12.0, 1.2 * height**2 / (width * depth)), 4))
+    panel.CreateEnableColorTemperatureAttr(True)
+    panel.CreateColorTemperatureAttr(4300.0)
+    panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
+    panel.AddRotateXOp().Set(-90.0)

@@ -1,0 +1,251 @@
+"""All files of a layered room as bytes, without touching the disk: the same room gives the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
+
+import echousd
+from echousd.room import assets, cameras, looks, materials, physics, shell
+from echousd.room.room import Room
+from echousd.room.styles import ROOM_STYLE, style_groups
+from echousd.room.surface import Surface, surface
+from echousd.room.taxonomy import ade20k
+from echousd.stage import graph_layer as write_graph_layer
+
+LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest first
+OBJECTS = "/Room/Objects"
+SHELL = "/Room/Shell"
+
+
+@dataclass(frozen=True)
+class Asset:
+    """One piece of furniture, ready to be written."""
+
+    name: str
+    category: str
+    surface: Surface
+    files: Mapping[str, bytes]
+    approximation: str
+
+
+def room_files(room: Room) -> dict[str, bytes]:
+    """Relative path -> content of everything that a room consists of, except the preview and the manifest."""
+    files: dict[str, bytes] = {}
+    made: dict[str, Asset] = {}
+    category = {node.name: node.category for node in room.graph.nodes}
+    for name in dict.fromkeys(room.assets.values()):
+        made[name] = _asset(room, name, category[name])
+        files.update(made[name].files)
+    shell_surfaces = _shell(room)
+    palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
+    files["textures/floor.png"] = materials.planks(looks.look(palette, "wood").color, seed=room.provenance.seed)
+    layers = {
+        "geometry": geometry_layer(room, shell_surfaces),
+        "graph": graph_layer(room),
+        "layout": layout_layer(room),
+        "physics": physics_layer(room, made, shell_surfaces),
+        "materials": materials_layer(room, made, shell_surfaces),
+    }
+    for name, layer in layers.items():
+        files[f"layers/{name}.usda"] = assets.layer_bytes(layer, ".usda")
+    files[f"{room.name}.usda"] = assets.layer_bytes(root_layer(room), ".usda")
+    return files
+
+
+def layer_data(room: Room, name: str) -> dict[str, Any]:
+    """The customLayerData of a layer: who made it, from what, and under which licence."""
+    return {
+        "asset_name": name,
+        "generator": f"echousd {echousd.__version__}",
+        "seed": room.provenance.seed,
+        "model": room.provenance.model,
+        "asset_license": assets.LICENCE,
+    }
+
+
+def geometry_layer(room: Room, shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
+    """`layers/geometry.usda`: every object references its asset; the shell's meshes."""
+    stage = _room_stage(room, "geometry")
+    root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
+    for path in (OBJECTS, SHELL):
+        Usd.ModelAPI(UsdGeom.Xform.Define(stage, path)).SetKind(Kind.Tokens.group)
+    for node in room.graph.nodes:
+        prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
+        _label(prim, "ade20k", ade20k(node.category))
+    for name, (kind, form) in shell_surfaces.items():
+        part = UsdGeom.Xform.Define(stage, f"{SHELL}/{name}").GetPrim()
+        Usd.ModelAPI(part).SetKind(Kind.Tokens.component)
+        low, high = form.extent
+        UsdGeom.ModelAPI.Apply(part).SetExtentsHint([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
+        _label(part, "category", kind)
+        _label(part, "ade20k", ade20k(kind))
+        assets.write_mesh(stage, f"{SHELL}/{name}/{name}_mesh", form)
+    return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
+
+
+def graph_layer(room: Room) -> Sdf.Layer:
+    """`layers/graph.usda`: nodes, labels and relations, as asked for."""
+    layer = write_graph_layer(room.graph)
+    layer.customLayerData = {**layer.customLayerData, **layer_data(room, f"{room.name}_graph")}
+    return layer
+
+
+def layout_layer(room: Room) -> Sdf.Layer:
+    """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
+    stage = _room_stage(room, "layout")
+    root = stage.OverridePrim("/Room")
+    layouts = room.layouts or (room.boxes,)
+    if len(layouts) == 1:
+        _place(stage, room, 0)
+        return stage.GetRootLayer()
+    variants = root.GetVariantSets().AddVariantSet("layout")
+    for number in range(len(layouts)):
+        name = f"layout_{number}"
+        variants.AddVariant(name)
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            _place(stage, room, number)
+    variants.SetVariantSelection("layout_0")
+    return stage.GetRootLayer()
+
+
+def physics_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
+    """`layers/physics.usda`."""
+    stage = _room_stage(room, "physics")
+    stage.OverridePrim("/Room")
+    bodies = []
+    for number, node in enumerate(room.graph.nodes):
+        asset = room.assets[node.name]
+        x, y, z = (float(v) for v in room.boxes.size[number])
+        path = f"{OBJECTS}/{node.name}"
+        bodies.append(physics.Body(path, f"{path}/{asset}_collider", made[asset].approximation, node.category, (x, y, z)))
+    static = [f"{SHELL}/{name}/{name}_mesh" for name in shell_surfaces]
+    physics.write_physics(stage, bodies, static)
+    physics.set_gravity(stage, room.options.up_axis)
+    return stage.GetRootLayer()
+
+
+def materials_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
+    """`layers/materials.usda`."""
+    stage = _room_stage(room, "materials")
+    stage.OverridePrim("/Room")
+    styles = style_groups(room.graph)
+    table: dict[str, looks.Look] = {}
+    bindings: dict[str, str] = {}
+
+    def bind(path: str, form: Surface, style: str) -> None:
+        slug = "".join(c if c.isalnum() else "_" for c in style)
+        palette = looks.palette_for(f"{style} {room.provenance.seed}")
+        for group in form.groups:
+            name = f"{slug}_{group}" if slug[0].isalpha() else f"style_{slug}_{group}"
+            table[name] = looks.look(palette, group)
+            bindings[f"{path}/{group}" if len(form.groups) > 1 else path] = name
+
+    for node in room.graph.nodes:
+        asset = room.assets[node.name]
+        bind(f"{OBJECTS}/{node.name}/{asset}_mesh", made[asset].surface, styles[node.name])
+    wood = looks.look(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"), "wood")
+    table["floor"] = looks.Look(wood.color, 0.55, texture="../textures/floor.png")
+    table["wall"] = looks.Look(looks.linear("ece8e1"), 0.9)
+    for name, (kind, _) in shell_surfaces.items():
+        bindings[f"{SHELL}/{name}/{name}_mesh"] = kind
+    materials.write_looks(stage, table, bindings)
+    return stage.GetRootLayer()
+
+
+def root_layer(room: Room) -> Sdf.Layer:
+    """The root layer: metadata, sublayers, lights and cameras."""
+    stage = _room_stage(room, "")
+    layer = stage.GetRootLayer()
+    layer.documentation = "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten."
+    UsdGeom.SetStageUpAxis(stage, room.options.up_axis)
+    root = UsdGeom.Xform.Define(stage, "/Room")
+    prim = root.GetPrim()
+    Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
+    Usd.ModelAPI(prim).SetAssetName(room.name)
+    if room.options.up_axis == "Z":
+        root.AddRotateXOp(opSuffix="upAxis").Set(90.0)
+    volume = room_volume(room)
+    low, high = (Gf.Vec3f(*map(float, corner)) for corner in (volume.lower, volume.upper))
+    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
+    yaw, weight = np.asarray(room.boxes.yaw, float), np.asarray(room.boxes.size, float).prod(1)
+    facing = np.array([(np.sin(yaw) * weight).sum(), (np.cos(yaw) * weight).sum()]) / max(float(weight.sum()), 1e-9)
+    cameras.write_lights(stage, volume, room.height)
+    cameras.write_cameras(stage, volume, facing)
+    return assets.without_stage(stage, _add_sublayers)
+
+
+def room_volume(room: Room) -> cameras.Volume:
+    """Box around the floor and all furniture, metres."""
+    size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
+    plan = np.concatenate([room.floor, shell.box_corners(size, position, np.asarray(room.boxes.yaw, float))])
+    top = room.height if room.options.walls else float((position[:, 1] + size[:, 1]).max(initial=0.5))
+    lower, upper = plan.min(0), plan.max(0)
+    return cameras.Volume(np.array([lower[0], -shell.THICKNESS, lower[1]]), np.array([upper[0], top, upper[1]]))
+
+
+def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
+    for name, asset in references.items():
+        prim = layer.GetPrimAtPath(f"{OBJECTS}/{name}")
+        prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
+
+
+def _add_sublayers(layer: Sdf.Layer) -> None:
+    layer.subLayerPaths = [f"./layers/{name}.usda" for name in LAYERS]
+
+
+def _asset(room: Room, name: str, category: str) -> Asset:
+    mesh, groups = looks.material_groups(room.meshes[name], category)
+    form = surface(mesh, groups, atlas=room.options.atlas)
+    collision, approximation = assets.collider(room.meshes[name], category)
+    data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
+    folder = f"assets/{name}/{name}"
+    geometry = assets.geometry_layer(name, form, collision, data)
+    component = assets.component_layer(name, category, form.extent, data)
+    files = {
+        f"{folder}_geo.usdc": assets.layer_bytes(geometry, ".usdc"),
+        f"{folder}.usda": assets.layer_bytes(component, ".usda"),
+    }
+    return Asset(name, category, form, files, approximation)
+
+
+def _shell(room: Room) -> dict[str, tuple[str, Surface]]:
+    floor = shell.floor_mesh(room.floor)
+    parts = {"Floor": ("floor", surface(floor, {"floor": np.arange(len(floor.faces))}))}
+    scale = 1 / 1.6  # one picture of boards is 1.6 m
+    kind, form = parts["Floor"]
+    parts["Floor"] = (kind, _scaled_st(form, scale))
+    if room.options.walls:
+        for number, wall in enumerate(shell.wall_meshes(room.floor, room.height)):
+            parts[f"Wall_{number + 1}"] = ("wall", surface(wall, {"wall": np.arange(len(wall.faces))}))
+    return parts
+
+
+def _scaled_st(form: Surface, scale: float) -> Surface:
+    from dataclasses import replace
+
+    return replace(form, st=(form.st * scale).astype(np.float32))
+
+
+def _place(stage: Usd.Stage, room: Room, layout: int) -> None:
+    boxes = room.layouts[layout] if room.layouts else room.boxes
+    for number, name in enumerate(room.names):
+        xform = UsdGeom.Xformable(stage.OverridePrim(f"{OBJECTS}/{name}"))
+        x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
+        xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
+        xform.AddRotateYOp().Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+
+
+def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:
+    UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+
+
+def _room_stage(room: Room, layer: str) -> Usd.Stage:
+    name = f"{room.name}_{layer}" if layer else room.name
+    return assets.new_stage("Room", ".usda", layer_data(room, name))

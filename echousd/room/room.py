@@ -1,0 +1,186 @@
+"""A room that was generated from a graph: boxes, meshes and verdicts, and how it is saved and shown."""
+
+from __future__ import annotations
+
+import tempfile
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import trimesh
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+    from echomodel.boxes import Boxes
+    from echousd.graph import SceneGraph
+
+
+@dataclass(frozen=True)
+class RoomOptions:
+    """How a room is written.
+
+    Arguments:
+        up_axis: `Y`, or `Z` (metadata and one rotation on the root prim; everything below stays as it is).
+        walls: add walls around the floor.
+        atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
+    """
+
+    up_axis: str = "Y"
+    walls: bool = False
+    atlas: bool = False
+
+    def __post_init__(self) -> None:
+        if self.up_axis not in ("Y", "Z"):
+            raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one relation of the graph: `kept`, `broken` or `unmeasured`, and by how much (metres or ratio)."""
+
+    subject: str
+    predicate: str
+    object: str
+    state: str
+    margin: float | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the manifest."""
+        margin = None if self.margin is None else round(self.margin, 4)
+        return {"subject": self.subject, "predicate": self.predicate, "object": self.object, "state": self.state, "margin": margin}
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a room comes from; written into every layer and into the manifest."""
+
+    seed: int = 0
+    preset: str = "compact"
+    model: str = "none"
+    shapes: str = "boxes"
+    source: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """A finished room.
+
+    Arguments:
+        name: valid identifier; file and default prim's asset name.
+        graph: the graph that was asked for.
+        boxes: N boxes in the order of `graph.nodes`.
+        meshes: object name -> mesh in the object's frame, metres, filling its box.
+        assets: object name -> name of the asset that it references; objects with one asset have one mesh.
+        floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
+        verdicts: one per relation of the graph.
+        layouts: all arrangements of the same furniture; the first is `boxes`.
+        timings: stage of the pipeline -> seconds.
+    """
+
+    name: str
+    graph: SceneGraph
+    boxes: Boxes
+    meshes: Mapping[str, trimesh.Trimesh]
+    assets: Mapping[str, str]
+    floor: np.ndarray
+    verdicts: tuple[Verdict, ...] = ()
+    layouts: tuple[Boxes, ...] = ()
+    provenance: Provenance = Provenance()
+    options: RoomOptions = RoomOptions()
+    timings: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the objects, in the order of the boxes."""
+        return tuple(node.name for node in self.graph.nodes)
+
+    @property
+    def height(self) -> float:
+        """Height of the room in metres: the graph's, else 2.8, and never below the highest object."""
+        top = float((np.asarray(self.boxes.position)[:, 1] + np.asarray(self.boxes.size)[:, 1]).max(initial=0.0))
+        return max(float(self.graph.room.height or 2.8), top)
+
+    def pose(self, number: int, layout: int = 0) -> np.ndarray:
+        """(4, 4) float: object frame -> room frame of one object in one layout."""
+        boxes = self.layouts[layout] if self.layouts else self.boxes
+        yaw = float(boxes.yaw[number])
+        matrix = np.eye(4)
+        matrix[0, 0] = matrix[2, 2] = np.cos(yaw)
+        matrix[0, 2], matrix[2, 0] = np.sin(yaw), -np.sin(yaw)
+        matrix[:3, 3] = np.asarray(boxes.position[number], float)
+        return matrix
+
+    def scene(self) -> trimesh.Scene:
+        """All objects in their places, in the room frame."""
+        scene = trimesh.Scene()
+        for number, name in enumerate(self.names):
+            scene.add_geometry(self.meshes[name], node_name=name, geom_name=self.assets[name], transform=self.pose(number))
+        return scene
+
+    def save(self, folder: str | Path, *, force: bool = False, preview: bool = True) -> Path:
+        """Write the layered room and return the path of its root layer.
+
+        Arguments:
+            folder: created if need be; a room of ours in it is regenerated, all other files stay untouched.
+            force: also write into a folder that holds other things than a room of ours.
+            preview: draw `<name>.png` (needs the extra `render`; left out without it).
+
+        Raises:
+            ValueError: the folder is not ours, cannot be written, or the disk is full; nothing is half-written.
+        """
+        from echousd.room.save import save_room
+
+        return save_room(self, Path(folder), force=force, preview=preview)
+
+    @property
+    def stage(self) -> Usd.Stage:
+        """The room as a composed stage (written to a temporary folder that lives as long as the room)."""
+        if not hasattr(self, "_stage"):
+            from pxr import Usd
+
+            folder = tempfile.TemporaryDirectory(prefix="echousd-")
+            root = self.save(Path(folder.name) / self.name, preview=False)
+            object.__setattr__(self, "_stage", Usd.Stage.Open(str(root)))
+            weakref.finalize(self, folder.cleanup)
+        return self._stage  # type: ignore[attr-defined]
+
+    def image(self, *, size: int = 512, view: str = "perspective") -> Any:
+        """A picture of the room (PIL image); needs the extra `render`."""
+        from echousd.render import render_stage
+
+        return render_stage(self.stage, view=view, size=size)
+
+    def _repr_png_(self) -> bytes | None:
+        import io
+
+        try:
+            picture = self.image()
+        except ValueError:  # without embreex a notebook shows the table alone
+            return None
+        out = io.BytesIO()
+        picture.save(out, "PNG")
+        return out.getvalue()
+
+    def _repr_html_(self) -> str:
+        import base64
+
+        kept = sum(v.state == "kept" for v in self.verdicts)
+        measured = sum(v.state != "unmeasured" for v in self.verdicts)
+        rows = "".join(
+            f"<tr><td>{node.name}</td><td>{node.category}</td><td>{' × '.join(f'{v:.2f}' for v in self.boxes.size[i].tolist())}</td>"
+            f"<td>{', '.join(f'{v:.2f}' for v in self.boxes.position[i].tolist())}</td></tr>"
+            for i, node in enumerate(self.graph.nodes)
+        )
+        png = self._repr_png_()
+        picture = f'<img width="360" src="data:image/png;base64,{base64.b64encode(png).decode()}">' if png else ""
+        return (
+            f"<div><b>{self.name}</b>: {len(self.names)} objects, {kept} of {measured} measured relations kept<br>{picture}"
+            f"<table><tr><th>object</th><th>category</th><th>size (m)</th><th>position (m)</th></tr>{rows}</table></div>"
+        )
+
+    def __repr__(self) -> str:
+        return f"Room({self.name!r}, {len(self.names)} objects, {len(self.verdicts)} relations, seed {self.provenance.seed})"

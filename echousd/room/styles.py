@@ -1,0 +1,97 @@
+"""Style groups of a graph, and which of their objects can share one asset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from echousd.graph import SceneGraph
+
+SIZE_TOLERANCE = 0.08  # largest relative difference of an extent that still is the same piece of furniture
+AGREEMENT = 0.75  # least intersection over union of two shapes in their boxes
+ROOM_STYLE = "room"
+
+
+def style_groups(graph: SceneGraph) -> dict[str, str]:
+    """Object name -> name of its style; objects joined by `same_style_as` or by one `style` are one group.
+
+    Objects of no group have the style `room`, so that a room looks of one piece.
+    """
+    parent = {node.name: node.name for node in graph.nodes}
+
+    def root(name: str) -> str:
+        while parent[name] != name:
+            parent[name] = parent[parent[name]]
+            name = parent[name]
+        return name
+
+    by_style: dict[str, str] = {}
+    for node in graph.nodes:
+        if node.style:
+            parent[root(node.name)] = root(by_style.setdefault(node.style, node.name))
+    for relation in graph.relations:
+        if relation.predicate == "same_style_as":
+            parent[root(relation.subject)] = root(relation.object)
+    members: dict[str, list[str]] = {}
+    for node in graph.nodes:
+        members.setdefault(root(node.name), []).append(node.name)
+    style_of = {node.name: node.style for node in graph.nodes}
+    out: dict[str, str] = {}
+    number = 0
+    for node in graph.nodes:
+        if node.name in out:
+            continue
+        group = members[root(node.name)]
+        named = next((style_of[name] for name in group if style_of[name]), None)
+        if named is None and len(group) == 1:
+            out[node.name] = ROOM_STYLE
+            continue
+        if named is None:
+            number += 1
+            named = f"style_{number}"
+        out.update(dict.fromkeys(group, named))
+    return {node.name: out[node.name] for node in graph.nodes}
+
+
+def shared_assets(
+    names: Sequence[str],
+    categories: Sequence[str],
+    styles: Mapping[str, str],
+    size: np.ndarray,
+    occupancy: np.ndarray | None = None,
+) -> dict[str, str]:
+    """Object name -> name of the object whose asset it uses (itself if nothing agrees).
+
+    Objects agree when they have one category and one style group, their sizes differ by at most `SIZE_TOLERANCE`, and
+    their shapes overlap by at least `AGREEMENT`.
+
+    Arguments:
+        names, categories: n words each.
+        styles: object name -> style, see `style_groups`.
+        size: (n, 3) float, metres.
+        occupancy: (n, d, d, d) bool, inside of each shape in its own box; None: all shapes are alike (boxes).
+    """
+    owners: list[int] = []
+    out: dict[str, str] = {}
+    for i, name in enumerate(names):
+        for j in owners:
+            same = categories[i] == categories[j] and styles[name] == styles[names[j]]
+            if same and styles[name] != ROOM_STYLE and _agree(i, j, size, occupancy):
+                out[name] = names[j]
+                break
+        else:
+            owners.append(i)
+            out[name] = name
+    return out
+
+
+def _agree(i: int, j: int, size: np.ndarray, occupancy: np.ndarray | None) -> bool:
+    if np.abs(size[i] / size[j] - 1).max() > SIZE_TOLERANCE:
+        return False
+    if occupancy is None:
+        return True
+    either = np.logical_or(occupancy[i], occupancy[j]).sum()
+    return bool(either) and np.logical_and(occupancy[i], occupancy[j]).sum() / either >= AGREEMENT

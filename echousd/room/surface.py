@@ -1,0 +1,119 @@
+"""Render-ready surfaces: a triangle mesh with creased normals, texture coordinates and material groups (numpy and trimesh)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles with indexed corner attributes, as UsdGeomMesh stores them.
+
+    Arguments:
+        points: (v, 3) float32, metres.
+        faces: (f, 3) int32, indices into points, counter-clockwise seen from outside.
+        normals, normal_index: (k, 3) float32 unit vectors and (3 f) int32, one index per face corner.
+        st, st_index: (t, 2) float32 and (3 f) int32.
+        groups: material group -> (m,) int32 face numbers; together they name every face exactly once.
+    """
+
+    points: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    normal_index: np.ndarray
+    st: np.ndarray
+    st_index: np.ndarray
+    groups: Mapping[str, np.ndarray]
+
+    @property
+    def extent(self) -> np.ndarray:
+        """(2, 3) float32: lower and upper corner."""
+        return np.stack([self.points.min(0), self.points.max(0)]).astype(np.float32)
+
+
+def surface(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False) -> Surface:
+    """A mesh with normals and texture coordinates.
+
+    Arguments:
+        mesh: triangles in metres.
+        groups: material group -> face numbers.
+        atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
+            axes, where one unit of texture space is one metre.
+    """
+    normals, normal_index = creased_normals(mesh)
+    st, st_index = atlas_unwrap(mesh) if atlas else box_projection(mesh)
+    return Surface(
+        points=np.asarray(mesh.vertices, np.float32),
+        faces=np.asarray(mesh.faces, np.int32),
+        normals=normals,
+        normal_index=normal_index,
+        st=st,
+        st_index=st_index,
+        groups={name: np.asarray(index, np.int32) for name, index in sorted(groups.items()) if len(index)},
+    )
+
+
+def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
+    """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
+    faces = np.asarray(mesh.faces)
+    triangles = np.asarray(mesh.vertices)[faces]
+    area_normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    unit = area_normal / np.maximum(np.linalg.norm(area_normal, axis=1, keepdims=True), 1e-20)
+    corner_vertex = faces.ravel()
+    corner_face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(corner_vertex, kind="stable")
+    count = np.bincount(corner_vertex, minlength=len(mesh.vertices))
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    # every corner meets every corner of the same vertex
+    fan = count[corner_vertex]
+    here = np.repeat(np.arange(len(corner_vertex)), fan)
+    step = np.arange(len(here)) - np.repeat(np.cumsum(fan) - fan, fan)
+    other = order[np.repeat(first[corner_vertex], fan) + step]
+    near = (unit[corner_face[here]] * unit[corner_face[other]]).sum(1) >= np.cos(crease)
+    total = np.zeros((len(corner_vertex), 3))
+    for axis in range(3):
+        weight = area_normal[corner_face[other[near]], axis]
+        total[:, axis] = np.bincount(here[near], weights=weight, minlength=len(corner_vertex))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    total = np.where(length > 1e-12, total / np.maximum(length, 1e-12), unit[corner_face])
+    flat = np.linalg.norm(total, axis=1) < 0.5  # corners of triangles without area
+    total[flat] = (0.0, 1.0, 0.0)
+    return _indexed(total, 4)
+
+
+def box_projection(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates in metres along the axis that each face looks at most: ((t, 2) float32, (3 f) int32)."""
+    triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    axis = np.abs(normal).argmax(1)
+    facing = np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)[:, None]
+    x, y, z = triangles[..., 0], triangles[..., 1], triangles[..., 2]
+    u = np.choose(axis[:, None], [-z * facing, x, x * facing])
+    v = np.choose(axis[:, None], [y, -z * facing, y])
+    return _indexed(np.stack([u, v], -1).reshape(-1, 2), 5)
+
+
+def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates without overlaps in the unit square (xatlas): ((t, 2) float32, (3 f) int32)."""
+    try:
+        import xatlas
+    except ImportError as error:
+        raise ValueError(f'texture atlas needs xatlas ({error}): pip install "echousd[texture]"') from None
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
+    pack = xatlas.PackOptions()
+    pack.resolution, pack.padding = 1024, 2
+    atlas.generate(pack_options=pack)
+    _, index, st = atlas[0]  # xatlas keeps the order of the faces
+    return np.asarray(st, np.float32), np.asarray(index, np.int32).ravel()
+
+
+def _indexed(values: np.ndarray, digits: int) -> tuple[np.ndarray, np.ndarray]:
+    unique, index = np.unique(np.round(values, digits) + 0.0, axis=0, return_inverse=True)
+    return unique.astype(np.float32), index.reshape(-1).astype(np.int32)
