@@ -24,10 +24,6 @@ class Volume:
         """Middle of the volume."""
         return (self.lower + self.upper) / 2
 
-    def corners(self) -> np.ndarray:
-        """(8, 3) float corners."""
-        return np.stack(np.meshgrid(*np.stack([self.lower, self.upper], 1)), -1).reshape(-1, 3)
-
 
 def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     """(4, 4) float camera to world, column vectors; the camera looks along its -Z with +Y up."""
@@ -40,27 +36,29 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def perspective_view(volume: Volume, facing: np.ndarray) -> np.ndarray:
-    """(4, 4) float camera to world of a view from the side that most furniture faces, seeing all of the volume.
+def perspective_view(points: np.ndarray, facing: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world of a view from the side that most furniture faces, with all points in the picture.
 
     Arguments:
-        volume: what must be in the picture.
+        points: (n, 3) float, metres, what must be seen.
         facing: (2,) float, x and z of the furniture's mean front.
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
     side = corners[np.argmax(corners @ (facing + (1e-3, 2e-3)))]
-    direction = np.array([0.62 * side[0], 0.66, 0.78 * side[1]])
+    direction = np.array([0.55 * side[0], 0.62, 0.85 * side[1]])
     direction /= np.linalg.norm(direction)
-    target = volume.centre.copy()
+    target = (points.min(0) + points.max(0)) / 2
     half = APERTURE / 2 / FOCAL_LENGTH / MARGIN
-    matrix = view_matrix(target + direction, target)
-    local = (volume.corners() - target) @ matrix[:3, :3]  # in camera axes, seen from the target
-    # Distance at which every corner lies within the square picture.
-    need = np.abs(local[:, :2]).max(1) / half + local[:, 2]
-    return view_matrix(target + direction * max(float(need.max()), 1.0), target)
+    for _ in range(4):  # the middle of the picture moves a little with the distance
+        axes = view_matrix(target + direction, target)[:3, :3]
+        local = (points - target) @ axes
+        distance = max(float((np.abs(local[:, :2]).max(1) / half + local[:, 2]).max()), 1.0)
+        seen = local[:, :2] / (distance - local[:, 2:])
+        target = target + axes[:, :2] @ (seen.max(0) + seen.min(0)) / 2 * distance
+    return view_matrix(target + direction * distance, target)
 
 
-def write_cameras(stage: Usd.Stage, volume: Volume, facing: np.ndarray) -> None:
+def write_cameras(stage: Usd.Stage, volume: Volume, points: np.ndarray, facing: np.ndarray) -> None:
     """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`."""
     UsdGeom.Scope.Define(stage, "/Room/Cameras")
     top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
@@ -73,7 +71,7 @@ def write_cameras(stage: Usd.Stage, volume: Volume, facing: np.ndarray) -> None:
     top.AddRotateXOp().Set(-90.0)
     top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
-    matrix = perspective_view(volume, facing)
+    matrix = perspective_view(points, facing)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
     camera.CreateFocalLengthAttr(FOCAL_LENGTH)
     camera.CreateHorizontalApertureAttr(APERTURE)

@@ -43,7 +43,7 @@ def room_files(room: Room) -> dict[str, bytes]:
         files.update(made[name].files)
     shell_surfaces = _shell(room)
     palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
-    files["textures/floor.png"] = materials.planks(looks.look(palette, "wood").color, seed=room.provenance.seed)
+    files["textures/floor.png"] = materials.planks(looks.floor_color(palette), seed=room.provenance.seed)
     layers = {
         "geometry": geometry_layer(room, shell_surfaces),
         "graph": graph_layer(room),
@@ -150,8 +150,8 @@ def materials_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mappi
     for node in room.graph.nodes:
         asset = room.assets[node.name]
         bind(f"{OBJECTS}/{node.name}/{asset}_mesh", made[asset].surface, styles[node.name])
-    wood = looks.look(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"), "wood")
-    table["floor"] = looks.Look(wood.color, 0.55, texture="../textures/floor.png")
+    boards = looks.floor_color(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"))
+    table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
     table["wall"] = looks.Look(looks.linear("ece8e1"), 0.9)
     for name, (kind, _) in shell_surfaces.items():
         bindings[f"{SHELL}/{name}/{name}_mesh"] = kind
@@ -177,17 +177,26 @@ def root_layer(room: Room) -> Sdf.Layer:
     yaw, weight = np.asarray(room.boxes.yaw, float), np.asarray(room.boxes.size, float).prod(1)
     facing = np.array([(np.sin(yaw) * weight).sum(), (np.cos(yaw) * weight).sum()]) / max(float(weight.sum()), 1e-9)
     cameras.write_lights(stage, volume, room.height)
-    cameras.write_cameras(stage, volume, facing)
+    cameras.write_cameras(stage, volume, room_points(room), facing)
     return assets.without_stage(stage, _add_sublayers)
+
+
+def room_points(room: Room) -> np.ndarray:
+    """(n, 3) float, metres: corners of the floor (and the walls) and of all boxes, in the frame of `/Room`."""
+    size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
+    plan = shell.box_corners(size, position, np.asarray(room.boxes.yaw, float))
+    low, high = np.repeat(position[:, 1], 4), np.repeat(position[:, 1] + size[:, 1], 4)
+    points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
+    points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]
+    if room.options.walls:
+        points.append(np.insert(room.floor, 1, room.height, axis=1))
+    return np.concatenate(points)
 
 
 def room_volume(room: Room) -> cameras.Volume:
     """Box around the floor and all furniture, metres."""
-    size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
-    plan = np.concatenate([room.floor, shell.box_corners(size, position, np.asarray(room.boxes.yaw, float))])
-    top = room.height if room.options.walls else float((position[:, 1] + size[:, 1]).max(initial=0.5))
-    lower, upper = plan.min(0), plan.max(0)
-    return cameras.Volume(np.array([lower[0], -shell.THICKNESS, lower[1]]), np.array([upper[0], top, upper[1]]))
+    points = room_points(room)
+    return cameras.Volume(points.min(0), points.max(0))
 
 
 def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:

@@ -67,6 +67,12 @@ def look(palette: str, group: str) -> Look:
     }[group]
 
 
+def floor_color(palette: str) -> tuple[float, float, float]:
+    """Linear colour of floor boards that set the palette's furniture off: light below dark wood, dark below light."""
+    wood = np.array(look(palette, "wood").color)
+    return linear("c2a27c") if wood.mean() < 0.2 else linear("8d6c4d")
+
+
 def palette_for(key: str) -> str:
     """A palette for a style's name, the same in every run."""
     names = sorted(PALETTES)

@@ -1,0 +1,223 @@
+"""Pictures of any stage without a GPU or a display: rays through Embree, soft sun, sky occlusion, and one bounce of light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echousd.scenery import Scenery, read_scenery
+
+if TYPE_CHECKING:
+    from PIL import Image
+    from pxr import Usd
+
+VIEWS = ("top", "perspective")
+COLORS = ("materials", "class")
+SUPERSAMPLES = 3  # squared: rays per pixel
+SKY_RAYS = 3  # per ray: rays towards the sky
+LARGEST = 4096
+
+
+class RenderUnavailable(ImportError, ValueError):
+    """Embree is not installed; the message says how to get it."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective)."""
+
+    matrix: np.ndarray
+    half: float
+    orthographic: bool
+
+
+def render_file(path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials") -> Image.Image:
+    """A picture of the room in a file; see `render_stage`. Raises ValueError where it cannot be opened."""
+    from echousd.stage import open_stage
+
+    return render_stage(open_stage(path), view=view, size=size, colors=colors)
+
+
+def render_stage(stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials") -> Image.Image:
+    """A square picture of everything visible on a stage.
+
+    Arguments:
+        stage: any stage; its up axis and units are taken care of.
+        view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner).
+        size: pixels on each side, 16 to 4096.
+        colors: `materials`, or `class` for one flat colour per category.
+
+    Raises:
+        ValueError: unknown view, colours or size, nothing to see, or Embree missing.
+    """
+    from PIL import Image
+
+    if view not in VIEWS:
+        raise ValueError(f"view is {view!r}, allowed: {', '.join(VIEWS)}")
+    if colors not in COLORS:
+        raise ValueError(f"colors is {colors!r}, allowed: {', '.join(COLORS)}")
+    if not 16 <= size <= LARGEST:
+        raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
+    scenery = read_scenery(stage, by_class=colors == "class")
+    camera = top_view(scenery) if view == "top" else corner_view(scenery)
+    pixels = trace(scenery, camera, size)
+    return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
+
+
+def top_view(scenery: Scenery) -> View:
+    """Straight down on the whole scene."""
+    lower, upper = scenery.bounds
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = (1, 0, 0), (0, 0, -1), (0, 1, 0)
+    centre = (lower + upper) / 2
+    matrix[:3, 3] = (centre[0], upper[1] + 1.0, centre[2])
+    return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)
+
+
+def corner_view(scenery: Scenery) -> View:
+    """From above a corner, the side that most objects turn their front to, the whole scene in the picture."""
+    from echousd.room.cameras import APERTURE, FOCAL_LENGTH, perspective_view
+
+    points = scenery.triangles.reshape(-1, 3)[:: max(1, len(scenery.triangles) // 4000)].astype(float)
+    return View(perspective_view(points, scenery.facing), APERTURE / 2 / FOCAL_LENGTH, False)
+
+
+def trace(scenery: Scenery, view: View, size: int, *, seed: int = 0) -> np.ndarray:
+    """The picture as (size, size, 3) float sRGB in [0, 1].
+
+    Every pixel sends SUPERSAMPLES² rays; together they cover the sun's disc and the sky evenly, each pixel with another
+    shift (randomised quasi-Monte Carlo), so that little noise is left.
+
+    Arguments:
+        scenery: triangles and their colours.
+        view: the camera.
+        size: pixels on each side.
+        seed: of the shifts; the same seed gives the same picture.
+    """
+    rng = np.random.default_rng(seed)
+    scene = _embree(scenery)
+    shift = rng.random((size, size, 4)).astype(np.float32)
+    image = np.zeros((size, size, 3), np.float32)
+    rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
+    for start in range(0, size, rows):
+        block = slice(start, min(size, start + rows))
+        for sample in range(SUPERSAMPLES**2):
+            image[block] += _shade(scene, scenery, view, size, block, sample, shift[block])
+    return (image / SUPERSAMPLES**2) ** (1 / 2.2)
+
+
+SUN = np.array([0.38, 0.84, 0.32]) / np.linalg.norm([0.38, 0.84, 0.32])
+SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
+SUN_LIGHT = np.array([1.05, 0.99, 0.90])
+SKY_LIGHT = np.array([0.80, 0.86, 0.95])
+BACKGROUND = np.array([0.90, 0.905, 0.915]) ** 2.2
+
+
+def _embree(scenery: Scenery) -> Any:
+    try:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+    except ImportError as error:
+        raise RenderUnavailable(f'drawing needs Embree ({error}): pip install "echousd[render]"') from None
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, np.ascontiguousarray(scenery.triangles, np.float32))
+    return scene
+
+
+def _shade(
+    scene: Any, scenery: Scenery, view: View, size: int, rows: slice, sample: int, shift: np.ndarray
+) -> np.ndarray:
+    """(rows, size, 3) linear colour of one ray for each pixel of some rows."""
+    across, down = sample % SUPERSAMPLES, sample // SUPERSAMPLES
+    x = (np.arange(size) + (across + 0.5) / SUPERSAMPLES) / size * 2 - 1
+    y = 1 - (np.arange(rows.start, rows.stop) + (down + 0.5) / SUPERSAMPLES) / size * 2
+    u, v = (g.ravel() * view.half for g in np.meshgrid(x, y))
+    axes, eye = view.matrix[:3, :3], view.matrix[:3, 3]
+    if view.orthographic:
+        origin = eye + u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1]
+        direction = np.broadcast_to(-axes[:, 2], origin.shape)
+    else:
+        direction = u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1] - axes[:, 2]
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        origin = np.broadcast_to(eye, direction.shape)
+    hit = scene.run(_f32(origin), _f32(direction), output=1)
+    seen = np.flatnonzero(hit["primID"] >= 0)
+    color = np.tile(BACKGROUND.astype(np.float32), (len(u), 1))
+    if not len(seen):
+        return color.reshape(-1, size, 3)
+    face = hit["primID"][seen]
+    bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
+    point = (scenery.triangles[face] * bary[..., None]).sum(1)
+    normal = (scenery.normals[face] * bary[..., None]).sum(1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    toward = -direction[seen]
+    normal = np.where((normal * toward).sum(1, keepdims=True) < 0, -normal, normal)
+    albedo = scenery.colors(face, bary)
+    lifted = point + 2e-3 * normal
+    color[seen] = _light(scene, scenery, lifted, normal, toward, albedo, face, sample, shift.reshape(-1, 4)[seen])
+    return color.reshape(-1, size, 3)
+
+
+def _light(
+    scene: Any,
+    scenery: Scenery,
+    point: np.ndarray,
+    normal: np.ndarray,
+    toward: np.ndarray,
+    albedo: np.ndarray,
+    face: np.ndarray,
+    sample: int,
+    shift: np.ndarray,
+) -> np.ndarray:
+    count = len(point)
+    sun = SUN + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
+    sun /= np.linalg.norm(sun, axis=1, keepdims=True)
+    facing = np.clip((normal * SUN).sum(1), 0, None)
+    lit = np.zeros(count)
+    ask = np.flatnonzero(facing > 0)
+    lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
+    direct = (facing * lit)[:, None] * SUN_LIGHT
+    sky = np.zeros((count, 3))
+    for ray in range(SKY_RAYS):
+        away = normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:]))  # cosine-weighted
+        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+        other = scene.run(_f32(point), _f32(away), output=1)
+        blocked = other["primID"] >= 0
+        # What a sky ray meets sends back a little of its own colour: one crude bounce.
+        bounce = 0.42 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
+        near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
+        open_sky = (0.55 + 0.45 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
+        sky += np.where(blocked[:, None], bounce * (0.35 + 0.65 * near), open_sky)
+    sky /= SKY_RAYS
+    half = toward + SUN
+    half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
+    gloss = scenery.gloss[face]
+    shine = gloss * np.clip((normal * half).sum(1), 0, None) ** (4 + 90 * gloss) * lit
+    out = albedo * (0.62 * direct + 0.78 * sky) + 0.5 * shine[:, None] + scenery.emissive[face]
+    return _tone(out)
+
+
+def _even(number: int, shift: np.ndarray) -> np.ndarray:
+    """Point `number` of the R2 sequence, which fills the unit square evenly, moved by a shift per pixel."""
+    return (shift + np.array([0.7548776662, 0.5698402910]) * (number + 1)) % 1.0
+
+
+def _on_sphere(square: np.ndarray) -> np.ndarray:
+    """Points of the unit square, spread evenly over the unit sphere."""
+    height = 2 * square[:, 0] - 1
+    radius, angle = np.sqrt(np.clip(1 - height**2, 0, 1)), 2 * np.pi * square[:, 1]
+    return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], 1)
+
+
+def _tone(color: np.ndarray) -> np.ndarray:
+    """Roll bright values off towards 1 instead of clipping them."""
+    knee = 0.72
+    over = np.clip(color - knee, 0, None)
+    return np.where(color > knee, knee + (1 - knee) * over / (over + (1 - knee)), color)
+
+
+def _f32(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, np.float32)
