@@ -4,6 +4,21 @@ Nothing here imports pxr or torch; `SceneGraph.from_stage` and `SceneGraph.to_st
 """
 
 from echousd.graph.consistency import GraphError
-from echousd.graph.scene import MAX_TEXT, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.difference import GraphDiff
+from echousd.graph.fields import MAX_TEXT
+from echousd.graph.files import load_graph, save_graph
+from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.starting import starting_graph
 
-__all__ = ["MAX_TEXT", "GraphError", "Node", "Relation", "RoomSpec", "SceneGraph"]
+__all__ = [
+    "MAX_TEXT",
+    "GraphDiff",
+    "GraphError",
+    "Node",
+    "Relation",
+    "RoomSpec",
+    "SceneGraph",
+    "load_graph",
+    "save_graph",
+    "starting_graph",
+]

@@ -11,36 +11,47 @@ Triple = tuple[str, str, str]
 
 
 class GraphError(ValueError):
-    """A scene graph, or a file that holds one, is not valid; one line that says what was found, where and what is allowed."""
+    """A scene graph or a file that holds one is not valid; one line says what was found, where and what is allowed.
+
+    `about` leads to the fault: field names and positions, such as ("relations", 3) or ("nodes", 0, "size").
+    """
+
+    def __init__(self, message: str, about: tuple[str | int, ...] = ()) -> None:
+        super().__init__(message)
+        self.about = about
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
-    """Raise `GraphError` at the first fault among `triples`, each (subject, predicate, object) with canonical predicates.
+    """Raise `GraphError` at the first fault among `triples`, each (subject, predicate, object) in canonical words.
 
     Faults: an endpoint that is none of `names`, a self relation, a relation stated twice, and a cycle in one of the
     orders that the vocabulary defines (left and right are one order along the room's z axis, bigger, smaller and `in`
     are one order of volumes ...), of which "A left B, B left A" and "A bigger B, A smaller B" are the shortest cases.
     """
-    known, seen = set(names), set()
-    for subject, predicate, object_ in triples:
+    known, stated = set(names), dict[Triple, int]()
+    for position, (subject, predicate, object_) in enumerate(triples):
+        here = ("relations", position)
         for role, name in (("subject", subject), ("object", object_)):
             if name not in known:
                 raise GraphError(
                     f"relation '{subject} {predicate} {object_}': {role} {name!r} is no object of this graph, "
-                    f"allowed: {listed(sorted(known))}"
+                    f"allowed: {listed(sorted(known))}",
+                    here,
                 )
         if subject == object_:
-            raise GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself")
-        if (subject, predicate, object_) in seen:
-            raise GraphError(f"relation '{subject} {predicate} {object_}' is stated twice")
-        seen.add((subject, predicate, object_))
+            raise GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself", here)
+        if (subject, predicate, object_) in stated:
+            raise GraphError(f"relation '{subject} {predicate} {object_}' is stated twice", here)
+        stated[subject, predicate, object_] = position
     for order, edges in ordered_edges(triples).items():
         cycle = find_cycle(edges)
         if cycle:
             said = [f"'{' '.join(edges[pair])}'" for pair in cycle]
+            here = ("relations", max(stated[edges[pair]] for pair in cycle))
             if len(said) == 2:
-                raise GraphError(f"{said[0]} contradicts {said[1]} ({order} order)")
-            raise GraphError(f"{', '.join(said[:-1])} and {said[-1]} contradict each other: a cycle in the {order} order")
+                raise GraphError(f"{said[0]} contradicts {said[1]} ({order} order)", here)
+            together = f"{', '.join(said[:-1])} and {said[-1]}"
+            raise GraphError(f"{together} contradict each other: a cycle in the {order} order", here)
 
 
 def ordered_edges(triples: Iterable[Triple]) -> dict[str, dict[tuple[str, str], Triple]]:

@@ -2,131 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import os
-import re
-from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
-from numbers import Real
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from echomodel.vocabulary import vocabulary
+from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, check_triples, listed
 
 if TYPE_CHECKING:
     from echousd.graph.difference import GraphDiff
-
-MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
-MAX_NAME = 100  # characters: names become file names of assets
-Vector: TypeAlias = tuple[float, float, float]
-Point: TypeAlias = tuple[float, float]
-Scalar: TypeAlias = bool | int | float | str
-
-
-def _identifier(value: Any) -> str:
-    if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", value):
-        raise ValueError(f"{shown(value)} is no identifier, allowed: letters, digits and _, not starting with a digit")
-    if len(value) > MAX_NAME:
-        raise ValueError(f"{shown(value)} has {len(value)} characters, allowed: {MAX_NAME}")
-    return value
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise ValueError(f"found {shown(value)}, allowed: a non-empty text")
-    return _storable(value)
-
-
-def _storable(value: str) -> str:
-    if len(value) > MAX_TEXT:
-        raise ValueError(f"a text of {len(value)} characters, allowed: {MAX_TEXT}")
-    if "\0" in value or any("\ud800" <= character <= "\udfff" for character in value):
-        raise ValueError(f"{shown(value)} holds a character that UTF-8 text cannot hold")
-    return value
-
-
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ValueError(f"found {shown(value)}, allowed: a finite number")
-    return float(value)
-
-
-def _positive(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 < value < math.inf:
-        raise ValueError(f"found {shown(value)}, allowed: a positive number of metres")
-    return float(value)
-
-
-def _share(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real) or not 0 <= value <= 1:
-        raise ValueError(f"found {shown(value)}, allowed: a number from 0 to 1")
-    return float(value)
-
-
-def _numbers(count: int, each: Callable[[Any], float], meaning: str) -> Callable[[Any], tuple[float, ...]]:
-    def check(value: Any) -> tuple[float, ...]:
-        try:
-            numbers = tuple(each(number) for number in ([] if isinstance(value, str | Mapping) else value))
-        except (TypeError, ValueError):
-            numbers = ()
-        if len(numbers) != count:
-            raise ValueError(f"found {shown(value)}, allowed: {meaning}")
-        return numbers
-
-    return check
-
-
-def _corners(value: Any) -> tuple[Point, ...]:
-    each = _numbers(2, _number, "corners [x, z] in metres")
-    if isinstance(value, str | Mapping) or not isinstance(value, Iterable):
-        raise ValueError(f"found {shown(value)}, allowed: at least three corners [x, z] in metres")
-    corners = tuple((x, z) for x, z in (each(corner) for corner in value))
-    if len(corners) < 3 or abs(polygon_area(corners)) < 1e-6:
-        raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three corners around the floor")
-    return corners
-
-
-def _attributes(value: Any) -> dict[str, Scalar]:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"found {shown(value)}, allowed: names with a text, a number or true/false each")
-    checked: dict[str, Scalar] = {}
-    for key, entry in value.items():
-        checked[_identifier(key)] = _scalar(key, entry)
-    return checked
-
-
-def _scalar(key: str, value: Any) -> Scalar:
-    if isinstance(value, str):
-        try:
-            return _storable(value)
-        except ValueError as error:
-            raise ValueError(f"{key} is {error}") from None
-    if isinstance(value, int) and -(2**63) <= value < 2**63:  # bool is an int and stays one
-        return value
-    if isinstance(value, float) and math.isfinite(value):
-        return value
-    raise ValueError(f"{key} is {shown(value)}, allowed: a text, a finite number below 2^63 or true/false")
-
-
-def _optional(check: Callable[[Any], Any]) -> BeforeValidator:
-    return BeforeValidator(lambda value: None if value is None else check(value))
-
-
-def _word(kind: str) -> BeforeValidator:
-    def check(value: Any) -> str:
-        if not isinstance(value, str):
-            raise ValueError(f"found {shown(value)}, allowed: the name of a {kind.replace('_', ' ')}")
-        return getattr(vocabulary(), kind)(value).name
-
-    return BeforeValidator(check)
-
-
-Name: TypeAlias = Annotated[str, BeforeValidator(_identifier)]
-Size: TypeAlias = Annotated[Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))]
-Place: TypeAlias = Annotated[Vector | None, _optional(_numbers(3, _number, "three finite numbers [x, y, z], metres"))]
-Extent: TypeAlias = Annotated[Point | None, _optional(_numbers(2, _positive, "two positive numbers [x, z], metres"))]
 
 
 class _Model(BaseModel):
@@ -138,16 +25,18 @@ class _Model(BaseModel):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise GraphError(self._complaint(fields, error)) from None
+            raise self._explained(fields, error) from None
 
     @classmethod
-    def _complaint(cls, fields: dict[str, Any], error: ValidationError) -> str:
+    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> GraphError:
         first = error.errors(include_url=False)[0]
-        message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
+        cause = first["ctx"]["error"] if first["type"] == "value_error" else None
+        message = first["msg"] if cause is None else str(cause)
         where = ".".join(str(part) for part in first["loc"])
         if first["type"] == "extra_forbidden":
             message = f"unknown field, allowed: {', '.join(cls.model_fields)}"
-        return f"{cls._title(fields)}{where + ': ' if where else ''}{message}"
+        about = (*first["loc"], *getattr(cause, "about", ()))
+        return GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
@@ -168,10 +57,10 @@ class RoomSpec(_Model):
         height: metres.
     """
 
-    type: Annotated[str, _word("room_type")]
-    floor_polygon: Annotated[tuple[Point, ...] | None, _optional(_corners)] = None
-    size: Extent = None
-    height: Annotated[float | None, _optional(_positive)] = None
+    type: field.RoomTypeWord
+    floor_polygon: field.Corners = None
+    size: field.Extents = None
+    height: field.Height = None
 
     def __init__(self, type: str, **fields: Any) -> None:
         super().__init__(type=type, **fields)
@@ -183,15 +72,15 @@ class RoomSpec(_Model):
     @model_validator(mode="after")
     def _agrees(self) -> RoomSpec:
         if self.floor_polygon and self.size:
-            found = bounding_extents(self.floor_polygon)
+            found = field.bounding_extents(self.floor_polygon)
             if max(abs(a - b) for a, b in zip(found, self.size, strict=True)) > 1e-3:
                 raise ValueError(f"size is {self.size} but floor_polygon spans {found}; leave one of them out")
         return self
 
     @property
-    def extents(self) -> Point | None:
+    def extents(self) -> field.Point | None:
         """(x, z) extents of the floor's bounding box in metres, None where nothing is known."""
-        return bounding_extents(self.floor_polygon) if self.floor_polygon else self.size
+        return field.bounding_extents(self.floor_polygon) if self.floor_polygon else self.size
 
 
 class Node(_Model):
@@ -208,23 +97,21 @@ class Node(_Model):
         attributes: free data, identifiers to texts, numbers or booleans.
     """
 
-    name: Name
-    category: Annotated[str, _word("category")]
-    style: Annotated[str | None, _optional(_text)] = None
-    size: Size = None
-    position: Place = None
-    yaw: Annotated[float | None, _optional(_number)] = None
-    locked: StrictBool = False
-    attributes: Annotated[dict[str, StrictBool | int | float | str], BeforeValidator(_attributes)] = Field(
-        default_factory=dict
-    )
+    name: field.Name
+    category: field.CategoryWord
+    style: field.Style = None
+    size: field.Size = None
+    position: field.Position = None
+    yaw: field.Angle = None
+    locked: field.Flag = False
+    attributes: field.Attributes = Field(default_factory=dict)
 
     def __init__(self, name: str, category: str, **fields: Any) -> None:
         super().__init__(name=name, category=category, **fields)
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
-        return f"object {shown(fields['name'])}: "
+        return f"object {field.shown(fields['name'])}: "
 
 
 class Relation(_Model):
@@ -237,10 +124,10 @@ class Relation(_Model):
         confidence: 0 to 1.
     """
 
-    subject: Name
-    predicate: Annotated[str, _word("predicate")]
-    object: Name
-    confidence: Annotated[float, BeforeValidator(_share)] = 1.0
+    subject: field.Name
+    predicate: field.PredicateWord
+    object: field.Name
+    confidence: field.Confidence = 1.0
 
     def __init__(self, subject: str, predicate: str, object: str, confidence: float = 1.0, **fields: Any) -> None:
         super().__init__(subject=subject, predicate=predicate, object=object, confidence=confidence, **fields)
@@ -248,7 +135,7 @@ class Relation(_Model):
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:
         said = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
-        return f"relation {shown(said)}: "
+        return f"relation {field.shown(said)}: "
 
     @property
     def triple(self) -> tuple[str, str, str]:
@@ -260,7 +147,7 @@ class Relation(_Model):
 
 
 class SceneGraph(_Model):
-    """A room described by objects and relations, always valid; every edit returns a new graph or raises `GraphError`."""
+    """A room described by objects and relations, always valid; edits return a new graph or raise `GraphError`."""
 
     room: RoomSpec
     nodes: tuple[Node, ...]
@@ -277,9 +164,10 @@ class SceneGraph(_Model):
         if not self.nodes:
             raise ValueError("the graph is empty, allowed: at least one object")
         seen: set[str] = set()
-        for node in self.nodes:
+        for position, node in enumerate(self.nodes):
             if node.name in seen:
-                raise ValueError(f"two objects are called {node.name!r}, allowed: a name of its own for each")
+                message = f"two objects are called {node.name!r}, allowed: a name of its own for each"
+                raise GraphError(message, ("nodes", position))
             seen.add(node.name)
         check_triples([relation.triple for relation in self.relations], seen)
         return self
@@ -296,7 +184,7 @@ class SceneGraph(_Model):
     def node(self, name: str) -> Node:
         """The node called `name`; raises `GraphError`."""
         if name not in self._by_name:
-            raise GraphError(f"no object {shown(name)} in this graph, allowed: {listed(sorted(self._by_name))}")
+            raise GraphError(f"no object {field.shown(name)} in this graph, allowed: {listed(sorted(self._by_name))}")
         return self._by_name[name]
 
     def relations_of(self, name: str) -> tuple[Relation, ...]:
@@ -408,7 +296,7 @@ class SceneGraph(_Model):
 
     @classmethod
     def from_stage(cls, stage: Any, room: str | None = None) -> SceneGraph:
-        """Read the graph of a stage or of the file at a path; `room` is the prim path of the room where there are several."""
+        """Read the graph of a stage or of the file at a path; `room` is the prim path of one room of several."""
         from echousd.stage import read_graph
 
         return read_graph(stage, room=room)
@@ -418,21 +306,3 @@ class SceneGraph(_Model):
         from echousd.stage import graph_layer, save_layer
 
         save_layer(graph_layer(self), path)
-
-
-def bounding_extents(corners: tuple[Point, ...]) -> Point:
-    """(x, z) extents of the bounding box of `corners`, metres."""
-    xs, zs = [x for x, _ in corners], [z for _, z in corners]
-    return max(xs) - min(xs), max(zs) - min(zs)
-
-
-def polygon_area(corners: tuple[Point, ...]) -> float:
-    """Signed area of a polygon in square metres (shoelace formula)."""
-    pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
-    return sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in pairs) / 2
-
-
-def shown(value: Any, most: int = 60) -> str:
-    """`repr(value)` cut to `most` characters: what an error message shows of a value."""
-    text = repr(value[: most + 1] if isinstance(value, str) else value)
-    return text if len(text) <= most + 2 else f"{text[: most - 3]}...{text[0] if text[0] in chr(34) + chr(39) else ''}"

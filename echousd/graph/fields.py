@@ -1,0 +1,186 @@
+"""The fields of nodes, relations and rooms: what each may hold, checked with a message that says what is allowed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from numbers import Real
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
+
+from echomodel.vocabulary import vocabulary
+
+MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
+MAX_NAME = 100  # characters: names become file names of assets
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+Point: TypeAlias = tuple[float, float]
+Vector: TypeAlias = tuple[float, float, float]
+Scalar: TypeAlias = StrictBool | int | float | str
+
+
+def identifier(value: Any) -> str:
+    """A valid USD identifier of at most `MAX_NAME` characters; raises ValueError."""
+    if not isinstance(value, str) or not IDENTIFIER.fullmatch(value):
+        raise ValueError(f"{shown(value)} is no identifier, allowed: letters, digits and _, not starting with a digit")
+    if len(value) > MAX_NAME:
+        raise ValueError(f"{shown(value)} has {len(value)} characters, allowed: {MAX_NAME}")
+    return value
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError(f"found {shown(value)}, allowed: a non-empty text")
+    return _storable(value)
+
+
+def _storable(value: str) -> str:
+    if len(value) > MAX_TEXT:
+        raise ValueError(f"a text of {len(value)} characters, allowed: {MAX_TEXT}")
+    if "\0" in value or any("\ud800" <= character <= "\udfff" for character in value):
+        raise ValueError(f"{shown(value)} holds a character that a USD file cannot hold")
+    return value
+
+
+def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callable[[Any], float]:
+    def check(value: Any) -> float:
+        try:
+            number = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+        except OverflowError:
+            number = math.inf
+        if not (math.isfinite(number) and test(number)):
+            raise ValueError(f"found {shown(value)}, allowed: {allowed}")
+        return number
+
+    return check
+
+
+_number = _real("a finite number")
+_positive = _real("a positive number, metres", lambda number: number > 0)
+_share = _real("a number from 0 to 1", lambda number: 0 <= number <= 1)
+
+
+def _numbers(count: int, each: Callable[[Any], float], allowed: str) -> Callable[[Any], tuple[float, ...]]:
+    def check(value: Any) -> tuple[float, ...]:
+        try:
+            numbers = tuple(each(number) for number in _items(value))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != count:
+            raise ValueError(f"found {shown(value)}, allowed: {allowed}")
+        return numbers
+
+    return check
+
+
+def _items(value: Any) -> Iterable[Any]:
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise ValueError(f"found {shown(value)}, allowed: a list")
+    return value
+
+
+_corner = _numbers(2, _number, "corners [x, z], metres")
+
+
+def _corners(value: Any) -> tuple[Point, ...]:
+    corners = tuple((x, z) for x, z in (_corner(corner) for corner in _items(value)))
+    if len(corners) < 3 or abs(polygon_area(corners)) < 1e-6:
+        raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
+    from shapely import Polygon, is_valid_reason
+
+    reason = is_valid_reason(Polygon(corners))
+    if reason != "Valid Geometry":
+        raise ValueError(
+            f"{reason.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
+        )
+    return corners
+
+
+def _attributes(value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ValueError(f"found {shown(value)}, allowed: names with a text, a number or true/false each")
+    return {identifier(key): _scalar(key, entry) for key, entry in value.items()}
+
+
+def _scalar(key: str, value: Any) -> bool | int | float | str:
+    if isinstance(value, str):
+        try:
+            return _storable(value)
+        except ValueError as error:
+            raise ValueError(f"{key} is {error}") from None
+    if isinstance(value, int) and -(2**63) <= value < 2**63:  # bool is an int and stays one
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    raise ValueError(f"{key} is {shown(value)}, allowed: a text, true, false or a finite number, integers below 2^63")
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"found {shown(value)}, allowed: true or false")
+    return value
+
+
+def _optional(check: Callable[[Any], Any]) -> BeforeValidator:
+    return BeforeValidator(lambda value: None if value is None else check(value))
+
+
+def _word(kind: str) -> tuple[BeforeValidator, WithJsonSchema]:
+    """A word of the vocabulary, canonicalised; the JSON schema offers the names and lets aliases pass."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str):
+            raise ValueError(f"found {shown(value)}, allowed: the name of a {kind.replace('_', ' ')}")
+        return getattr(words, kind)(value).name
+
+    words = vocabulary()
+    entries: tuple[Any, ...] = {
+        "category": words.categories,
+        "predicate": words.predicates,
+        "room_type": words.room_types,
+    }[kind]
+    names = [entry.name for entry in entries]
+    known = {"enum": names, "description": f"{kind.replace('_', ' ')} of the vocabulary"}
+    return BeforeValidator(check), WithJsonSchema({"anyOf": [known, {"type": "string", "description": "or an alias"}]})
+
+
+_category, _predicate, _room_type = _word("category"), _word("predicate"), _word("room_type")
+
+Name: TypeAlias = Annotated[
+    str, BeforeValidator(identifier), Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=MAX_NAME)
+]
+CategoryWord: TypeAlias = Annotated[str, _category[0], _category[1]]
+PredicateWord: TypeAlias = Annotated[str, _predicate[0], _predicate[1]]
+RoomTypeWord: TypeAlias = Annotated[str, _room_type[0], _room_type[1]]
+Style: TypeAlias = Annotated[str | None, _optional(_text)]
+Size: TypeAlias = Annotated[
+    Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))
+]
+Position: TypeAlias = Annotated[Vector | None, _optional(_numbers(3, _number, "three numbers [x, y, z], metres"))]
+Angle: TypeAlias = Annotated[float | None, _optional(_number)]
+Confidence: TypeAlias = Annotated[float, BeforeValidator(_share), Field(ge=0, le=1)]
+Attributes: TypeAlias = Annotated[dict[str, Scalar], BeforeValidator(_attributes)]
+Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
+Extents: TypeAlias = Annotated[Point | None, _optional(_numbers(2, _positive, "two positive numbers [x, z], metres"))]
+Corners: TypeAlias = Annotated[tuple[Point, ...] | None, _optional(_corners)]
+Height: TypeAlias = Annotated[float | None, _optional(_positive)]
+
+
+def bounding_extents(corners: tuple[Point, ...]) -> Point:
+    """(x, z) extents of the bounding box of `corners`, metres."""
+    xs, zs = [x for x, _ in corners], [z for _, z in corners]
+    return max(xs) - min(xs), max(zs) - min(zs)
+
+
+def polygon_area(corners: tuple[Point, ...]) -> float:
+    """Signed area of a polygon in square metres (shoelace formula)."""
+    pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in pairs) / 2
+
+
+def shown(value: Any, most: int = 60) -> str:
+    """`repr(value)` cut to about `most` characters: what an error message shows of a value."""
+    text = repr(value[: most + 1] if isinstance(value, str) else value)
+    return text if len(text) <= most + 2 else f"{text[:most]}..."

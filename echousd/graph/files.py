@@ -1,0 +1,67 @@
+"""Scene graphs in files, told apart by extension: YAML and JSON are read here, USD by `echousd.stage`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Literal
+
+from echousd.graph.consistency import GraphError
+from echousd.graph.scene import SceneGraph
+from echousd.graph.text import graph_from_text
+
+TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
+STAGE_FORMS = (".usda", ".usdc", ".usd", ".usdz")
+MAX_BYTES = 64 * 2**20
+
+
+def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGraph:
+    """Read the graph in the file at `path`.
+
+    Arguments:
+        path: a YAML or JSON file of either form, or a stage.
+        room: prim path of one room of several on a stage.
+
+    Raises `GraphError` (text) or `echousd.stage.StageError` (stage), both ValueError, naming the file and the fault.
+    """
+    path = Path(path)
+    if path.suffix.lower() in STAGE_FORMS:
+        return SceneGraph.from_stage(path, room=room)
+    if path.suffix.lower() not in TEXT_FORMS:
+        raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join((*TEXT_FORMS, *STAGE_FORMS))}")
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise GraphError(f"{path}: {size / 2**20:.0f} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
+        text = path.read_text("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None
+    except OSError as error:
+        raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    return graph_from_text(text, TEXT_FORMS[path.suffix.lower()], str(path))
+
+
+def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
+    """Write `graph` to `path` in the form of its extension, whole or not at all; raises as `load_graph` does."""
+    path = Path(path)
+    form = TEXT_FORMS.get(path.suffix.lower())
+    if form is None:
+        if path.suffix.lower() not in STAGE_FORMS[:-1]:
+            allowed = ", ".join((*TEXT_FORMS, *STAGE_FORMS[:-1]))
+            raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {allowed}")
+        graph.to_stage(path)
+        return
+    write_text(path, graph.to_json() if form == "json" else graph.to_yaml())
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a UTF-8 file beside `path`, then rename it; raises `GraphError`."""
+    path = Path(path)
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, "utf-8")
+        beside.replace(path)
+    except OSError as error:
+        raise GraphError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,221 @@
+"""Scene graphs as text: the canonical JSON form and the short form that a person writes, each as YAML or JSON.
+
+room: bedroom
+objects: {bed: double_bed, wardrobe: wardrobe, lamp: {category: table_lamp, style: oak}}
+relations: [bed left of wardrobe, lamp close by bed]
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import yaml
+
+from echomodel.vocabulary import normalised, vocabulary
+from echousd.graph.consistency import GraphError
+from echousd.graph.fields import IDENTIFIER, shown
+from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
+
+TOP_KEYS = ("room", "objects", "nodes", "relations")
+
+
+def graph_from_text(text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
+    """Read a graph from YAML or JSON text; raises `GraphError` as `source:line: what was found, what is allowed`."""
+    try:
+        located = parse_json(text) if form == "json" else parse_yaml(text)
+    except GraphError as error:
+        raise GraphError(_with_source(source, str(error))) from None
+    try:
+        return graph_from_plain(located.data)
+    except GraphError as error:
+        path, line = _written(located, error.about), None
+        if path:
+            line = located.line(path)
+        where = f"line {line}: " if line else ""
+        raise GraphError(_with_source(source, where + str(error)), error.about) from None
+
+
+def _with_source(source: str, message: str) -> str:
+    if not source:
+        return message
+    return f"{source}:{message.removeprefix('line ')}" if message.startswith("line ") else f"{source}: {message}"
+
+
+def _written(located: Located, about: Path) -> Path:
+    """Where in the text the field `about` of the graph was written: nodes may stand under `objects`, by name."""
+    data = located.data
+    if len(about) > 1 and about[0] == "nodes" and isinstance(data, Mapping) and "objects" in data:
+        objects = data["objects"]
+        keys = list(objects) if isinstance(objects, Mapping) else None
+        position = about[1]
+        assert isinstance(position, int)
+        return ("objects", keys[position] if keys else position, *about[2:])
+    return about
+
+
+def graph_from_plain(data: Any) -> SceneGraph:
+    """The graph in plain data (mappings, lists, texts, numbers) of either form; raises `GraphError`."""
+    if not isinstance(data, Mapping):
+        raise GraphError(f"found {shown(data)}, allowed: a mapping with {', '.join(TOP_KEYS)}")
+    _only(data, TOP_KEYS, ())
+    if "objects" in data and "nodes" in data:
+        raise GraphError("both objects and nodes are given, allowed: one of them", ("nodes",))
+    if "room" not in data:
+        types = ", ".join(kind.name for kind in vocabulary().room_types)
+        raise GraphError(f"room is missing, allowed: one of {types}, or a mapping with type")
+    key = "nodes" if "nodes" in data else "objects"
+    room = _built(RoomSpec, _fields(data["room"], "type", ("room",)), ("room",))
+    nodes = [_built(Node, fields, ("nodes", i)) for i, fields in enumerate(_objects(data.get(key), key))]
+    stated = data.get("relations")
+    if not isinstance(stated, list | None):
+        raise GraphError(
+            f"relations: found {shown(stated)}, allowed: a list such as [bed left wardrobe]", ("relations",)
+        )
+    relations = [
+        _built(Relation, _relation(entry, ("relations", i)), ("relations", i)) for i, entry in enumerate(stated or ())
+    ]
+    return SceneGraph(room, tuple(nodes), tuple(relations))
+
+
+def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
+    needed = [name for name, info in model.model_fields.items() if info.is_required()]  # type: ignore[attr-defined]
+    _only(fields, tuple(model.model_fields), about)  # type: ignore[attr-defined]
+    for name in needed:
+        if name not in fields:
+            first = next(iter(fields.values()), None)
+            named = f" of {shown(first)}" if isinstance(first, str) else ""
+            raise GraphError(f"{'.'.join(map(str, about))}: {name}{named} is missing", about)
+    try:
+        return model(**fields)
+    except GraphError as error:
+        raise GraphError(str(error), (*about, *error.about)) from None
+
+
+def _only(fields: Mapping[str, Any], allowed: tuple[str, ...], about: Path) -> None:
+    for key in fields:
+        if key not in allowed:
+            near = difflib.get_close_matches(str(key), allowed, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"allowed: {', '.join(allowed)}"
+            raise GraphError(f"unknown field {shown(key)}: {hint}", (*about, key))
+
+
+def _fields(entry: Any, short: str, about: Path) -> dict[str, Any]:
+    """The fields of `entry`, which may be just the value of the field `short`."""
+    if isinstance(entry, Mapping):
+        return dict(entry)
+    if isinstance(entry, str):
+        return {short: entry}
+    where = ".".join(str(part) for part in about)
+    raise GraphError(f"{where}: found {shown(entry)}, allowed: a {short} or a mapping with {short}", about)
+
+
+def _objects(entries: Any, key: str) -> Iterator[dict[str, Any]]:
+    """The fields of each node: from a mapping of names, or from a list of mappings and of bare categories."""
+    if entries is None:
+        return
+    if isinstance(entries, Mapping):
+        for i, (name, entry) in enumerate(entries.items()):
+            fields = _fields(name if entry is None else entry, "category", ("nodes", i))
+            if "name" in fields:
+                raise GraphError(f"object {shown(name)}: a second name, allowed: the key alone", ("nodes", i, "name"))
+            yield {"name": name, **fields}
+        return
+    if not isinstance(entries, list):
+        raise GraphError(f"{key}: found {shown(entries)}, allowed: a mapping of names to categories, or a list", (key,))
+    often = Counter(_own_name(entry) for entry in entries if isinstance(entry, str))
+    taken = {entry.get("name") for entry in entries if isinstance(entry, Mapping)}
+    counted: Counter[str] = Counter()
+    for i, entry in enumerate(entries):
+        fields = _fields(entry, "category", ("nodes", i))
+        if isinstance(entry, str):
+            name = _own_name(entry)
+            if often[name] > 1 or name in taken:
+                counted[name] += 1
+                while f"{name}_{counted[name]}" in taken:
+                    counted[name] += 1
+                name = f"{name}_{counted[name]}"
+            fields["name"] = name
+        yield fields
+
+
+def _own_name(category: str) -> str:
+    """The name of an object that is listed by its category alone."""
+    name = normalised(category)
+    return name if IDENTIFIER.fullmatch(name) else vocabulary().category(category).name
+
+
+def _relation(entry: Any, about: Path) -> dict[str, Any]:
+    """The fields of a relation from `bed left of wardrobe`, [bed, left, wardrobe] or a mapping."""
+    if isinstance(entry, Mapping):
+        return dict(entry)
+    words = entry.split() if isinstance(entry, str) else entry
+    if not isinstance(words, list) or len(words) < 3 or not all(isinstance(word, str) for word in words):
+        raise GraphError(
+            f"relation {shown(entry)}: allowed: subject predicate object, such as bed left wardrobe", about
+        )
+    return {"subject": words[0], "predicate": " ".join(words[1:-1]), "object": words[-1]}
+
+
+def plain(graph: SceneGraph) -> dict[str, Any]:
+    """The canonical form as plain data: fields in a fixed order, those at their default left out."""
+    return {
+        "room": _stated(graph.room),
+        "nodes": [_stated(node) for node in graph.nodes],
+        "relations": [_stated(relation) for relation in graph.relations],
+    }
+
+
+def _stated(model: RoomSpec | Node | Relation) -> dict[str, Any]:
+    fields = type(model).model_fields
+    values = {name: getattr(model, name) for name in fields}
+    return {
+        name: _lists(value)
+        for name, value in values.items()
+        if value != fields[name].get_default(call_default_factory=True)
+    }
+
+
+def _lists(value: Any) -> Any:
+    return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
+
+
+def graph_to_json(graph: SceneGraph) -> str:
+    """The canonical JSON form with one node and one relation a line."""
+
+    def line(value: Any) -> str:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+    def block(entries: list[Any]) -> str:
+        return "[\n    " + ",\n    ".join(map(line, entries)) + "\n  ]" if entries else "[]"
+
+    form = plain(graph)
+    return (
+        f'{{\n  "room": {line(form["room"])},\n  "nodes": {block(form["nodes"])},\n'
+        f'  "relations": {block(form["relations"])}\n}}\n'
+    )
+
+
+def graph_to_yaml(graph: SceneGraph) -> str:
+    """The short YAML form with one object and one relation a line."""
+    form = plain(graph)
+    room = form["room"]
+    lines = [f"room: {_flow(room['type'] if len(room) == 1 else room)}", "objects:"]
+    for node in form["nodes"]:
+        name = node.pop("name")
+        lines.append(f"  {_flow(name)}: {_flow(node['category'] if len(node) == 1 else node)}")
+    if graph.relations:
+        lines.append("relations:")
+    for relation, said in zip(graph.relations, form["relations"], strict=True):
+        lines.append(f"  - {relation if len(said) == 3 else _flow(said)}")
+    return "\n".join(lines) + "\n"
+
+
+def _flow(value: Any) -> str:
+    """`value` on one line of YAML."""
+    text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...").strip()
