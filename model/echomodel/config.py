@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from typing import Any, Literal, TypeVar, get_type_hints
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 Objective = Literal["noise", "velocity", "flow"]
 Prediction = Literal["output", "sample"]
@@ -125,7 +125,7 @@ def to_json(config: Any) -> str:
 
 
 def from_json(kind: type[C], text: str) -> C:
-    """The configuration that `to_json` wrote; raises ValueError naming a field that is not known or has a wrong type."""
+    """The configuration that `to_json` wrote; raises ValueError naming an unknown or mistyped field."""
     return from_dict(kind, json.loads(text))
 
 
@@ -176,7 +176,7 @@ def with_settings(config: C, settings: list[str]) -> C:
 def _typed(hint: Any, value: Any, path: str) -> Any:
     if is_dataclass(hint):
         return from_dict(hint, value, path)  # type: ignore[arg-type]
-    origin, choices = getattr(hint, "__origin__", None), getattr(hint, "__args__", ())
+    origin, choices = get_origin(hint), get_args(hint)
     if origin is Literal:
         if value not in choices:
             raise ValueError(f"{path} is {value!r}, allowed: {', '.join(map(str, choices))}")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import torch
 from torch import Tensor
@@ -159,7 +160,7 @@ def _march(
         free = (~known_mask).to(x.dtype)
         fixed = expand(known_mask, x)
         x = torch.where(fixed, known.to(x.dtype), x)
-    for number, (start, end) in enumerate(zip(times, times[1:], strict=False)):
+    for number, (start, end) in enumerate(pairwise(times)):
         moved = step(x, predict(x, free * start), start, end)
         x = moved if fixed is None else torch.where(fixed, x, moved)
         if progress is not None:

@@ -17,7 +17,7 @@ class LatentGraph(nn.Module):
     nodes enter with z = 0 and nodes whose relations changed are marked as touched.
 
     Shapes:
-        category (N,) int64 of the edited graph, two `Pairs` over the same N nodes, origin and touched (N,) -> (N, width)
+        category (N,) int64 of the edited graph, `Pairs` over the same N nodes, added, touched (N,) -> (N, width)
     """
 
     def __init__(self, config: CompactConfig) -> None:

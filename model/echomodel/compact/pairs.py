@@ -42,8 +42,8 @@ def ordered_pairs(counts: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     per_node = counts.repeat_interleave(counts)
     receiver = torch.arange(len(per_node), device=counts.device).repeat_interleave(per_node)
     first = starts.repeat_interleave(counts).repeat_interleave(per_node)
-    offset = torch.arange(len(receiver), device=counts.device) - (per_node.cumsum(0) - per_node).repeat_interleave(per_node)
-    sender = first + offset
+    row = (per_node.cumsum(0) - per_node).repeat_interleave(per_node)
+    sender = first + torch.arange(len(receiver), device=counts.device) - row
     different = receiver != sender
     scale = (per_node - 1).clamp_min(1).float().rsqrt()[:, None]
     return receiver[different], sender[different], scale

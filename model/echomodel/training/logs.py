@@ -67,9 +67,8 @@ def plot_log(log: Path, out: Path) -> None:
     if not groups:
         return
     columns = min(3, len(groups))
-    figure, axes = plt.subplots(
-        math.ceil(len(groups) / columns), columns, squeeze=False, figsize=(5 * columns, 3.5 * math.ceil(len(groups) / columns))
-    )
+    rows = math.ceil(len(groups) / columns)
+    figure, axes = plt.subplots(rows, columns, squeeze=False, figsize=(5 * columns, 3.5 * rows))
     for axis, (group, curves) in zip(axes.flat, sorted(groups.items()), strict=False):
         for label, points in curves.items():
             axis.plot(*zip(*points, strict=True), label=label, linewidth=1)

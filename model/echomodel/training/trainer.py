@@ -96,7 +96,8 @@ class Trainer:
             loss_module = nn.parallel.DistributedDataParallel(loss_module, find_unused_parameters=True)
         self.folder.mkdir(parents=True, exist_ok=True)
         log = RunLog(self.folder, self.step) if self.rank == 0 else None
-        started, marked, sums = time.monotonic(), time.monotonic(), {}
+        started = marked = time.monotonic()
+        sums: dict[str, float] = {}
         self.model.train()
         while self.step < last and (seconds is None or time.monotonic() - started < seconds):
             values = self._train_step(loss_module)
@@ -155,7 +156,8 @@ class Trainer:
                 tensors[f"optimizer.{key}.{name}"] = torch.as_tensor(value)
         partial = self.folder / "checkpoint.partial"
         metadata = {"step": str(self.step), "recipe": to_json(self.recipe)}
-        save_file({key: value.detach().contiguous().clone() for key, value in tensors.items()}, partial, metadata=metadata)
+        copies = {key: value.detach().contiguous().clone() for key, value in tensors.items()}
+        save_file(copies, partial, metadata=metadata)
         partial.replace(self.folder / "checkpoint.safetensors")
         save_weights(self.folder / "weights.safetensors", self.average, self.stage.trained)
 
@@ -170,7 +172,8 @@ class Trainer:
         if stage != self.recipe.stage:
             raise ValueError(f"{path}: is a checkpoint of stage {stage!r}, the recipe's is {self.recipe.stage!r}")
         try:
-            self.model.load_state_dict({k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")})
+            state = {key[6:]: value for key, value in tensors.items() if key.startswith("model.")}
+            self.model.load_state_dict(state)
         except RuntimeError as error:
             raise ValueError(f"{path}: does not fit the recipe's model: {str(error).splitlines()[1].strip()}") from None
         averaged = dict(self.average.named_parameters())

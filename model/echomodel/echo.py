@@ -1,0 +1,201 @@
+"""EchoModel: the compact model behind two calls, boxes for a graph and shapes for its boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.compact.model import CompactModel, load_weights
+from echomodel.compact.pairs import Pairs, pairs_of
+from echomodel.config import CompactConfig, Sampler
+from echomodel.graph import GraphBatch
+from echomodel.objectives import clean_from
+from echomodel.samplers import Predict, guided, sample
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class GraphEdit:
+    """How a graph came about by editing another one over the same nodes (EchoScene 3.2).
+
+    Arguments:
+        before: (E, 3) int64, the triplets before the edit.
+        added: (N,) bool, nodes that were not there before; triplets of `before` do not touch them.
+    """
+
+    before: Tensor
+    added: Tensor
+
+
+class EchoModel:
+    """Samples rooms with a `CompactModel`; equal arguments and generator state give equal results on one device.
+
+    Arguments:
+        model: the model, in evaluation mode.
+        hash: short hash of the weights it came from.
+    """
+
+    def __init__(self, model: CompactModel, hash: str = "") -> None:
+        self.model, self.hash = model.eval(), hash
+
+    @classmethod
+    def load(cls, path: str | Path | None = None, *, device: torch.device | str = "cpu") -> EchoModel:
+        """Load the weights that ship with the package, a weights file, or a folder of weights files.
+
+        Raises:
+            WeightsError: there are none, or they are damaged or do not belong together.
+        """
+        source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
+        files = sorted(source.glob("*.safetensors")) if source.is_dir() else [source]
+        return cls(*load_weights(files, device))
+
+    @property
+    def config(self) -> CompactConfig:
+        """Sizes, objectives and default steps."""
+        return self.model.config
+
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next(self.model.parameters()).device
+
+    @torch.no_grad()
+    def sample_layout(
+        self,
+        graph: GraphBatch,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        sampler: Sampler | None = None,
+        known: Boxes | None = None,
+        known_mask: Tensor | None = None,
+        edit: GraphEdit | None = None,
+        rules: str = "strict",
+        guidance: float = 1.0,
+        noise: Tensor | None = None,
+        progress: Progress | None = None,
+    ) -> Boxes:
+        """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`.
+
+        Arguments:
+            graph: S scenes, N nodes.
+            generator: source of all randomness.
+            steps, sampler: None = the config's.
+            known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
+            edit: what was changed in the graph, None = nothing.
+            rules: the rule set that the relations are meant in, `strict` or `sgfront`.
+            guidance: scale of classifier-free guidance towards the relations, 1 = off.
+            noise: (N, 8) starting noise in place of the generator's.
+            progress: called with (steps done, steps).
+
+        Returns:
+            N boxes; sizes are positive.
+
+        Raises:
+            ValueError: a graph, box or argument that the model cannot work with; the message names it.
+        """
+        config = self.config
+        graph = self._checked(graph)
+        known, known_mask = self._known(graph, known, known_mask)
+        given = None if known is None else known.encode(self.model.statistics)
+        conditional = self._layout_predictor(graph, self.graph_latent(graph, edit), rules)
+        if guidance != 1.0:
+            bare = graph.with_triplets(graph.triplets[:0])
+            free = self._layout_predictor(bare, self.graph_latent(bare), rules)
+            conditional = guided(conditional, free, guidance)
+        x = self._noise((graph.num_nodes, 8), generator, noise)
+        vectors = sample(
+            sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,
+            known=given, known_mask=known_mask, generator=generator, progress=progress,
+        )  # fmt: skip
+        boxes = Boxes.decode(vectors, self.model.statistics)
+        boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
+        if known is None or known_mask is None:
+            return boxes
+        wide = known_mask[:, None]
+        return Boxes(
+            torch.where(wide, known.size, boxes.size),
+            torch.where(wide, known.position, boxes.position),
+            torch.where(known_mask, known.yaw, boxes.yaw),
+        )
+
+    @torch.no_grad()
+    def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
+        """Latent nodes (N, latent width) that both branches read; `edit` routes them through the manipulator's edit."""
+        pairs = pairs_of(graph, self.config.predicates)
+        if edit is None:
+            return self.model.latent(graph.category, pairs)
+        old = pairs_of(graph.with_triplets(edit.before.to(self.device)), self.config.predicates)
+        added = edit.added.to(self.device)
+        return self.model.latent(
+            graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
+        )
+
+    def _layout_predictor(self, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
+        config, layout = self.config, self.model.layout
+        if rules not in config.rules:
+            raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
+        chosen = torch.full_like(graph.room_type, config.rules.index(rules))
+        pairs: Pairs = pairs_of(graph, config.predicates)
+        context = layout.context(graph, pairs, latent, chosen)
+
+        def predict(x: Tensor, level: Tensor) -> Tensor:
+            return clean_from(layout(x, level, context), x, level, config.layout.objective)
+
+        return predict
+
+    def _checked(self, graph: GraphBatch) -> GraphBatch:
+        config = self.config
+        graph.check(categories=config.categories, predicates=config.predicates, room_types=config.room_types)
+        return graph.to(self.device)
+
+    def _known(
+        self, graph: GraphBatch, known: Any, mask: Tensor | None, check: bool = True
+    ) -> tuple[Any, Tensor | None]:
+        """Known values and their mask on the model's device, with unknown rows replaced by something harmless."""
+        if (known is None) != (mask is None):
+            raise ValueError("known and known_mask belong together, one of them is missing")
+        if known is None or mask is None:
+            return None, None
+        nodes = graph.num_nodes
+        if len(known) != nodes or tuple(mask.shape) != (nodes,) or mask.dtype != torch.bool:
+            found = f"{len(known)} values and a {tuple(mask.shape)} {mask.dtype} mask"
+            raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
+        known, mask = known.to(self.device), mask.to(self.device)
+        if isinstance(known, Boxes):
+            known[mask].check()
+            one = known.size.new_ones(())
+            return Boxes(
+                torch.where(mask[:, None], known.size, one),
+                torch.where(mask[:, None], known.position, 0 * one),
+                torch.where(mask, known.yaw, 0 * one),
+            ), mask
+        bad = ~torch.isfinite(known.flatten(1)).all(1) & mask
+        if bool(bad.any()):
+            raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
+        return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
+
+    def _noise(self, shape: tuple[int, ...], generator: torch.Generator, noise: Tensor | None) -> Tensor:
+        if noise is None:
+            return torch.randn(shape, generator=generator, device=generator.device).to(self.device)
+        if tuple(noise.shape) != shape:
+            raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
+        return noise.to(self.device)
+
+
+def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
+    """(N,) bool: nodes that were added, and both ends of every triplet that came or went."""
+    touched = edit.added.to(graph.category.device).clone()
+    now, before = ({tuple(row) for row in triplets.tolist()} for triplets in (graph.triplets, edit.before))
+    for subject, _, target in now ^ before:
+        touched[subject] = True
+        touched[target] = True
+    return touched
