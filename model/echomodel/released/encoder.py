@@ -1,0 +1,151 @@
+"""Graph embedding, graph encoder E_r and graph manipulator (EchoScene, section 3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from echomodel.released.config import EncoderConfig
+from echomodel.released.gcn import TripletGCN
+
+
+@dataclass(frozen=True, eq=False)
+class SceneGraphTensors:
+    """A labelled graph as the published model takes it.
+
+    Arguments:
+        classes: (N,) int64, class ids; each scene ends by its floor and its `_scene_` node (class 0).
+        triples: (E, 3) int64 [subject, predicate, object]; every node has an `in` (0) triple to its `_scene_`.
+        node_text: (N, text) float32, text features of the class labels.
+        edge_text: (E, text) float32, text features of "subject predicate object", or None (zeros).
+    """
+
+    classes: Tensor
+    triples: Tensor
+    node_text: Tensor
+    edge_text: Tensor | None = None
+
+    def check(self, config: EncoderConfig) -> None:
+        """Raises ValueError naming the first class, predicate, end or text feature that the model cannot use."""
+        nodes = len(self.classes)
+        if not nodes:
+            raise ValueError("graph has no nodes, at least one is needed")
+        for name, values, size in (
+            ("class of node", self.classes, config.classes),
+            ("subject of triplet", self.triples[:, 0], nodes),
+            ("predicate of triplet", self.triples[:, 1], config.predicates),
+            ("object of triplet", self.triples[:, 2], nodes),
+        ):
+            wrong = (values < 0) | (values >= size)
+            if bool(wrong.any()):
+                at = int(wrong.nonzero()[0])
+                raise ValueError(f"{name} {at} is {int(values[at])}, allowed: 0..{size - 1}")
+        for name, text, count in (("node", self.node_text, nodes), ("edge", self.edge_text, len(self.triples))):
+            if text is None:
+                continue
+            if tuple(text.shape) != (count, config.text):
+                raise ValueError(f"text features of {name}s are {tuple(text.shape)}, expected {(count, config.text)}")
+            bad = ~torch.isfinite(text).all(1)
+            if bool(bad.any()):
+                raise ValueError(f"text feature of {name} {int(bad.nonzero()[0])} is not finite")
+
+
+class GraphEncoder(nn.Module):
+    """Embedding tables, encoder and manipulator, under the published parameter names.
+
+    Arguments:
+        config: sizes.
+        branches: branches that `config.separated` stores an unused graph convolution for (`l`, `s`).
+    """
+
+    def __init__(self, config: EncoderConfig, branches: Sequence[str] = ("s", "l")) -> None:
+        super().__init__()
+        self.encoder_config = config
+        node, sizes = config.node, (config.hidden, config.layers, config.node, config.residual)
+        self.obj_embeddings_ec = nn.Embedding(config.classes + 1, config.learned)
+        self.pred_embeddings_ec = nn.Embedding(config.predicates, config.learned)
+        self.obj_embeddings_dc = nn.Embedding(config.classes + 1, config.learned)  # never used by the published code
+        self.pred_embeddings_man_dc = nn.Embedding(config.predicates, config.learned)
+        self.gconv_net_ec = TripletGCN(node, node, *sizes)
+        self.gconv_net_manipulation = TripletGCN(2 * node + config.flag, node, *sizes)
+        if config.separated:
+            for branch in branches:
+                self.add_module(f"gconv_net_ec_rel_{branch}", TripletGCN(2 * node, node, *sizes))
+
+    def embed(self, graph: SceneGraphTensors, *, manipulator: bool = False) -> tuple[Tensor, Tensor]:
+        """Node (N, node) and edge (E, node) features: text, then learned; `manipulator` picks its predicate table."""
+        own = manipulator and self.encoder_config.own_manipulator_table
+        table = self.pred_embeddings_man_dc if own else self.pred_embeddings_ec
+        predicates = table(graph.triples[:, 1])
+        text = graph.edge_text
+        if text is None:
+            text = predicates.new_zeros(len(predicates), self.encoder_config.text)
+        nodes = torch.cat([graph.node_text, self.obj_embeddings_ec(graph.classes)], dim=1)
+        return nodes, torch.cat([text, predicates], dim=1)
+
+    def encode(self, graph: SceneGraphTensors) -> tuple[Tensor, Tensor]:
+        """Latents of nodes and edges, (N, node) and (E, node) float32 (E_r)."""
+        graph.check(self.encoder_config)
+        return self.gconv_net_ec(*self.embed(graph), graph.triples[:, [0, 2]])
+
+    def manipulate(
+        self,
+        latent: Tensor,
+        graph: SceneGraphTensors,
+        *,
+        added: Sequence[int] = (),
+        touched: Sequence[int] = (),
+        noise: Tensor | None = None,
+        generator: torch.Generator | None = None,
+        replace: bool = True,
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Latents of an edited graph from those of the graph before (generation: no edit).
+
+        Arguments:
+            latent: (M, node) float32, encoder output of the graph before the edit.
+            graph: the graph after the edit.
+            added: nodes missing before, each the index that the node has before later ones are inserted; a zero
+                latent is inserted there.
+            touched: ends of changed triples, in the numbering after the edit.
+            noise: (added + touched, flag) float32, change flags; drawn with `generator` when None.
+            replace: take the manipulator's output for all nodes (published default), not for the edited ones alone.
+
+        Returns:
+            (N, node) latents, (E, node) edge latents and (N,) bool, the nodes that were kept.
+
+        Raises:
+            ValueError: the counts do not add up, or the graph is one that `SceneGraphTensors.check` refuses.
+        """
+        config = self.encoder_config
+        graph.check(config)
+        places = [index + number for number, index in enumerate(added)]
+        latent = insert_zeros(latent, places)
+        count = len(graph.classes)
+        if len(latent) != count:
+            raise ValueError(f"{len(latent)} latents with {len(places)} added nodes for a graph of {count} nodes")
+        edited = [*places, *touched]
+        if noise is None:
+            noise = torch.randn(len(edited), config.flag, generator=generator)
+        if tuple(noise.shape) != (len(edited), config.flag):
+            raise ValueError(f"change flags are {tuple(noise.shape)}, expected {(len(edited), config.flag)}")
+        flags = latent.new_zeros(count, config.flag)
+        keep = torch.ones(count, dtype=torch.bool)
+        for row, node in enumerate(edited):
+            flags[node], keep[node] = noise[row], False
+        nodes, edges = self.embed(graph, manipulator=True)
+        new, new_edges = self.gconv_net_manipulation(
+            torch.cat([latent, flags, nodes], dim=1), edges, graph.triples[:, [0, 2]]
+        )
+        return (new if replace else torch.where(keep[:, None], latent, new)), new_edges, keep
+
+
+def insert_zeros(latent: Tensor, places: Sequence[int]) -> Tensor:
+    """(M, D) with rows of zeros inserted at `places`, indices of the result, ascending: (M + K, D)."""
+    for place in places:
+        if not 0 <= place <= len(latent):
+            raise ValueError(f"added node {place} lies outside 0..{len(latent)}")
+        latent = torch.cat([latent[:place], latent.new_zeros(1, latent.shape[1]), latent[place:]])
+    return latent

@@ -1,0 +1,109 @@
+"""Triplet convolution, encoder and manipulator against the published ones (tolerance 1e-4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from parity_configs import encoder_config
+from parity_numbers import Numbers, close, value
+from torch import nn
+
+from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
+from echomodel.released.gcn import TripletGCN
+
+
+@pytest.mark.parametrize("name", ["gcn", "gcn_noresidual"])
+def test_triplet_gcn(name: str) -> None:
+    numbers = Numbers(name)
+    meta = numbers.meta
+    net = TripletGCN(
+        meta["input_dim_obj"],
+        meta["input_dim_pred"],
+        meta["hidden_dim"],
+        meta["num_layers"],
+        meta["output_dim"],
+        meta["residual"],
+    )
+    numbers.fill(net)
+    with torch.inference_mode():
+        for mode, suffix in ((False, ""), (True, "_trainmode")):
+            x, e = net.train(mode)(numbers["x"], numbers["e"], numbers["edges"])
+            close(x, numbers[f"out_x{suffix}"], 1e-4)
+            close(e, numbers[f"out_e{suffix}"], 1e-4)
+
+
+def _encoder(own_table: bool = True) -> GraphEncoder:
+    """Encoder weights from one file, manipulator weights from the other, each from its own seed."""
+    sources = [Numbers("encoder"), Numbers("manipulator")]
+    net = GraphEncoder(replace(encoder_config(sources[0]), own_manipulator_table=own_table))
+    state = nn.Module.state_dict(net)
+    seen = set()
+    with torch.no_grad():
+        for numbers in sources:
+            for key, shape in numbers.keys.items():
+                assert list(state[key].shape) == shape, key
+                if key not in seen and state[key].is_floating_point():
+                    state[key].copy_(torch.from_numpy(value(key, tuple(shape), numbers.seed, numbers.gain)))
+                seen.add(key)
+    assert set(state) - seen <= {"obj_embeddings_dc.weight", "pred_embeddings_man_dc.weight"}
+    return net.eval()
+
+
+def _graph(n: Numbers, classes: str, triples: str, nodes: str, edges: str) -> SceneGraphTensors:
+    return SceneGraphTensors(n[classes], n[triples], n[nodes], n[edges])
+
+
+@torch.inference_mode()
+def test_encoder() -> None:
+    numbers = Numbers("encoder")
+    net = _encoder()
+    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    nodes, edges = net.embed(graph)
+    close(nodes, numbers["obj_embed"], 1e-6)
+    close(edges, numbers["pred_embed_enc"], 1e-6)
+    latent, latent_edges = net.encode(graph)
+    close(latent, numbers["latent_obj"], 1e-4)
+    close(latent_edges, numbers["latent_pred"], 1e-4)
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize(("own_table", "expected"), [(True, "manip_obj"), (False, "manip_obj_echoscene_variant")])
+def test_manipulator_generates(own_table: bool, expected: str) -> None:
+    numbers = Numbers("manipulator")
+    net = _encoder(own_table)
+    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    latent, edges, keep = net.manipulate(numbers["latent_obj"], graph)
+    close(latent, numbers[expected], 1e-4)
+    assert keep.all()
+    if own_table:
+        close(edges, numbers["manip_pred"], 1e-4)
+
+
+@torch.inference_mode()
+def test_manipulator_adds_a_node() -> None:
+    numbers = Numbers("manipulator")
+    net = _encoder()
+    before = _graph(numbers, "add_enc_objs", "add_enc_triples", "add_clip_obj", "add_clip_rel")
+    after = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    latent, _ = net.encode(before)
+    added = numbers["add_index"].tolist()
+    new, _, keep = net.manipulate(latent, after, added=added, noise=numbers["add_noise"])
+    close(new, numbers["add_c_b"], 1e-4)
+    close(net.embed(after)[0], numbers["add_uc_b"], 1e-6)
+    assert keep.long().tolist() == numbers["add_keep"].tolist()
+
+
+@torch.inference_mode()
+def test_manipulator_changes_a_relation() -> None:
+    numbers = Numbers("manipulator")
+    net = _encoder()
+    before = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    after = _graph(numbers, "objs", "chg_dec_triples", "clip_obj", "chg_clip_rel")
+    latent, _ = net.encode(before)
+    touched = numbers["chg_nodes"].tolist()
+    new, _, keep = net.manipulate(latent, after, touched=touched, noise=numbers["chg_noise"])
+    close(new, numbers["chg_c_b"], 1e-4)
+    close(net.embed(after)[0], numbers["chg_uc_b"], 1e-6)
+    assert keep.long().tolist() == numbers["chg_keep"].tolist()

@@ -1,0 +1,81 @@
+"""Layout branch against the published one: step, tables, 1,000-step sampling, loss and gradients, full size."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from parity_configs import layout_config
+from parity_numbers import Numbers, check_gradients, close
+
+from echomodel.released.layout import LayoutNet
+from echomodel.released.sampling import ancestral, layout_loss
+from echomodel.released.tables import LayoutTables
+
+
+def _net(numbers: Numbers) -> LayoutNet:
+    net = LayoutNet(layout_config(numbers))
+    numbers.fill(net)
+    return net
+
+
+def _tables(raw: dict) -> LayoutTables:
+    return LayoutTables.linear(raw["beta_start"], raw["beta_end"], raw["time_num"])
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize("name", ["layout_step", "layout_step_notemb"])
+def test_step(name: str) -> None:
+    numbers = Numbers(name)
+    net = _net(numbers)
+    embedding = net.embed_time(numbers["t"])
+    close(embedding, numbers["time_emb"], 1e-4)
+    x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
+    close(net.echo(x, objects, triples, embedding, None), numbers["echo"], 1e-4)
+    close(net(x, objects, triples, numbers["t"]), numbers["eps"], 2e-4)
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize("name", ["full_layout_step", "full_layout_step_notemb"])
+def test_step_at_full_size(name: str) -> None:
+    numbers = Numbers(name)
+    net = _net(numbers)
+    close(net(numbers["x"], numbers["obj_embed"], numbers["triples"], numbers["t"]), numbers["eps"], 1e-4)
+
+
+def test_tables() -> None:
+    numbers = Numbers("layout_tables")
+    tables = _tables(numbers.meta)
+    for name in numbers.names:
+        close(getattr(tables, name), numbers[name], 0.0, relative=2e-7)
+
+
+@torch.inference_mode()
+def test_thousand_step_sampling() -> None:
+    numbers = Numbers("layout_sampling")
+    net = _net(numbers)
+    tables = _tables(numbers.meta["diffusion"])
+    objects, triples, noise = numbers["obj_embed"], numbers["triples"], numbers["noise"]
+    top = len(tables.betas) - 1
+    checked = 0
+    for step, x in ancestral(
+        lambda x, t: net(x, objects, triples, t), numbers["x_T"], tables, noise=lambda step: noise[top - step]
+    ):
+        if f"x_after_t{step}" in numbers:
+            close(x, numbers[f"x_after_t{step}"], 1e-4 if step >= 900 else 0.02)
+            checked += 1
+    assert checked == sum(name.startswith("x_after_t") for name in numbers.names)
+    close(x, numbers["out"], 0.02)
+
+
+@pytest.mark.parametrize("name", ["layout_loss", "layout_loss_notemb"])
+def test_loss_and_gradients(name: str) -> None:
+    numbers = Numbers(name)
+    net = _net(numbers).train()
+    objects = numbers["obj_embed"].requires_grad_()
+    tables = LayoutTables.linear()
+    losses = layout_loss(net, numbers["box0"], objects, numbers["triples"], numbers["t"], numbers["noise"], tables)
+    for part in ("loss", "size", "trans", "angle"):
+        close(losses[part].detach(), numbers["loss" if part == "loss" else f"loss_{part}"], 0.0, relative=1e-5)
+    losses["loss"].backward()
+    close(objects.grad, numbers["grad_obj_embed"], 1e-3 * float(numbers["grad_obj_embed"].abs().max()))
+    check_gradients(net, numbers.gradient_norms())
