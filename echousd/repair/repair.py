@@ -17,7 +17,7 @@ from echousd.repair.solver import RepairConfig, solve
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
-    from echousd.graph import Relation, SceneGraph
+    from echousd.graph import Relation, RoomSpec, SceneGraph
 
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 DEFAULT_HEIGHT = 2.8
@@ -105,7 +105,7 @@ def repair(
         np.asarray(boxes.position, float),
         np.asarray(boxes.yaw, float),
         triplets,
-        floor_polygon=floor_of(graph),
+        floor_polygon=floor_of_room(graph.room),
         height=graph.room.height or DEFAULT_HEIGHT,
         fixed=np.array([node.locked or node.position is not None for node in nodes]),
         rigid=np.array([node.locked or node.size is not None for node in nodes]),
@@ -135,13 +135,13 @@ def repair(
     )
 
 
-def floor_of(graph: SceneGraph) -> np.ndarray | None:
+def floor_of_room(room: RoomSpec) -> np.ndarray | None:
     """(k, 2) float, the room's floor polygon, the rectangle around the origin of its size, or None."""
-    if graph.room.floor_polygon is not None:
-        return np.asarray(graph.room.floor_polygon, float)
-    if graph.room.size is None:
+    if room.floor_polygon is not None:
+        return np.asarray(room.floor_polygon, float)
+    if room.size is None:
         return None
-    x, z = np.asarray(graph.room.size, float) / 2
+    x, z = np.asarray(room.size, float) / 2
     return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
 
 

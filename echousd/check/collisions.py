@@ -1,0 +1,128 @@
+"""Collisions between the meshes of a room: boxes first, then points of one surface inside the other solid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from echousd.check.objects import RoomObject
+from echousd.repair.belonging import allowed_overlap
+from echousd.repair.geometry import axes, pair_indices, separation
+
+TOUCH = 0.01  # metres: boxes that overlap less than this only touch
+DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision
+SAMPLES = 600  # points per surface and pair
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two objects whose meshes run into each other, by `depth` metres."""
+
+    first: str
+    second: str
+    depth: float
+
+    def to_json(self) -> dict:
+        """The entry of the report."""
+        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
+
+
+def find_collisions(objects: Sequence[RoomObject]) -> tuple[Collision, ...]:
+    """All pairs that collide and do not belong together, deepest first.
+
+    A pair that belongs together (`repair.belonging`) is excepted as long as its boxes overlap no further than allowed.
+    """
+    if len(objects) < 2:
+        return ()
+    size = np.array([thing.size for thing in objects])
+    position = np.array([thing.position for thing in objects])
+    yaw = np.array([thing.yaw for thing in objects])
+    pairs = pair_indices(len(objects))
+    depth = -separation(size, position, yaw, pairs)
+    allowed = allowed_overlap([thing.node.category for thing in objects], size, pairs)
+    found = []
+    for (i, j), overlap, free in zip(pairs.tolist(), depth, allowed, strict=True):
+        if overlap > TOUCH and overlap > free:
+            deep = mesh_depth(objects[i], objects[j]) if len(objects[i].faces) and len(objects[j].faces) else overlap
+            if deep > DEEP:
+                found.append(Collision(objects[i].node.name, objects[j].node.name, float(deep)))
+    return tuple(sorted(found, key=lambda hit: -hit.depth))
+
+
+def mesh_depth(first: RoomObject, second: RoomObject) -> float:
+    """How deep one surface reaches into the other solid in metres, 0 where they do not meet."""
+    return max(_reach(first, second), _reach(second, first))
+
+
+def _reach(surface: RoomObject, solid: RoomObject) -> float:
+    points = surface_points(surface, solid)
+    if not len(points):
+        return 0.0
+    within = points[winding_number(points, solid.points[solid.faces]) > 0.5]
+    if not len(within):
+        return 0.0
+    rng = np.random.default_rng(0)
+    skin = np.concatenate((solid.points, _scatter(solid.points[solid.faces], 4000, rng)))
+    # The nearest sample is at most a sample's distance further than the surface itself.
+    return float(cKDTree(skin).query(within)[0].max())
+
+
+def surface_points(surface: RoomObject, solid: RoomObject) -> np.ndarray:
+    """(s, 3) float: vertices and scattered points of a surface that lie in the other object's box."""
+    rng = np.random.default_rng(0)
+    triangles = surface.points[surface.faces]
+    near = triangles[_touches(triangles, solid)]
+    if not len(near):
+        return np.zeros((0, 3))
+    points = np.concatenate((near.reshape(-1, 3), _scatter(near, 4 * SAMPLES, rng)))
+    points = points[_within(points, solid)]
+    return points if len(points) <= SAMPLES else points[rng.choice(len(points), SAMPLES, replace=False)]
+
+
+def _scatter(triangles: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    if area.sum() <= 0:
+        return np.zeros((0, 3))
+    chosen = triangles[rng.choice(len(triangles), count, p=area / area.sum())]
+    u, v = rng.random((2, count, 1))
+    flip = u + v > 1
+    u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
+    return chosen[:, 0] + u * (chosen[:, 1] - chosen[:, 0]) + v * (chosen[:, 2] - chosen[:, 0])
+
+
+def _local(points: np.ndarray, solid: RoomObject) -> np.ndarray:
+    u = axes(np.array([solid.yaw]))[0]
+    offset = points - solid.position
+    plan = offset[..., [0, 2]] @ u.T
+    return np.stack((plan[..., 0], offset[..., 1] - solid.size[1] / 2, plan[..., 1]), -1)
+
+
+def _within(points: np.ndarray, solid: RoomObject) -> np.ndarray:
+    return (np.abs(_local(points, solid)) <= solid.size / 2).all(-1)
+
+
+def _touches(triangles: np.ndarray, solid: RoomObject) -> np.ndarray:
+    local = _local(triangles, solid)
+    return ((local.min(1) <= solid.size / 2) & (local.max(1) >= -solid.size / 2)).all(-1)
+
+
+def winding_number(points: np.ndarray, triangles: np.ndarray, block: int = 400_000) -> np.ndarray:
+    """(s,) float: generalised winding number of a triangle soup around points, 1 inside, 0 outside (Jacobson 2013).
+
+    Arguments:
+        points: (s, 3) float; triangles: (f, 3, 3) float.
+        block: largest number of point-triangle pairs held at once.
+    """
+    out = np.zeros(len(points))
+    step = max(1, block // max(len(triangles), 1))
+    corners = triangles.astype(np.float32)
+    for start in range(0, len(points), step):
+        a, b, c = np.moveaxis(corners[None] - points[start : start + step, None, None].astype(np.float32), 2, 0)
+        la, lb, lc = (np.sqrt((v * v).sum(-1)) for v in (a, b, c))
+        triple = (a * np.cross(b, c)).sum(-1)
+        below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+        out[start : start + step] = np.arctan2(triple, below).sum(-1) / (2 * np.pi)
+    return out

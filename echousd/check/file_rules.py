@@ -1,0 +1,68 @@
+"""Rules on the files of a stage: asset paths that work on another machine."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from pxr import Sdf, Usd, UsdUtils
+
+from echousd.check.findings import Finding, Rule
+
+ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
+
+
+def relative_paths(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every asset path is relative and written with forward slashes."""
+    session = stage.GetSessionLayer()
+    told = set()
+    for layer in stage.GetUsedLayers():
+        if layer == session:
+            continue
+        for path in _asset_paths(layer):
+            if (layer.identifier, path) in told or not (ABSOLUTE.match(path) or "\\" in path):
+                continue
+            told.add((layer.identifier, path))
+            what = "absolute" if ABSOLUTE.match(path) else "written with backslashes"
+            where = layer.GetDisplayName()
+            yield Finding(_holder(layer, path), f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
+
+
+def _asset_paths(layer: Sdf.Layer) -> list[str]:
+    """All asset paths that a layer authors: sublayers, references, payloads, clips, attributes, metadata."""
+    copy = Sdf.Layer.CreateAnonymous(".usda")
+    copy.TransferContent(layer)
+    found: list[str] = []
+
+    def note(path: str) -> str:
+        found.append(path)
+        return path
+
+    UsdUtils.ModifyAssetPaths(copy, note)
+    for spec in _specs(layer):
+        identifier = (spec.assetInfo or {}).get("identifier") if isinstance(spec, Sdf.PrimSpec) else None
+        if identifier:
+            found.append(getattr(identifier, "path", str(identifier)))
+    return found
+
+
+def _specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]
+
+
+def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
+    """The prim of a layer whose opinions mention an asset path; the pseudo-root for sublayers."""
+    for spec in _specs(layer):
+        if isinstance(spec, Sdf.AttributeSpec) and getattr(spec.default, "path", None) == path:
+            return spec.path.GetPrimPath()
+        if isinstance(spec, Sdf.PrimSpec):
+            arcs = [*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems()]
+            identifier = (spec.assetInfo or {}).get("identifier")
+            if any(arc.assetPath == path for arc in arcs) or getattr(identifier, "path", None) == path:
+                return spec.path
+    return Sdf.Path.absoluteRootPath
+
+
+RULES = (Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),)

@@ -1,0 +1,119 @@
+"""Rules on geometry and materials: texture coordinates, scale, materials inside the default prim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+
+from echousd.check.findings import Finding, Rule, applied, is_guide, prims
+from echousd.stage.encoding import NODE_API
+
+EVEN = 1e-3  # relative difference of scale factors that counts as none
+PHYSICAL = ("PhysicsRigidBodyAPI", "PhysicsCollisionAPI")
+
+
+def texture_coordinates(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every visible mesh has `primvars:st`, with as many values as its interpolation asks for and indices in range."""
+    for prim in prims(stage):
+        if not prim.IsA(UsdGeom.Mesh) or is_guide(prim):
+            continue
+        fault = _uv_fault(UsdGeom.Mesh(prim))
+        if fault:
+            yield Finding(prim.GetPath(), fault)
+
+
+def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
+    primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("st")
+    if not primvar or not primvar.HasValue():
+        return "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
+    values = primvar.Get()
+    interpolation = primvar.GetInterpolation()
+    counts = mesh.GetFaceVertexCountsAttr().Get() or []
+    wanted = {
+        UsdGeom.Tokens.constant: 1,
+        UsdGeom.Tokens.uniform: len(counts),
+        UsdGeom.Tokens.varying: len(mesh.GetPointsAttr().Get() or []),
+        UsdGeom.Tokens.vertex: len(mesh.GetPointsAttr().Get() or []),
+        UsdGeom.Tokens.faceVarying: len(mesh.GetFaceVertexIndicesAttr().Get() or []),
+    }.get(interpolation, 0)
+    indices = primvar.GetIndices() if primvar.IsIndexed() else None
+    found = len(values) if indices is None else len(indices)
+    if found != wanted:
+        return f"primvars:st has {found} texture coordinates, {interpolation} interpolation needs {wanted}"
+    if indices is not None and len(indices):
+        table = np.asarray(indices)
+        if table.min() < 0 or table.max() >= len(values):
+            return f"primvars:st:indices reach from {table.min()} to {table.max()}, allowed: 0 to {len(values) - 1}"
+    return None
+
+
+def scale(stage: Usd.Stage) -> Iterator[Finding]:
+    """No scale is zero, and no node of a graph, body or collider is scaled differently along its axes."""
+    cache = UsdGeom.XformCache()
+    told: set[Sdf.Path] = set()
+    for prim in prims(stage):
+        if not prim.IsA(UsdGeom.Xformable):
+            continue
+        local = _factors(cache.GetLocalTransformation(prim)[0])
+        if local.min() < 1e-6:
+            told.add(prim.GetPath())
+            yield Finding(prim.GetPath(), f"scale is {_shown(local)}, allowed: above 0")
+            continue
+        schemas = applied(prim)
+        if NODE_API not in schemas and not any(schema in schemas for schema in PHYSICAL):
+            continue
+        world = _factors(cache.GetLocalToWorldTransform(prim))
+        if world.min() < 1e-6 or world.max() / world.min() < 1 + EVEN:
+            continue
+        culprit = _unevenly_scaled(prim, cache)
+        if culprit.GetPath() not in told:
+            told.add(culprit.GetPath())
+            what = "a body, collider or object of a scene graph"
+            yield Finding(culprit.GetPath(), f"scale is {_shown(world)}, allowed on {what}: the same along all axes")
+
+
+def _unevenly_scaled(prim: Usd.Prim, cache: UsdGeom.XformCache) -> Usd.Prim:
+    above = prim
+    while above and not above.IsPseudoRoot():
+        factors = _factors(cache.GetLocalTransformation(above)[0])
+        if factors.max() / max(factors.min(), 1e-9) > 1 + EVEN:
+            return above
+        above = above.GetParent()
+    return prim
+
+
+def _factors(matrix) -> np.ndarray:  # type: ignore[no-untyped-def]
+    return np.linalg.svd(np.array(matrix)[:3, :3], compute_uv=False)
+
+
+def _shown(factors: np.ndarray) -> str:
+    return "(" + ", ".join(f"{factor:.4g}" for factor in sorted(factors)) + ")"
+
+
+def materials_inside(stage: Usd.Stage) -> Iterator[Finding]:
+    """Bound materials lie below the default prim, so that a reference to the stage brings them along."""
+    default = stage.GetDefaultPrim()
+    if not default:
+        return
+    for prim in prims(stage):
+        if not prim.GetPath().HasPrefix(default.GetPath()):
+            continue
+        for relationship in prim.GetRelationships():
+            if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
+                continue
+            for target in relationship.GetTargets():
+                found = stage.GetPrimAtPath(target.GetPrimPath())
+                if found and found.IsA(UsdShade.Material) and not target.HasPrefix(default.GetPath()):
+                    yield Finding(
+                        prim.GetPath(),
+                        f"bound to <{target}>, allowed: a material below the default prim <{default.GetPath()}>",
+                    )
+
+
+RULES = (
+    Rule("echo:TextureCoordinates", "Visible meshes have texture coordinates, as many as needed.", texture_coordinates),
+    Rule("echo:Scale", "No zero scale; bodies, colliders and objects are scaled evenly.", scale),
+    Rule("echo:MaterialsInside", "Bound materials lie below the default prim.", materials_inside),
+)

@@ -1,0 +1,111 @@
+"""Rules on the scene graph and on what tells tools what things are: edges, types, semantics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pxr import Usd, UsdGeom
+
+from echousd.check.findings import Finding, Rule, applied, is_guide, prims
+from echousd.stage import encoding as usd
+from echousd.stage.encoding import StageError
+from echousd.stage.read import find_rooms, node_names, relation_of, room_graph
+
+LABELS_PREFIX = "SemanticsLabelsAPI:"
+
+
+def edge_targets(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every relation has one subject, one known predicate and one object, all in its own room."""
+    try:
+        rooms = find_rooms(stage)
+    except StageError as error:
+        yield Finding(stage.GetPseudoRoot().GetPath(), str(error))
+        return
+    owned = set()
+    for room in rooms:
+        try:
+            names = node_names(room)
+        except StageError as error:
+            yield Finding(room.graph.GetPath(), str(error))
+            continue
+        for prim in room.relations:
+            owned.add(prim.GetPath())
+            try:
+                relation_of(prim, names)
+            except StageError as error:
+                yield Finding(prim.GetPath(), _without_place(str(error), prim))
+    for prim in prims(stage):
+        if prim.GetTypeName() == usd.RELATION_TYPE and prim.GetPath() not in owned:
+            yield Finding(
+                prim.GetPath(), f"a relation outside every scene graph, allowed: below an {usd.GRAPH_TYPE} prim"
+            )
+
+
+def consistent_graph(stage: Usd.Stage) -> Iterator[Finding]:
+    """The relations of a room do not contradict each other, and its words are those of the vocabulary."""
+    if any(True for _ in edge_targets(stage)):
+        return
+    for room in find_rooms(stage):
+        try:
+            room_graph(room)
+        except StageError as error:
+            yield Finding(room.graph.GetPath(), _without_place(str(error), room.graph))
+
+
+def known_types(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every prim type and applied API schema is known to this OpenUSD."""
+    registry = Usd.SchemaRegistry()
+    for prim in prims(stage):
+        name = prim.GetTypeName()
+        if name and not registry.FindConcretePrimDefinition(name) and not name.startswith("Echo"):
+            yield Finding(prim.GetPath(), f"unknown prim type {name!r}: no registered schema defines it")
+        for schema in applied(prim):
+            base = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)[0]
+            if not registry.FindAppliedAPIPrimDefinition(base) and not base.startswith("Echo"):
+                yield Finding(prim.GetPath(), f"unknown API schema {schema!r}: no registered schema defines it")
+
+
+def semantics(stage: Usd.Stage) -> Iterator[Finding]:
+    """All visible geometry carries semantics labels, itself or through a prim above it."""
+    told: set = set()
+    for prim in prims(stage):
+        if not prim.IsA(UsdGeom.Gprim) or is_guide(prim) or _labelled(prim):
+            continue
+        owner = _component(prim)
+        if owner.GetPath() not in told:
+            told.add(owner.GetPath())
+            yield Finding(
+                owner.GetPath(), "no semantics labels, allowed: SemanticsLabelsAPI on the geometry or above it"
+            )
+
+
+def _labelled(prim: Usd.Prim) -> bool:
+    while prim and not prim.IsPseudoRoot():
+        for schema in applied(prim):
+            if schema.startswith(LABELS_PREFIX):
+                attribute = prim.GetAttribute(f"semantics:labels:{schema.removeprefix(LABELS_PREFIX)}")
+                if attribute and attribute.Get():
+                    return True
+        prim = prim.GetParent()
+    return False
+
+
+def _component(prim: Usd.Prim) -> Usd.Prim:
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if Usd.ModelAPI(above).GetKind() == "component":
+            return above
+        above = above.GetParent()
+    return prim
+
+
+def _without_place(message: str, prim: Usd.Prim) -> str:
+    return message.split(f"<{prim.GetPath()}>: ", 1)[-1]
+
+
+RULES = (
+    Rule("echo:EdgeTargets", "Relations have one subject, one predicate and one object in their room.", edge_targets),
+    Rule("echo:ConsistentGraph", "The relations of a room do not contradict each other.", consistent_graph),
+    Rule("echo:KnownTypes", "Prim types and applied API schemas are known.", known_types),
+    Rule("echo:Semantics", "All visible geometry carries semantics labels.", semantics),
+)

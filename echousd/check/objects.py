@@ -1,0 +1,178 @@
+"""What stands in a room on a stage: the meshes and boxes of its objects in the room frame (+Y up, metres)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from echousd.graph import Node, Relation, RoomSpec
+from echousd.stage.encoding import StageError
+from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
+
+Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
+HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+
+@dataclass(frozen=True, eq=False)
+class RoomObject:
+    """One object of a room.
+
+    Arguments:
+        node: what the graph says about it.
+        points: (v, 3) float, metres, room frame; faces: (f, 3) int. Empty where the object has no geometry.
+        size, position, yaw: its box: extents at yaw 0, centre of the bottom face (metres), radians about +Y.
+    """
+
+    node: Node
+    points: np.ndarray
+    faces: np.ndarray
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
+
+
+@dataclass(frozen=True, eq=False)
+class RoomContents:
+    """One room of a stage, read as far as it can be read.
+
+    Arguments:
+        path: prim path of the room.
+        spec: room type, floor and height, or None where they cannot be read.
+        objects: the objects that have a box; missing: names of those that have neither geometry nor a fixed box.
+        relations: the relations whose two ends are among the objects.
+    """
+
+    path: str
+    spec: RoomSpec | None
+    objects: tuple[RoomObject, ...]
+    missing: tuple[str, ...]
+    relations: tuple[Relation, ...]
+
+
+def read_contents(prims: RoomPrims) -> RoomContents:
+    """The contents of one room; what is not valid is left out here, the validators report it."""
+    stage = prims.room.GetStage()
+    cache = UsdGeom.XformCache()
+    to_room = room_frame(prims.room, cache)
+    names = _readable(lambda: node_names(prims)) or {}
+    owners = [prim.GetPath() for prim in prims.nodes]
+    objects, missing = [], []
+    for prim in prims.nodes:
+        node = _readable(lambda prim=prim: read_node(prim, names.get(prim.GetPath(), prim.GetName())))  # type: ignore[misc]
+        if node is None:
+            continue
+        found = _object(prim, node, cache, to_room, set(owners) - {prim.GetPath()})
+        if found is None:
+            missing.append(node.name)
+        else:
+            objects.append(found)
+    present = {thing.node.name for thing in objects}
+    read = [_readable(lambda prim=prim: relation_of(prim, names)) for prim in prims.relations]  # type: ignore[misc]
+    relations = tuple(r for r in read if r is not None and r.subject in present and r.object in present)
+    spec = _readable(lambda: room_spec(prims.graph))
+    assert stage
+    return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
+
+
+def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
+    """(4, 4) float, column vectors: from world coordinates of the stage to the room frame in metres.
+
+    The room frame sits at the room's prim. Where the prim is turned so that its own +Y is up (or the stage is Y-up) its
+    axes are the room's; a Z-up prim is turned.
+    """
+    stage = room.GetStage()
+    world = np.array(cache.GetLocalToWorldTransform(room)).T
+    up = np.array([0.0, 0, 1] if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
+    scale = np.linalg.norm(world[:3, :3], axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    local_up = (world[:3, :3] / scale).T @ up
+    turn = Z_TO_Y if abs(local_up[2]) > abs(local_up[1]) else np.eye(3)
+    out = np.eye(4)
+    out[:3, :3] = turn @ np.diag(scale) * UsdGeom.GetStageMetersPerUnit(stage)
+    try:
+        return out @ np.linalg.inv(world)
+    except np.linalg.LinAlgError:
+        return out
+
+
+def _readable(read):  # type: ignore[no-untyped-def]
+    try:
+        return read()
+    except StageError:
+        return None
+
+
+def _object(
+    prim: Usd.Prim, node: Node, cache: UsdGeom.XformCache, to_room: np.ndarray, others: set
+) -> RoomObject | None:
+    own = to_room @ np.array(cache.GetLocalToWorldTransform(prim)).T
+    points, faces = [], []
+    count = 0
+    for mesh in meshes_below(prim, others):
+        vertices, triangles = triangulated(mesh)
+        if not len(triangles):
+            continue
+        matrix = to_room @ np.array(cache.GetLocalToWorldTransform(mesh)).T
+        points.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        faces.append(triangles + count)
+        count += len(vertices)
+    if not points:
+        if node.size is None or node.position is None or node.yaw is None:
+            return None
+        size, position = np.array(node.size), np.array(node.position)
+        return RoomObject(node, np.zeros((0, 3)), np.zeros((0, 3), int), size, position, node.yaw)
+    vertices = np.concatenate(points)
+    front = own[:3, :3] @ np.array([0.0, 0, 1])
+    width = own[:3, :3] @ np.array([1.0, 0, 0])
+    # The front is horizontal in our rooms; in a prim whose own up is +Z it is not, then the width tells the heading.
+    level = np.hypot(front[0], front[2]) > np.hypot(width[0], width[2]) * 1e-3
+    yaw = float(np.arctan2(front[0], front[2])) if level else float(np.arctan2(-width[2], width[0]))
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turned = np.stack(
+        (cos * vertices[:, 0] - sin * vertices[:, 2], vertices[:, 1], sin * vertices[:, 0] + cos * vertices[:, 2]), 1
+    )
+    low, high = turned.min(0), turned.max(0)
+    x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
+    position = np.array([cos * x + sin * z, low[1], cos * z - sin * x])
+    return RoomObject(node, vertices, np.concatenate(faces), high - low, position, yaw)
+
+
+def meshes_below(prim: Usd.Prim, others: set | frozenset = frozenset()) -> Iterator[Usd.Prim]:
+    """The visible render geometry at and below a prim, without guides and proxies and without the prims in `others`."""
+    prims = iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
+    for found in prims:
+        if found.GetPath() in others:
+            prims.PruneChildren()
+        elif found.IsA(UsdGeom.Gprim):
+            image = UsdGeom.Imageable(found)
+            if image.ComputePurpose() not in HIDDEN and image.ComputeVisibility() != UsdGeom.Tokens.invisible:
+                yield found
+
+
+def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
+    """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int; other gprims become their box."""
+    if not prim.IsA(UsdGeom.Mesh):
+        extent = UsdGeom.Boundable(prim).ComputeExtent(Usd.TimeCode.Default())
+        return _box(np.array(extent)) if extent else (np.zeros((0, 3)), np.zeros((0, 3), int))
+    mesh = UsdGeom.Mesh(prim)
+    points = np.array(mesh.GetPointsAttr().Get() or [], float).reshape(-1, 3)
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], int)
+    indices = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], int)
+    if not len(points) or counts.sum() != len(indices) or (len(indices) and indices.max() >= len(points)):
+        return np.zeros((0, 3)), np.zeros((0, 3), int)
+    starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
+    triangles = []
+    for corners in np.unique(counts[counts >= 3]):
+        first = starts[counts == corners]
+        for k in range(1, corners - 1):
+            triangles.append(np.stack((indices[first], indices[first + k], indices[first + k + 1]), 1))
+    return points, np.concatenate(triangles) if triangles else np.zeros((0, 3), int)
+
+
+def _box(extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    corners = np.array([[extent[(k >> axis) & 1, axis] for axis in range(3)] for k in range(8)], float)
+    quads = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])

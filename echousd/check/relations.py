@@ -1,0 +1,56 @@
+"""Which relations of a room's graph its objects keep, measured on their boxes by the rules of `echomodel.rules`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from echomodel.vocabulary import vocabulary
+from echousd.check.objects import RoomContents
+from echousd.graph import Relation
+from echousd.repair.repair import floor_of_room
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A relation with its signed margin (metres or ratio, >= 0 = kept), None where the rules do not measure it."""
+
+    relation: Relation
+    kept: bool
+    margin: float | None
+
+    def to_json(self) -> dict:
+        """The entry of the report."""
+        subject, predicate, object_ = self.relation.triple
+        margin = None if self.margin is None else round(self.margin, 4)
+        return {"subject": subject, "predicate": predicate, "object": object_, "margin": margin}
+
+
+def judge(room: RoomContents, rules: str = "strict") -> tuple[Judged, ...]:
+    """Every relation between objects with boxes; raises ValueError for unknown rules."""
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.rules import margins, verdicts
+
+    words = vocabulary()
+    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
+    triplets = torch.tensor(
+        [[index[r.subject], words.predicate_id(r.predicate), index[r.object]] for r in room.relations],
+        dtype=torch.int64,
+    ).reshape(-1, 3)
+    size = np.array([thing.size for thing in room.objects]).reshape(-1, 3)
+    position = np.array([thing.position for thing in room.objects]).reshape(-1, 3)
+    yaw = np.array([thing.yaw for thing in room.objects])
+    boxes = Boxes(*(torch.tensor(v, dtype=torch.float64) for v in (size, position, yaw)))
+    polygon = None if room.spec is None else floor_of_room(room.spec)
+    centre = np.zeros(2) if polygon is None else (polygon.max(0) + polygon.min(0)) / 2
+    center = torch.as_tensor(centre)
+    verdict = verdicts(boxes, triplets, rules=rules, center=center).tolist()
+    margin = margins(boxes, triplets, rules=rules, center=center).tolist()
+    # Meshes are stored in single precision: a relation that holds to a tenth of a millimetre holds.
+    return tuple(
+        Judged(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
+        for relation, found, value in zip(room.relations, verdict, margin, strict=True)
+    )
