@@ -1,4 +1,4 @@
-"""Pictures of any stage without a GPU or a display: rays through Embree, soft sun, sky occlusion, and one bounce of light."""
+"""Pictures of any stage without a GPU or a display: rays through Embree, soft sun, occluded sky, one bounce."""
 
 from __future__ import annotations
 
@@ -34,14 +34,18 @@ class View:
     orthographic: bool
 
 
-def render_file(path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials") -> Image.Image:
+def render_file(
+    path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials"
+) -> Image.Image:
     """A picture of the room in a file; see `render_stage`. Raises ValueError where it cannot be opened."""
     from echousd.stage import open_stage
 
     return render_stage(open_stage(path), view=view, size=size, colors=colors)
 
 
-def render_stage(stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials") -> Image.Image:
+def render_stage(
+    stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials"
+) -> Image.Image:
     """A square picture of everything visible on a stage.
 
     Arguments:

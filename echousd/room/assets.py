@@ -17,7 +17,8 @@ from echousd.room.surface import Surface
 
 LICENCE = "Apache-2.0"
 # Solids that may be wrapped in one hull; everything else has room below or inside that other things need.
-CONVEX = frozenset({"cabinet", "lamp_below", "table_lamp", "ceiling_lamp", "pendant_lamp", "wall_lamp", "plant", "tv", "ottoman", "stool"})
+LAMPS = {"lamp_below", "table_lamp", "ceiling_lamp", "pendant_lamp", "wall_lamp"}
+CONVEX = frozenset({"cabinet", "plant", "tv", "ottoman", "stool"} | LAMPS)
 COLLIDER_FACES = 400
 
 
@@ -53,7 +54,7 @@ def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
 
 
 def write_mesh(stage: Usd.Stage, path: str, surface: Surface) -> UsdGeom.Mesh:
-    """Author a UsdGeomMesh with indexed normals and `st`, and one GeomSubset per material group where there are several."""
+    """Author a UsdGeomMesh with indexed normals and `st`, and a GeomSubset per material group if there are several."""
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(surface.points))

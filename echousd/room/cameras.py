@@ -44,7 +44,7 @@ def perspective_view(points: np.ndarray, facing: np.ndarray) -> np.ndarray:
         facing: (2,) float, x and z of the furniture's mean front.
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
-    side = corners[np.argmax(corners @ (facing + (1e-3, 2e-3)))]
+    side = corners[np.argmax(corners @ (facing + np.array([1e-3, 2e-3])))]
     direction = np.array([0.55 * side[0], 0.62, 0.85 * side[1]])
     direction /= np.linalg.norm(direction)
     target = (points.min(0) + points.max(0)) / 2

@@ -99,12 +99,23 @@ def graph_layer(room: Room) -> Sdf.Layer:
 def layout_layer(room: Room) -> Sdf.Layer:
     """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
     stage = _room_stage(room, "layout")
-    root = stage.OverridePrim("/Room")
+    stage.OverridePrim("/Room")
+    place_layouts(stage, room)
+    return stage.GetRootLayer()
+
+
+def place_layouts(stage: Usd.Stage, room: Room) -> None:
+    """Author the objects' xformOps (replacing those there are), as variants `layout_0` ... where there are several."""
+    for name in room.names:
+        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
+        for property_name in ("xformOpOrder", "xformOp:translate", "xformOp:rotateY"):
+            if prim and prim.HasProperty(property_name):
+                prim.RemoveProperty(property_name)
     layouts = room.layouts or (room.boxes,)
     if len(layouts) == 1:
         _place(stage, room, 0)
-        return stage.GetRootLayer()
-    variants = root.GetVariantSets().AddVariantSet("layout")
+        return
+    variants = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
     for number in range(len(layouts)):
         name = f"layout_{number}"
         variants.AddVariant(name)
@@ -112,7 +123,6 @@ def layout_layer(room: Room) -> Sdf.Layer:
         with variants.GetVariantEditContext():
             _place(stage, room, number)
     variants.SetVariantSelection("layout_0")
-    return stage.GetRootLayer()
 
 
 def physics_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
@@ -124,14 +134,18 @@ def physics_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping
         asset = room.assets[node.name]
         x, y, z = (float(v) for v in room.boxes.size[number])
         path = f"{OBJECTS}/{node.name}"
-        bodies.append(physics.Body(path, f"{path}/{asset}_collider", made[asset].approximation, node.category, (x, y, z)))
+        bodies.append(
+            physics.Body(path, f"{path}/{asset}_collider", made[asset].approximation, node.category, (x, y, z))
+        )
     static = [f"{SHELL}/{name}/{name}_mesh" for name in shell_surfaces]
     physics.write_physics(stage, bodies, static)
     physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
 
 
-def materials_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
+def materials_layer(
+    room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]
+) -> Sdf.Layer:
     """`layers/materials.usda`."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")

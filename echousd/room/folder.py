@@ -1,14 +1,13 @@
 """A room's folder on disk: files appear together or not at all, and what is not ours stays untouched (no pxr here).
 
-Everything new is first written to `.echousd/` inside the folder. A journal beside it, itself renamed into place, then says
-which files move where; from that moment the run can be finished by whoever comes next, before it nothing was changed.
+Everything new is first written to `.echousd/` inside the folder. A journal beside it, itself renamed into place, then
+says which files move where; from then on the run can be finished by whoever comes next, before nothing was changed.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -55,7 +54,9 @@ def claim(folder: Path, *, force: bool) -> dict:
     return {}
 
 
-def write_together(folder: Path, files: Mapping[str, bytes], *, last: Iterable[str], remove: Iterable[str]) -> list[str]:
+def write_together(
+    folder: Path, files: Mapping[str, bytes], *, last: Iterable[str], remove: Iterable[str]
+) -> list[str]:
     """Write all files of a room as one step and return the paths that changed.
 
     Files whose bytes are already there are not touched.
@@ -83,7 +84,7 @@ def write_together(folder: Path, files: Mapping[str, bytes], *, last: Iterable[s
         gone = [path for path in remove if (folder / path).is_file()]
         journal = {"move": [[str(number), path] for number, path in enumerate(changed)], "remove": gone}
         (staging / "journal.new").write_text(json.dumps(journal), "utf-8")
-        os.replace(staging / "journal.new", staging / JOURNAL)
+        (staging / "journal.new").replace(staging / JOURNAL)
     except OSError as error:
         shutil.rmtree(folder if created else staging, ignore_errors=True)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
@@ -102,7 +103,7 @@ def recover(folder: Path) -> None:
             for source, path in journal["move"]:
                 if (staging / source).exists():  # else an earlier run has moved it
                     (folder / path).parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(staging / source, folder / path)
+                    (staging / source).replace(folder / path)
             for path in journal["remove"]:
                 (folder / path).unlink(missing_ok=True)
                 _remove_empty((folder / path).parent, folder)

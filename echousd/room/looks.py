@@ -34,7 +34,6 @@ PALETTES: Mapping[str, tuple[str, str, str, str, str, str, str]] = {
     "cherry": ("8f4f34", "a4623f", "c9b594", "f0e9de", "93443a", "c2a15f", "e4ddd0"),
     "birch": ("dcc39a", "cfd8d3", "c48f85", "f5f0ea", "d5a79c", "8e9498", "c9b8a6"),
 }
-GROUPS = ("wood", "front", "fabric", "linen", "blanket", "metal", "ceramic", "leaf", "shade", "screen", "soil", "cushion")
 
 
 def linear(hexadecimal: str) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""`layers/materials.usda`: the looks of the room, one material per style and material group, and where they are bound."""
+"""`layers/materials.usda`: the looks of the room, one per style and material group, and where they are bound."""
 
 from __future__ import annotations
 

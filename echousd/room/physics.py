@@ -12,7 +12,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.room.looks import kind_of
 
 GRAVITY = 9.81  # m/s²
-# Mass over the volume of the whole box (kg/m³): furniture is mostly hollow. A wardrobe of 1.6 x 2.2 x 0.6 m weighs about 150 kg.
+# Mass over the volume of the whole box, kg/m³: furniture is mostly hollow. A wardrobe of 1.6 x 2.2 x 0.6 m: 150 kg.
 BULK_DENSITY = {
     "bed": 55.0,
     "sofa": 50.0,

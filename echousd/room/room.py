@@ -51,7 +51,8 @@ class Verdict:
     def to_json(self) -> dict[str, Any]:
         """The entry of the manifest."""
         margin = None if self.margin is None else round(self.margin, 4)
-        return {"subject": self.subject, "predicate": self.predicate, "object": self.object, "state": self.state, "margin": margin}
+        triple = {"subject": self.subject, "predicate": self.predicate, "object": self.object}
+        return {**triple, "state": self.state, "margin": margin}
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,8 @@ class Room:
         """All objects in their places, in the room frame."""
         scene = trimesh.Scene()
         for number, name in enumerate(self.names):
-            scene.add_geometry(self.meshes[name], node_name=name, geom_name=self.assets[name], transform=self.pose(number))
+            asset = self.assets[name]
+            scene.add_geometry(self.meshes[name], node_name=name, geom_name=asset, transform=self.pose(number))
         return scene
 
     def save(self, folder: str | Path, *, force: bool = False, preview: bool = True) -> Path:
@@ -170,17 +172,16 @@ class Room:
 
         kept = sum(v.state == "kept" for v in self.verdicts)
         measured = sum(v.state != "unmeasured" for v in self.verdicts)
-        rows = "".join(
-            f"<tr><td>{node.name}</td><td>{node.category}</td><td>{' × '.join(f'{v:.2f}' for v in self.boxes.size[i].tolist())}</td>"
-            f"<td>{', '.join(f'{v:.2f}' for v in self.boxes.position[i].tolist())}</td></tr>"
-            for i, node in enumerate(self.graph.nodes)
-        )
+        size = [" × ".join(f"{v:.2f}" for v in row) for row in self.boxes.size.tolist()]
+        position = [", ".join(f"{v:.2f}" for v in row) for row in self.boxes.position.tolist()]
+        cells = [(n.name, n.category, s, p) for n, s, p in zip(self.graph.nodes, size, position, strict=True)]
+        rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in cells)
+        head = "".join(f"<th>{title}</th>" for title in ("object", "category", "size (m)", "position (m)"))
+        count = f"{len(self.names)} objects, {kept} of {measured} measured relations kept"
         png = self._repr_png_()
         picture = f'<img width="360" src="data:image/png;base64,{base64.b64encode(png).decode()}">' if png else ""
-        return (
-            f"<div><b>{self.name}</b>: {len(self.names)} objects, {kept} of {measured} measured relations kept<br>{picture}"
-            f"<table><tr><th>object</th><th>category</th><th>size (m)</th><th>position (m)</th></tr>{rows}</table></div>"
-        )
+        return f"<div><b>{self.name}</b>: {count}<br>{picture}<table><tr>{head}</tr>{rows}</table></div>"
 
     def __repr__(self) -> str:
-        return f"Room({self.name!r}, {len(self.names)} objects, {len(self.verdicts)} relations, seed {self.provenance.seed})"
+        count = f"{len(self.names)} objects, {len(self.verdicts)} relations"
+        return f"Room({self.name!r}, {count}, seed {self.provenance.seed})"

@@ -24,7 +24,9 @@ def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = 
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     for path in list(files):
         current = _read(folder / path)
-        if current is None or path not in recorded or folders.digest(current) in (recorded[path], folders.digest(files[path])):
+        if current is None or path not in recorded:
+            continue
+        if folders.digest(current) in (recorded[path], folders.digest(files[path])):
             continue
         if path == root:
             files[path] = _keep_root(folder / path, current, files[path])
@@ -85,7 +87,7 @@ def write_whole(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(content)
-        os.replace(temporary, path)
+        temporary.replace(path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise ValueError(f"{path}: cannot be written ({error.strerror or error}); nothing was changed") from None

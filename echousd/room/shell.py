@@ -12,7 +12,9 @@ MARGIN = 0.35  # metres of floor around the furniture where nobody said how larg
 THICKNESS = 0.1
 
 
-def floor_polygon(polygon: Sequence[Sequence[float]] | None, size: Sequence[float] | None, boxes: np.ndarray) -> np.ndarray:
+def floor_polygon(
+    polygon: Sequence[Sequence[float]] | None, size: Sequence[float] | None, boxes: np.ndarray
+) -> np.ndarray:
     """Corners of the floor, counter-clockwise seen from above (x to the right, z towards the viewer).
 
     Arguments:
@@ -25,7 +27,8 @@ def floor_polygon(polygon: Sequence[Sequence[float]] | None, size: Sequence[floa
     if polygon is not None and len(polygon):
         shape = shapely.Polygon(np.asarray(polygon, float))
         if not shape.is_valid or shape.area < 1e-4:
-            raise ValueError(f"floor polygon: {shapely.is_valid_reason(shape)}, area {shape.area:.4f} m²; need a simple polygon")
+            reason = f"{shapely.is_valid_reason(shape)}, area {shape.area:.4f} m²"
+            raise ValueError(f"floor polygon: {reason}; need a polygon that does not cross itself")
         corners = np.asarray(shape.exterior.coords)[:-1]
     else:
         if size is not None:

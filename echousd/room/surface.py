@@ -1,4 +1,4 @@
-"""Render-ready surfaces: a triangle mesh with creased normals, texture coordinates and material groups (numpy and trimesh)."""
+"""Surfaces ready to be shown: triangles with creased normals, texture coordinates and material groups."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ OF_COARSE = {
 
 
 def ade20k(category: str) -> str:
-    """The ADE20K class of a category of the vocabulary, of `floor` or of `wall`; raises `UnknownWord` for other words."""
+    """The ADE20K class of a category of the vocabulary, of `floor` or of `wall`; raises `UnknownWord`."""
     if category in OF_CATEGORY:
         return OF_CATEGORY[category]
     entry = vocabulary().category(category)

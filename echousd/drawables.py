@@ -1,0 +1,201 @@
+"""Visible meshes of a stage as numpy arrays with their materials: what pictures and other formats are made from."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pxr import Ar, Usd, UsdGeom, UsdShade
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A UsdPreviewSurface in short: linear colours, and the resolved path of the colour's texture ("" for none)."""
+
+    name: str = "grey"
+    color: tuple[float, float, float] = (0.55, 0.55, 0.55)
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    roughness: float = 0.8
+    metallic: float = 0.0
+    texture: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawable:
+    """One visible mesh.
+
+    Arguments:
+        path: prim path of the mesh.
+        component: name of the nearest prim above with a kind of component, else of the mesh.
+        category: nearest `SemanticsLabelsAPI:category` label, "" without one.
+        world: (4, 4) float, mesh to world, column vectors, y up, metres.
+        triangles, normals: (t, 3, 3) float corners and normals in the mesh's frame.
+        st: (t, 3, 2) float texture coordinates, or None.
+        paints: materials with the triangles that they colour; later entries win.
+    """
+
+    path: str
+    component: str
+    category: str
+    world: np.ndarray
+    triangles: np.ndarray
+    normals: np.ndarray
+    st: np.ndarray | None
+    paints: tuple[tuple[Paint, np.ndarray], ...]
+
+
+def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
+    """Every visible mesh of purpose default or render, instances included; Z-up and other units are converted."""
+    to_world = np.diag([UsdGeom.GetStageMetersPerUnit(stage)] * 3 + [1.0])
+    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+        to_world[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ to_world[:3]
+    cache = UsdGeom.XformCache()
+    known: dict[str, Paint] = {}
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        if prim.GetTypeName() != "Mesh" or not _visible(prim):
+            continue
+        mesh = UsdGeom.Mesh(prim)
+        part = _triangles(mesh)
+        if part is not None:
+            face, triangles, normals, st = part
+            world = to_world @ np.array(cache.GetLocalToWorldTransform(prim)).T
+            paints = tuple(_paints(mesh, face, known))
+            path, component, category = str(prim.GetPath()), _component(prim), _category(prim)
+            yield Drawable(path, component, category, world, triangles, normals, st, paints)
+
+
+def read_image(path: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of an image, from a folder or from inside a usdz; one grey pixel where there is none."""
+    from PIL import Image
+
+    asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
+    if not asset:
+        return np.full((1, 1, 3), 188, np.uint8)
+    return np.asarray(Image.open(io.BytesIO(bytes(asset.GetBuffer()))).convert("RGB"))
+
+
+def _visible(prim: Usd.Prim) -> bool:
+    imageable = UsdGeom.Imageable(prim)
+    purpose = imageable.ComputePurpose()
+    return purpose in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render) and imageable.ComputeVisibility() != "invisible"
+
+
+def _category(prim: Usd.Prim) -> str:
+    while prim and not prim.IsPseudoRoot():
+        values = prim.GetAttribute("semantics:labels:category")
+        if values and values.Get():
+            return str(values.Get()[0])
+        prim = prim.GetParent()
+    return ""
+
+
+def _component(prim: Usd.Prim) -> str:
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if Usd.ModelAPI(above).GetKind() == "component":
+            return above.GetName()
+        above = above.GetParent()
+    return prim.GetName()
+
+
+def _triangles(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None] | None:
+    """Fan triangles of a mesh: the face that each came from, corners, corner normals, st."""
+    points = np.asarray(mesh.GetPointsAttr().Get() or [], np.float64).reshape(-1, 3)
+    counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
+    index = np.asarray(mesh.GetFaceVertexIndicesAttr().Get() or [], np.int64)
+    if not len(points) or not len(counts) or counts.sum() != len(index) or index.max(initial=0) >= len(points):
+        return None
+    first = np.cumsum(counts) - counts
+    fans = np.clip(counts - 2, 0, None)
+    face = np.repeat(np.arange(len(counts)), fans)
+    step = np.arange(len(face)) - np.repeat(np.cumsum(fans) - fans, fans)
+    corner = np.stack([first[face], first[face] + step + 1, first[face] + step + 2], 1)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        corner = corner[:, ::-1]
+    triangles = points[index[corner]]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
+    normals = np.repeat(flat[:, None], 3, axis=1)
+    authored = _corner_values(mesh, "normals", 3, index, len(points), face, corner)
+    if authored is not None:
+        length = np.linalg.norm(authored, axis=-1, keepdims=True)
+        normals = np.where(length > 1e-9, authored / np.maximum(length, 1e-9), normals)
+    return face, triangles, normals, _corner_values(mesh, "st", 2, index, len(points), face, corner)
+
+
+def _corner_values(
+    mesh: UsdGeom.Mesh, name: str, width: int, index: np.ndarray, points: int, face: np.ndarray, corner: np.ndarray
+) -> np.ndarray | None:
+    """(t, 3, width) values of a primvar (or of the `normals` attribute) at the corners, or None."""
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name)
+    if primvar and primvar.HasValue():
+        values, interpolation = primvar.ComputeFlattened(), primvar.GetInterpolation()
+    elif name == "normals" and mesh.GetNormalsAttr().HasAuthoredValue():
+        values, interpolation = mesh.GetNormalsAttr().Get(), mesh.GetNormalsInterpolation()
+    else:
+        return None
+    table = np.asarray(values, np.float64).reshape(-1, width)
+    if interpolation == UsdGeom.Tokens.faceVarying and len(table) == len(index):
+        return table[corner]
+    if interpolation in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying) and len(table) == points:
+        return table[index[corner]]
+    if interpolation == UsdGeom.Tokens.uniform and len(table) > face.max(initial=0):
+        return np.repeat(table[face][:, None], 3, axis=1)
+    return None
+
+
+def _paints(mesh: UsdGeom.Mesh, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
+    """Materials of a mesh with the triangles that they colour."""
+    paints = [(_bound(mesh.GetPrim(), known), np.arange(len(face)))]
+    for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
+        chosen = np.zeros(int(face.max(initial=0)) + 1, bool)
+        inside = np.asarray(subset.GetIndicesAttr().Get() or [], int)
+        chosen[inside[(inside >= 0) & (inside < len(chosen))]] = True
+        paints.append((_bound(subset.GetPrim(), known), np.flatnonzero(chosen[face])))
+    return paints
+
+
+def _bound(prim: Usd.Prim, known: dict[str, Paint]) -> Paint:
+    material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+    if not material:
+        shown = UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() if prim.IsA(UsdGeom.Gprim) else None
+        return Paint("displayColor", _rgb(shown[0])) if shown else Paint()
+    path = str(material.GetPath())
+    if path not in known:
+        known[path] = _surface(material)
+    return known[path]
+
+
+def _surface(material: UsdShade.Material) -> Paint:
+    shader, _, _ = material.ComputeSurfaceSource()
+    if not shader:
+        return Paint()
+    values: dict[str, Any] = {}
+    texture = ""
+    for name in ("diffuseColor", "emissiveColor", "roughness", "metallic"):
+        source = shader.GetInput(name)
+        if not source:
+            continue
+        connected = source.GetConnectedSources()[0] if source.HasConnectedSource() else []
+        if connected and name == "diffuseColor":
+            image = UsdShade.Shader(connected[0].source.GetPrim())
+            file = image.GetInput("file").Get() if image.GetInput("file") else None
+            texture = str(file.resolvedPath) if file else ""
+        elif not connected and source.Get() is not None:
+            values[name] = source.Get()
+    return Paint(
+        material.GetPrim().GetName(),
+        _rgb(values.get("diffuseColor", (0.18, 0.18, 0.18))),
+        _rgb(values.get("emissiveColor", (0.0, 0.0, 0.0))),
+        float(values.get("roughness", 0.5)),
+        float(values.get("metallic", 0.0)),
+        texture,
+    )
+
+
+def _rgb(value: Any) -> tuple[float, float, float]:
+    red, green, blue = (float(c) for c in value)
+    return red, green, blue
