@@ -13,13 +13,15 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
+from echomodel.compact.autoencoder import Autoencoder
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
+from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig, from_dict, to_json
 from echomodel.vocabulary import vocabulary
 
 FORMAT = "echousd-compact-1"
-_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser}
+_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser}
 PARTS = tuple(_MADE)
 
 
@@ -45,6 +47,8 @@ class CompactModel(nn.Module):
 
     latent: LatentGraph
     layout: LayoutDenoiser
+    autoencoder: Autoencoder
+    shape: ShapeDenoiser
 
     def part_tensors(self, part: str) -> dict[str, Tensor]:
         """State of one part, keys with the part's name in front."""

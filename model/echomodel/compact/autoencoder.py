@@ -1,0 +1,110 @@
+"""Autoencoder of truncated signed distances: a PCA of 4^3 patches, refined by convolutions over the latent grid."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+from echomodel.config import CompactConfig
+
+GRID = 64
+
+
+class Autoencoder(nn.Module):
+    """Grids (N, 64, 64, 64) in [-1, 1] <-> latents (N, C, G, G, G), G = 64 / patch.
+
+    Encoder and decoder are the linear maps of a PCA of patches plus residual convolutions on the latent grid, so that
+    an untrained decoder after `initialise` is the PCA. The latent is continuous, or rounded to `levels` values per
+    channel (finite scalar quantisation, Mentzer et al. 2023) with straight-through gradients.
+    """
+
+    def __init__(self, config: CompactConfig) -> None:
+        super().__init__()
+        settings = config.autoencoder
+        self.patch, self.levels, self.channels = settings.patch, settings.levels, settings.channels
+        voxels = self.patch**3
+        self.encode_patch = nn.Linear(voxels, settings.channels)
+        self.decode_patch = nn.Linear(settings.channels, voxels)
+        self.analysis = _Refiner(voxels, settings.width, settings.channels, 1)
+        self.synthesis = _Refiner(settings.channels, settings.width, voxels, settings.blocks)
+
+    @property
+    def cells(self) -> int:
+        """Cells of the latent grid along a side."""
+        return GRID // self.patch
+
+    @torch.no_grad()
+    def initialise(self, grids: Tensor) -> None:
+        """Set the linear maps to the PCA of the grids' patches (M, 64, 64, 64), scaled so that latents have unit power."""
+        patches = to_patches(grids, self.patch).flatten(2).transpose(1, 2).reshape(-1, self.patch**3).double()
+        mean = patches.mean(0)
+        centred = patches - mean
+        values, vectors = torch.linalg.eigh(centred.T @ centred / len(centred))
+        basis = vectors[:, -self.channels :].flip(1)
+        scale = values[-self.channels :].mean().sqrt()
+        self.encode_patch.weight.copy_((basis / scale).T)
+        self.encode_patch.bias.copy_(-(mean @ basis) / scale)
+        self.decode_patch.weight.copy_(basis * scale)
+        self.decode_patch.bias.copy_(mean)
+
+    def encode(self, grids: Tensor) -> Tensor:
+        """Latents of grids: (N, X, Y, Z) -> (N, C, X/p, Y/p, Z/p); any multiples of the patch."""
+        patches = to_patches(grids, self.patch)
+        latent = _per_cell(self.encode_patch, patches) + self.analysis(patches)
+        return self.quantise(latent)
+
+    def decode(self, latent: Tensor) -> Tensor:
+        """Grids of latents: (N, C, G, G, G) -> (N, 64, 64, 64) in [-1, 1]."""
+        latent = self.quantise(latent)
+        return from_patches(_per_cell(self.decode_patch, latent) + self.synthesis(latent), self.patch).clamp(-1, 1)
+
+    def quantise(self, latent: Tensor) -> Tensor:
+        """The latent itself, or rounded to `levels` values in [-2, 2] per channel."""
+        if not self.levels:
+            return latent
+        step = 4 / (self.levels - 1)
+        bounded = 2 * torch.tanh(latent / 2)
+        return bounded + ((bounded / step).round() * step - bounded).detach()
+
+    def forward(self, grids: Tensor, noise: Tensor | float = 0.0) -> Tensor:
+        """Reconstruction of grids, with noise added to the latent in between."""
+        return self.decode(self.encode(grids) + noise)
+
+
+class _Refiner(nn.Module):
+    """Residual convolutions on the latent grid; the last map starts at zero."""
+
+    def __init__(self, inputs: int, width: int, outputs: int, blocks: int) -> None:
+        super().__init__()
+        self.enter = nn.Conv3d(inputs, width, 3 if inputs <= width // 2 else 1, padding="same")
+        self.blocks = nn.ModuleList(
+            nn.Sequential(nn.SiLU(), nn.Conv3d(width, width, 3, padding=1), nn.SiLU(), nn.Conv3d(width, width, 3, padding=1))
+            for _ in range(blocks)
+        )
+        self.leave = nn.Conv3d(width, outputs, 1)
+        nn.init.zeros_(self.leave.weight)
+        nn.init.zeros_(self.leave.bias)
+
+    def forward(self, x: Tensor) -> Tensor:
+        x = self.enter(x)
+        for block in self.blocks:
+            x = x + block(x)
+        return self.leave(nn.functional.silu(x))
+
+
+def to_patches(grids: Tensor, patch: int) -> Tensor:
+    """Cut grids into cubes of `patch` voxels a side: (N, X, Y, Z) -> (N, patch^3, X/p, Y/p, Z/p)."""
+    n, x, y, z = grids.shape
+    cut = grids.reshape(n, x // patch, patch, y // patch, patch, z // patch, patch)
+    return cut.permute(0, 2, 4, 6, 1, 3, 5).reshape(n, patch**3, x // patch, y // patch, z // patch)
+
+
+def from_patches(patches: Tensor, patch: int) -> Tensor:
+    """The inverse of `to_patches`."""
+    n, _, x, y, z = patches.shape
+    cut = patches.reshape(n, patch, patch, patch, x, y, z).permute(0, 4, 1, 5, 2, 6, 3)
+    return cut.reshape(n, x * patch, y * patch, z * patch)
+
+
+def _per_cell(linear: nn.Linear, x: Tensor) -> Tensor:
+    return nn.functional.conv3d(x, linear.weight[:, :, None, None, None], linear.bias)
