@@ -1,0 +1,5 @@
+"""Rooms to learn from: floors, functional groups and lamps, drawn so that they look like real ones in numbers."""
+
+from echomodel.data.rooms.generator import generate_room, generate_rooms
+
+__all__ = ["generate_room", "generate_rooms"]

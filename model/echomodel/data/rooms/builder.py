@@ -1,0 +1,210 @@
+"""A room under construction: boxes placed so far, and where the next one may stand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from echomodel.data.furniture.sizes import sample_size
+from echomodel.data.rooms.floor import Floor, Wall
+
+TALL = 1.25  # metres; taller things do not stand before windows
+HALF_PI = math.pi / 2
+Size = tuple[float, float, float]
+
+
+@dataclass(slots=True)
+class Item:
+    """One box: position of its bottom centre, half extents of its axis-aligned hull in plan, and its style."""
+
+    category: str
+    size: Size
+    x: float
+    y: float
+    z: float
+    yaw: float
+    style: int = -1
+    hull_x: float = 0.0
+    hull_z: float = 0.0
+
+    def __post_init__(self) -> None:
+        c, s = abs(math.cos(self.yaw)), abs(math.sin(self.yaw))
+        self.hull_x = (c * self.size[0] + s * self.size[2]) / 2
+        self.hull_z = (s * self.size[0] + c * self.size[2]) / 2
+
+    @property
+    def turned(self) -> bool:
+        """Whether the item stands askew to the axes."""
+        return min(abs(math.cos(self.yaw)), abs(math.sin(self.yaw))) > 0.03
+
+    def local(self, lateral: float, forward: float) -> tuple[float, float]:
+        """The point `lateral` metres to its +x side and `forward` metres before it."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return self.x + c * lateral + s * forward, self.z - s * lateral + c * forward
+
+
+class Builder:
+    """Places boxes on a floor. Methods return what they placed, or None where nothing fits.
+
+    Arguments:
+        floor: the empty room.
+        rng: source of every draw.
+        styles: number of style groups of the shape set that the rooms refer to.
+    """
+
+    def __init__(self, floor: Floor, rng: np.random.Generator, styles: int) -> None:
+        self.floor = floor
+        self.rng = rng
+        self.styles = styles
+        self.room_style = int(rng.integers(styles))
+        self.items: list[Item] = []
+        self.wanted: dict[str, int] = {}
+
+    # -- draws ---------------------------------------------------------------------------------------------------
+
+    def chance(self, share: float) -> bool:
+        return self.rng.random() < share
+
+    def uniform(self, low: float, high: float) -> float:
+        return low + (high - low) * self.rng.random()
+
+    def pick(self, options: list, weights: list[float]):
+        """One of the options by weight."""
+        mark = self.rng.random() * sum(weights)
+        for option, weight in zip(options, weights, strict=True):
+            mark -= weight
+            if mark < 0:
+                return option
+        return options[-1]
+
+    def size(self, category: str) -> Size:
+        x, y, z = sample_size(category, self.rng).tolist()
+        return x, y, z
+
+    def style(self) -> int:
+        """The style of a group of furniture: mostly that of the room."""
+        return self.room_style if self.rng.random() < 0.65 else int(self.rng.integers(self.styles))
+
+    def take(self, category: str) -> int:
+        """How many of a category are wanted; they count as handled from now on."""
+        return self.wanted.pop(category, 0)
+
+    # -- collisions ----------------------------------------------------------------------------------------------
+
+    def free(self, item: Item, play: float = 0.02, ignore: tuple[Item, ...] = (), doors: bool = True) -> bool:
+        """Whether an item stands on the floor, clear of doors and of what is there (up to `play` metres)."""
+        x0, x1, z0, z1 = item.x - item.hull_x, item.x + item.hull_x, item.z - item.hull_z, item.z + item.hull_z
+        if not self.floor.holds(x0, z0, x1, z1):
+            return False
+        if doors and any(x0 < d[2] and x1 > d[0] and z0 < d[3] and z1 > d[1] for d in self.floor.doors):
+            return False
+        if item.size[1] > TALL and any(
+            x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1] for w in self.floor.windows
+        ):
+            return False
+        return not any(overlaps(item, other, play) for other in self.items if other not in ignore)
+
+    def add(self, item: Item, style: int) -> Item:
+        item.style = style
+        self.items.append(item)
+        return item
+
+    def put(
+        self, category: str, size: Size, x: float, z: float, yaw: float, style: int,
+        *, play: float = 0.02, ignore: tuple[Item, ...] = (), doors: bool = True,
+    ) -> Item | None:  # fmt: skip
+        """Place one item at a given spot, if it is free."""
+        item = Item(category, size, x, 0.0, z, yaw)
+        return self.add(item, style) if self.free(item, play, ignore, doors) else None
+
+    def beside(
+        self, anchor: Item, category: str, size: Size, lateral: float, forward: float, turn: float, style: int,
+        *, play: float = 0.02, ignore: tuple[Item, ...] = (), doors: bool = True,
+    ) -> Item | None:  # fmt: skip
+        """Place one item in the frame of another."""
+        x, z = anchor.local(lateral, forward)
+        return self.put(category, size, x, z, anchor.yaw + turn, style, play=play, ignore=ignore, doors=doors)
+
+    def wall_spot(self, width: float, corner: float) -> tuple[Wall, float] | None:
+        """A wall that is long enough and the place along it of something `width` wide.
+
+        Arguments:
+            width: metres.
+            corner: share of the draws that go into a corner.
+        """
+        fits = [wall for wall in self.floor.walls if wall.length >= width - 0.02]
+        if not fits:
+            return None
+        wall = self.pick(fits, [w.length for w in fits])
+        free = max(wall.length - width, 0.0)
+        if self.rng.random() < corner:
+            along = min(abs(self.rng.normal(0.0, 0.06)), free)
+            along = along if self.rng.random() < 0.5 else free - along
+        else:
+            along = free * self.rng.random()
+        return wall, along + width / 2
+
+    def against_wall(
+        self, category: str, *, size: Size | None = None, corner: float = 0.3, gap: float | None = None,
+        style: int | None = None, tries: int = 12, yaw: float | None = None,
+    ) -> Item | None:  # fmt: skip
+        """Place one item with its back to a wall; `yaw` asks for walls of that direction only."""
+        size = size or self.size(category)
+        style = self.style() if style is None else style
+        for _ in range(tries):
+            spot = self.wall_spot(size[0], corner)
+            if spot is None:
+                return None
+            wall, along = spot
+            if yaw is not None and math.cos(wall.yaw - yaw) < 0.9:
+                continue
+            away = (self.wall_gap() if gap is None else gap) + size[2] / 2
+            x, z = wall.point(along, away)
+            placed = self.put(category, size, x, z, wall.yaw, style)
+            if placed:
+                return placed
+        return None
+
+    def wall_gap(self) -> float:
+        """Gap between a back and its wall: a few centimetres, sometimes a hand's breadth."""
+        return abs(self.rng.normal(0.03, 0.025)) if self.rng.random() < 0.9 else self.uniform(0.08, 0.4)
+
+    def somewhere(
+        self, category: str, *, size: Size | None = None, yaw: float | None = None, style: int | None = None,
+        tries: int = 12, clearance: float = 0.1,
+    ) -> Item | None:  # fmt: skip
+        """Place one item on open floor."""
+        size = size or self.size(category)
+        style = self.style() if style is None else style
+        for _ in range(tries):
+            x = self.uniform(-self.floor.half_x, self.floor.half_x)
+            z = self.uniform(-self.floor.half_z, self.floor.half_z)
+            turn = yaw if yaw is not None else self.pick([0.0, HALF_PI, math.pi, -HALF_PI], [1, 1, 1, 1])
+            placed = self.put(category, size, x, z, turn, style, play=-clearance)
+            if placed:
+                return placed
+        return None
+
+
+def overlaps(a: Item, b: Item, play: float) -> bool:
+    """Whether two items run into each other by more than `play` metres (in plan and in height)."""
+    if a.y >= b.y + b.size[1] or b.y >= a.y + a.size[1]:
+        return False
+    if abs(a.x - b.x) >= a.hull_x + b.hull_x - play or abs(a.z - b.z) >= a.hull_z + b.hull_z - play:
+        return False
+    return not (a.turned or b.turned) or not (_separated(a, b, play) or _separated(b, a, play))
+
+
+def _separated(a: Item, b: Item, play: float) -> bool:
+    """Whether an edge of `a` parts the two (separating axes of a)."""
+    c, s = math.cos(a.yaw), math.sin(a.yaw)
+    turn_c, turn_s = abs(math.cos(b.yaw - a.yaw)), abs(math.sin(b.yaw - a.yaw))
+    dx, dz = b.x - a.x, b.z - a.z
+    lateral, forward = abs(c * dx - s * dz), abs(s * dx + c * dz)
+    half_x, half_z = b.size[0] / 2, b.size[2] / 2
+    return (
+        lateral >= a.size[0] / 2 + turn_c * half_x + turn_s * half_z - play
+        or forward >= a.size[2] / 2 + turn_s * half_x + turn_c * half_z - play
+    )

@@ -1,0 +1,177 @@
+"""Floors: a rectangle with corners cut away, its walls, doors and windows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from echomodel.data.rooms.statistics import RoomTypeStatistics, quantile
+
+Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
+DOOR_DEPTH = 0.75
+CORRIDOR = 1.0  # what a cut must leave of a side
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A straight wall: start (x, z), unit direction, length, and the yaw of something that stands with its back to it.
+
+    The inward normal is (sin yaw, cos yaw).
+    """
+
+    x: float
+    z: float
+    dx: float
+    dz: float
+    length: float
+    yaw: float
+
+    def point(self, along: float, away: float) -> tuple[float, float]:
+        """The point `along` metres from the start and `away` metres into the room."""
+        return (
+            self.x + self.dx * along + math.sin(self.yaw) * away,
+            self.z + self.dz * along + math.cos(self.yaw) * away,
+        )
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Half extents of the bounding rectangle (centred at the origin), the corners cut away, walls and openings.
+
+    Arguments:
+        half_x, half_z: metres.
+        cuts: rectangles outside the room.
+        walls: the sides of the polygon.
+        doors: rectangles that must stay free.
+        windows: rectangles before which nothing tall may stand.
+        height: metres.
+    """
+
+    half_x: float
+    half_z: float
+    polygon: tuple[tuple[float, float], ...]
+    height: float
+    cuts: tuple[Rectangle, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    doors: tuple[Rectangle, ...] = ()
+    windows: tuple[Rectangle, ...] = ()
+    area: float = field(default=0.0)
+
+    def holds(self, x0: float, z0: float, x1: float, z1: float, play: float = 0.04) -> bool:
+        """Whether a rectangle lies on the floor, up to `play` metres."""
+        if x0 < -self.half_x - play or x1 > self.half_x + play or z0 < -self.half_z - play or z1 > self.half_z + play:
+            return False
+        return not any(
+            x0 < c[2] - play and x1 > c[0] + play and z0 < c[3] - play and z1 > c[1] + play for c in self.cuts
+        )
+
+    def opposite(self, wall: Wall, along: float) -> tuple[float, Wall | None]:
+        """Distance from a point of a wall straight across the room, and the wall that is met there."""
+        x, z = wall.point(along, 0.0)
+        nx, nz = math.sin(wall.yaw), math.cos(wall.yaw)
+        best, met = math.inf, None
+        for other in self.walls:
+            if math.cos(other.yaw - wall.yaw) > -0.5:
+                continue
+            distance = (other.x - x) * nx + (other.z - z) * nz
+            reach = (x - other.x) * other.dx + (z - other.z) * other.dz
+            if 0.1 < distance < best and -1e-6 <= reach <= other.length + 1e-6:
+                best, met = distance, other
+        return best, met
+
+
+def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Floor:
+    """Draw the floor of a room of the given kind: extents, cut corners, height, one or two doors, a window."""
+    z = rng.standard_normal(2)
+    short = quantile(statistics.short, z[0])
+    long = max(quantile(statistics.long, 0.55 * z[0] + 0.84 * z[1]), short)
+    short, long = round(short / 2, 2), round(long / 2, 2)
+    half_x, half_z = (long, short) if rng.random() < 0.45 else (short, long)
+    sizes: list[tuple[float, float]] = [(0.0, 0.0)] * 4
+    if rng.random() >= statistics.rectangular:
+        sizes = _cuts(half_x, half_z, statistics.cuts, rng)
+    polygon = _trace(half_x, half_z, sizes)
+    cuts = tuple(_cut(half_x, half_z, sx, sz, *size) for (sx, sz), size in zip(CORNERS, sizes, strict=True) if size[0])
+    walls = _walls(polygon)
+    area = 4 * half_x * half_z - sum(w * d for w, d in sizes)
+    height = float(np.round(quantile(statistics.height, rng.standard_normal()), 2))
+    doors = [_opening(walls, rng.uniform(0.8, 1.0), DOOR_DEPTH, rng) for _ in range(1 + (area > 18) + (area > 30))]
+    windows = [_opening(walls, rng.uniform(1.0, 2.0), 0.35, rng) for _ in range(1 + (area > 25))]
+    return Floor(
+        half_x, half_z, polygon, height, cuts, walls,
+        tuple(d for d in doors if d), tuple(w for w in windows if w), area,
+    )  # fmt: skip
+
+
+CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+
+
+def _cuts(half_x: float, half_z: float, counts: tuple[float, ...], rng: np.random.Generator) -> list:
+    """Width and depth of the piece cut from each corner, (0, 0) where none is."""
+    sizes = [(0.0, 0.0)] * 4
+    number = 1 + int(np.searchsorted(np.cumsum(counts), rng.random()))
+    for corner in rng.permutation(4)[:number]:
+        sx, sz = CORNERS[corner]
+        along_x = next(i for i, c in enumerate(CORNERS) if c == (-sx, sz))
+        along_z = next(i for i, c in enumerate(CORNERS) if c == (sx, -sz))
+        room_x = 2 * half_x - sizes[along_x][0] - CORRIDOR
+        room_z = 2 * half_z - sizes[along_z][1] - CORRIDOR
+        if rng.random() < 0.3:
+            width, depth = rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.6)
+        else:
+            width, depth = 2 * half_x * rng.uniform(0.15, 0.65), 2 * half_z * rng.uniform(0.12, 0.55)
+        opposite = sizes[(corner + 2) % 4]
+        overlap = width + opposite[0] > 2 * half_x - CORRIDOR and depth + opposite[1] > 2 * half_z - CORRIDOR
+        if width < room_x and depth < room_z and not overlap:
+            sizes[corner] = (round(width, 2), round(depth, 2))
+    return sizes
+
+
+def _cut(half_x: float, half_z: float, sx: int, sz: int, width: float, depth: float) -> Rectangle:
+    x = sorted((sx * half_x, sx * (half_x - width)))
+    z = sorted((sz * half_z, sz * (half_z - depth)))
+    # What is cut away reaches outwards, so that furniture cannot slip through a thin gap behind it.
+    return (x[0] - (sx < 0), z[0] - (sz < 0), x[1] + (sx > 0), z[1] + (sz > 0))
+
+
+def _trace(half_x: float, half_z: float, sizes: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """The polygon, corner by corner in one turn."""
+    points: list[tuple[float, float]] = []
+    for (sx, sz), (width, depth) in zip(CORNERS, sizes, strict=True):
+        if not width:
+            points.append((sx * half_x, sz * half_z))
+            continue
+        step = [
+            (sx * (half_x - width), sz * half_z),
+            (sx * (half_x - width), sz * (half_z - depth)),
+            (sx * half_x, sz * (half_z - depth)),
+        ]
+        points.extend(step if sx == -sz else step[::-1])
+    return tuple(points)
+
+
+def _walls(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
+    walls = []
+    for (x0, z0), (x1, z1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+        length = math.hypot(x1 - x0, z1 - z0)
+        if length < 1e-6:
+            continue
+        dx, dz = (x1 - x0) / length, (z1 - z0) / length
+        walls.append(Wall(x0, z0, dx, dz, length, math.atan2(-dz, dx)))  # inside is where the turn goes
+    return tuple(walls)
+
+
+def _opening(walls: tuple[Wall, ...], width: float, depth: float, rng: np.random.Generator) -> Rectangle | None:
+    """The rectangle before a door or window at a random place, or None where no wall is long enough."""
+    fits = [wall for wall in walls if wall.length > width + 0.1]
+    if not fits:
+        return None
+    weights = np.cumsum([wall.length for wall in fits])
+    wall = fits[int(np.searchsorted(weights, rng.random() * weights[-1]))]
+    free = wall.length - width
+    # Doors and windows like the end of a wall.
+    start = free * rng.random() if rng.random() < 0.4 else (0.08 if rng.random() < 0.5 else free - 0.08)
+    a, b = wall.point(start, 0.0), wall.point(start + width, depth)
+    return (min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))

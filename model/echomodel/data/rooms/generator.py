@@ -1,0 +1,89 @@
+"""The generator of rooms: a floor, what it holds, and where everything stands, as `RoomBoxes`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from echomodel.data.rooms.builder import Builder
+from echomodel.data.rooms.floor import sample_floor
+from echomodel.data.rooms.recipes import furnish, wanted
+from echomodel.data.rooms.statistics import room_type_statistics
+from echomodel.roomboxes import RoomBoxes
+
+# Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
+MIX = {"bedroom": 0.40, "living_dining_room": 0.27, "living_room": 0.14, "dining_room": 0.11, "study": 0.08}
+STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
+
+
+def generate_room(
+    rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room"
+) -> RoomBoxes:
+    """Draw one room.
+
+    Arguments:
+        rng: source of every draw; the room is a function of its state.
+        room_type: word of the vocabulary, or None to draw one from `MIX`.
+        styles: number of style groups; objects refer to shape `s<style>_<category>`.
+        name: the room's id.
+
+    Returns:
+        The room with its floor's bounding box centred at the origin, metres and radians.
+
+    Raises:
+        ValueError: a room type that the statistics do not hold.
+    """
+    if room_type is None:
+        room_type = list(MIX)[int(np.searchsorted(np.cumsum(list(MIX.values())), rng.random() * 0.999999))]
+    statistics = room_type_statistics(room_type)
+    while True:
+        builder = Builder(sample_floor(statistics, rng), rng, styles)
+        builder.wanted = wanted(statistics, builder.floor.area, rng)
+        furnish(builder, room_type)
+        if len(builder.items) > 1:
+            return _boxes(builder, name, room_type)
+
+
+def generate_rooms(
+    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0
+) -> list[RoomBoxes]:
+    """Draw `count` rooms; room number i depends on (seed, i) alone, so that sets can be made in pieces."""
+    return list(iterate_rooms(count, seed, room_type=room_type, styles=styles, start=start))
+
+
+def iterate_rooms(
+    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0
+) -> Iterator[RoomBoxes]:
+    """`generate_rooms` one by one."""
+    for number in range(start, start + count):
+        rng = np.random.Generator(np.random.PCG64([seed, number]))
+        yield generate_room(rng, room_type, styles=styles, name=f"room_{seed}_{number:06d}")
+
+
+def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
+    items = builder.items
+    order = builder.rng.permutation(len(items))
+    mirror = -1.0 if builder.rng.random() < 0.5 else 1.0
+    turn = -1.0 if builder.rng.random() < 0.5 else 1.0
+
+    def turned(points: np.ndarray) -> np.ndarray:
+        """Mirrored and turned by half a turn at random (quarter turns come with the floor's extents)."""
+        return points * [mirror * turn, turn]
+
+    chosen = [items[k] for k in order]
+    plan = turned(np.array([(item.x, item.z) for item in chosen]))
+    yaw = mirror * np.array([item.yaw for item in chosen]) + (math.pi if turn < 0 else 0.0)
+    return RoomBoxes(
+        id=name,
+        room_type=room_type,
+        floor_polygon=turned(np.array(builder.floor.polygon)),
+        height=builder.floor.height,
+        categories=tuple(item.category for item in chosen),
+        size=np.array([item.size for item in chosen]),
+        position=np.stack([plan[:, 0], [item.y for item in chosen], plan[:, 1]], -1),
+        yaw=(yaw + math.pi) % (2 * math.pi) - math.pi,
+        models=tuple(f"s{item.style}_{item.category}" for item in chosen),
+        styles=tuple(item.style for item in chosen),
+    )

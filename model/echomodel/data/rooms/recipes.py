@@ -1,0 +1,233 @@
+"""Recipes: what a room of each kind holds and in which order it is furnished."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echomodel.data.rooms.builder import HALF_PI, Builder, Item
+from echomodel.data.rooms.groups import BEDS, SOFAS, bed_group, desk_group, dining_group, sofa_group, television
+from echomodel.data.rooms.lamps import ceiling_lamps, on_top
+from echomodel.data.rooms.statistics import RoomTypeStatistics
+
+# Classes that the statistics do not show appear in place of a similar one with this probability.
+SUBSTITUTES = {
+    "double_bed": (("single_bed", 0.06),),
+    "multi_seat_sofa": (("sofa", 0.08), ("chaise_longue_sofa", 0.03)),
+    "loveseat_sofa": (("lazy_sofa", 0.2),),
+    "lounge_chair": (("lazy_sofa", 0.06),),
+    "side_table": (("corner_side_table", 0.1), ("round_end_table", 0.12)),
+    "sideboard": (("console_table", 0.12), ("wine_cabinet", 0.1)),
+    "cabinet": (("children_cabinet", 0.12), ("wine_cabinet", 0.1)),
+    "desk": (("table", 0.12),),
+    "dining_chair": (("chinese_chair", 0.04),),
+    "stool": (("dressing_chair", 0.3),),
+}
+# Seldom seen things that the default graphs still ask for.
+EXTRAS = {"table_lamp": 0.05, "tv": 0.04, "wall_lamp": 0.03, "bench": 0.04}
+# Of these a room holds one kind.
+EXCLUSIVE = (BEDS, ("pendant_lamp", "ceiling_lamp"))
+STORAGE = (
+    "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
+    "children_cabinet",
+)  # fmt: skip
+SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
+DESK_SEATS = ("office_chair", "dining_chair", "chair", "dressing_chair", "stool", "lounge_chair")
+
+
+def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator) -> dict[str, int]:
+    """Draw how many of each category a room asks for; larger rooms ask for more."""
+    middle = math.log(statistics.area[2])
+    spread = (math.log(statistics.area[4]) - math.log(statistics.area[0])) / 3.29
+    lean = math.exp(0.45 * min(max((math.log(area) - middle) / spread, -2.0), 2.0))
+    want: dict[str, int] = {}
+    for category, (share, counts, cumulative) in statistics.presence.items():
+        share = min(share * ABUNDANCE.get((statistics.name, category), 1.05), 0.995)
+        if share < 0.75:
+            odds = share / (1 - share) * lean
+            share = odds / (1 + odds)
+        if rng.random() < share:
+            want[category] = counts[int(np.searchsorted(cumulative, rng.random()))]
+    for group in EXCLUSIVE:
+        held = [category for category in group if category in want]
+        keep = 0.12 if group[0] == "pendant_lamp" else 0.0
+        if len(held) > 1 and rng.random() >= keep:
+            weights = np.array([statistics.presence[category][0] for category in held])
+            chosen = held[int(np.searchsorted(np.cumsum(weights / weights.sum()), rng.random()))]
+            for category in held:
+                if category != chosen:
+                    del want[category]
+    for category, others in SUBSTITUTES.items():
+        for other, share in others:
+            if category in want and rng.random() < share:
+                want[other] = want.get(other, 0) + want.pop(category)
+    for category, share in EXTRAS.items():
+        if rng.random() < share:
+            want[category] = 1 + int(rng.random() < 0.4)
+    return want
+
+
+# Corrections for what does not always find a place (shares asked for / shares wished).
+ABUNDANCE: dict[tuple[str, str], float] = {}
+
+
+def furnish(room: Builder, name: str) -> None:
+    """Furnish an empty room of one type of the vocabulary."""
+    {
+        "bedroom": _bedroom,
+        "living_room": _living_room,
+        "dining_room": _dining_room,
+        "living_dining_room": _living_dining_room,
+        "study": _study,
+    }[name](room)
+
+
+def _bedroom(room: Builder) -> None:
+    beds = [bed for category in BEDS if room.take(category) and (bed := bed_group(room, category))]
+    if beds and room.take("tv_stand"):
+        television(room, beds[0])
+    _wardrobe(room, beds[0] if beds else None)
+    if room.take("dressing_table"):
+        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair", "dining_chair", "ottoman"))
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, list(beds))
+
+
+def _wardrobe(room: Builder, bed: Item | None) -> None:
+    """Wardrobes along the side walls of the bed."""
+    for _ in range(room.take("wardrobe")):
+        placed = None
+        size, style = room.size("wardrobe"), room.style()
+        if bed is not None and room.chance(0.85):
+            turn = bed.yaw + room.pick([HALF_PI, -HALF_PI], [1, 1])
+            for yaw in (turn, turn + math.pi):
+                placed = placed or room.against_wall("wardrobe", size=size, style=style, corner=0.5, yaw=yaw)
+        if placed is None:
+            room.against_wall("wardrobe", size=size, style=style, corner=0.5, tries=16)
+
+
+def _living_room(room: Builder) -> None:
+    sofa = _sofas(room)
+    if room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
+        dining_group(room)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, _anchors(room, sofa))
+
+
+def _dining_room(room: Builder) -> None:
+    tables = [dining_group(room, central=True) for _ in range(room.take("dining_table"))]
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, [table for table in tables if table])
+
+
+def _living_dining_room(room: Builder) -> None:
+    tables = room.take("dining_table")
+    sofa = _sofas(room)
+    for _ in range(tables):
+        dining_group(room)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, _anchors(room, sofa))
+
+
+def _study(room: Builder) -> None:
+    beds = [bed for category in BEDS if room.take(category) and (bed := bed_group(room, category))]
+    if not beds and not room.wanted.get("desk"):
+        room.wanted["desk"] = 1
+    if room.wanted.get("desk") and not any(room.wanted.get(seat) for seat in DESK_SEATS) and room.chance(0.5):
+        room.wanted["office_chair"] = 1
+    _desks(room)
+    _wardrobe(room, beds[0] if beds else None)
+    _rest(room)
+    ceiling_lamps(room, [item for item in room.items if item.category in (*BEDS, "desk")][:1])
+
+
+def _sofas(room: Builder) -> Item | None:
+    for category in sorted(SOFAS, key=lambda name: -room.wanted.get(name, 0)):
+        if room.wanted.get(category):
+            room.wanted[category] -= 1
+            return sofa_group(room, category)
+    return None
+
+
+def _anchors(room: Builder, sofa: Item | None) -> list[Item]:
+    """What pendant lamps hang over, the most usual first."""
+    tables = [item for item in room.items if item.category == "dining_table"]
+    coffee = [item for item in room.items if item.category == "coffee_table"][:1]
+    anchors = tables + (coffee or ([sofa] if sofa else []))
+    return anchors if room.chance(0.75) else anchors[::-1]
+
+
+def _desks(room: Builder) -> None:
+    for category in ("desk", "table"):
+        for _ in range(room.take(category)):
+            desk_group(room, category, DESK_SEATS)
+    if room.take("dressing_table"):
+        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair"))
+
+
+def _rest(room: Builder) -> None:
+    """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
+    for _ in range(room.take("tv_stand")):
+        room.against_wall("tv_stand", corner=0.15)
+    for category in STORAGE:
+        count = room.take(category)
+        if count:
+            size, style = room.size(category), room.style()
+            for k in range(count):
+                if k and room.chance(0.5):
+                    size = room.size(category)
+                room.against_wall(category, size=size, style=style, corner=0.4, tries=14)
+    for category in ("plant", "floor_lamp"):
+        for _ in range(room.take(category)):
+            _by_the_wall(room, category)
+    for category in [c for c in room.wanted if c in SMALL_TABLES]:
+        for _ in range(room.take(category)):
+            room.against_wall(category, corner=0.4, gap=abs(room.rng.normal(0.05, 0.1)))
+    on_top(room)
+    for category in [c for c in room.wanted if c not in ("pendant_lamp", "ceiling_lamp")]:
+        count = room.take(category)
+        size, style = room.size(category), room.style()
+        for _ in range(min(count, 4)):
+            _loose(room, category, size, style)
+
+
+def _by_the_wall(room: Builder, category: str) -> None:
+    """A plant or lamp: beside the tv stand, in a corner, or along a wall."""
+    size, style = room.size(category), room.style()
+    stands = [item for item in room.items if item.category == "tv_stand"]
+    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2])
+    if category == "floor_lamp" and room.chance(0.3):
+        turn += room.uniform(-0.7, 0.7)
+    if stands and category == "plant" and room.chance(0.5):
+        stand = stands[0]
+        for side in (1, -1) if room.chance(0.5) else (-1, 1):
+            lateral = side * (stand.size[0] / 2 + size[0] / 2 + room.uniform(-0.03, 0.3))
+            forward = size[2] / 2 - stand.size[2] / 2 + room.uniform(0.0, 0.15)
+            if room.beside(stand, category, size, lateral, forward, turn, style, play=0.06):
+                return
+    for _ in range(10):
+        spot = room.wall_spot(size[0], 0.7)
+        if spot is None:
+            return
+        x, z = spot[0].point(spot[1], size[2] / 2 + abs(room.rng.normal(0.02, 0.08)))
+        if room.put(category, size, x, z, spot[0].yaw + turn, style):
+            return
+
+
+def _loose(room: Builder, category: str, size: tuple[float, float, float], style: int) -> None:
+    """A loose seat: near a wall with its back to it and often askew, or on open floor."""
+    if room.chance(0.6):
+        for _ in range(8):
+            spot = room.wall_spot(size[0] + 0.1, 0.4)
+            if spot is None:
+                break
+            x, z = spot[0].point(spot[1], size[2] / 2 + room.uniform(0.03, 0.6))
+            turn = room.uniform(-0.8, 0.8) if room.chance(0.4) else 0.0
+            if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
+                return
+    room.somewhere(category, size=size, style=style)

@@ -1,0 +1,76 @@
+"""What real rooms look like, as data: `room_statistics.json` beside this package, and draws from its percentiles."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+# How many corners are cut where the floor is not a rectangle: shares of 1, 2, 3 and 4.
+CUTS = {"bedroom": (0.72, 0.2, 0.06, 0.02), "study": (0.75, 0.2, 0.05, 0.0)}
+MANY_CUTS = (0.35, 0.35, 0.2, 0.1)
+_KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
+
+
+@dataclass(frozen=True)
+class RoomTypeStatistics:
+    """Percentiles (5, 25, 50, 75, 95) of one kind of room in metres, and which categories it holds.
+
+    Arguments:
+        presence: category -> (share of rooms that have it, counts and their shares).
+    """
+
+    name: str
+    area: tuple[float, ...]
+    short: tuple[float, ...]
+    long: tuple[float, ...]
+    height: tuple[float, ...]
+    rectangular: float
+    objects: tuple[float, ...]
+    cuts: tuple[float, ...]
+    presence: dict[str, tuple[float, tuple[int, ...], tuple[float, ...]]]
+
+
+@cache
+def room_statistics() -> dict:
+    """The whole table."""
+    return json.loads(resources.files("echomodel.data").joinpath("room_statistics.json").read_text("utf-8"))
+
+
+@cache
+def room_type_statistics(name: str) -> RoomTypeStatistics:
+    """The part of one room type of the vocabulary; raises ValueError for another word."""
+    rooms = room_statistics()["rooms"]
+    if name not in rooms:
+        raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
+    raw = rooms[name]
+    presence = {}
+    for category, entry in raw["presence"].items():
+        counts = tuple(int(count) for count in entry["counts"])
+        weights = np.array(list(entry["counts"].values()), float)
+        presence[category] = (entry["share"], counts, tuple(np.cumsum(weights / weights.sum()).tolist()))
+    return RoomTypeStatistics(
+        name=name,
+        area=tuple(raw["area"]),
+        short=tuple(raw["short"]),
+        long=tuple(raw["long"]),
+        height=tuple(raw["height"]),
+        rectangular=raw["rectangular"],
+        objects=tuple(raw["objects"]),
+        cuts=CUTS.get(name, MANY_CUTS),
+        presence=presence,
+    )
+
+
+def quantile(percentiles: tuple[float, ...], z: float) -> float:
+    """The value at the standard score `z` of a distribution given by 3 or 5 percentiles, linear between them."""
+    knots = _KNOTS[len(percentiles)]
+    z = min(max(z, -2.1), 2.1)
+    if z <= knots[0] or z >= knots[-1]:
+        at = 0 if z <= knots[0] else len(knots) - 2
+        slope = (percentiles[at + 1] - percentiles[at]) / (knots[at + 1] - knots[at])
+        return percentiles[at] + slope * (z - knots[at])
+    return float(np.interp(z, knots, percentiles))

@@ -1,0 +1,130 @@
+"""The room generator: deterministic, inside its floor, without accidental collisions, like real rooms in numbers."""
+
+import numpy as np
+import pytest
+from shapely import affinity
+from shapely.geometry import Polygon, box
+
+from echomodel.data.rooms import generate_room, generate_rooms
+from echomodel.data.rooms.builder import Item, overlaps
+from echomodel.data.rooms.floor import sample_floor
+from echomodel.data.rooms.statistics import room_type_statistics
+from echomodel.vocabulary import vocabulary
+
+TYPES = [kind.name for kind in vocabulary().room_types]
+SEATS = (
+    "dining_chair", "chinese_chair", "chair", "office_chair", "stool", "dressing_chair", "lounge_chair", "ottoman",
+)  # fmt: skip
+# Pairs that are meant to meet: chairs under tables, a table in the corner of an L, pieces side by side.
+MEANT = {
+    frozenset(pair)
+    for pair in (
+        *((seat, table) for table in ("dining_table", "desk", "table", "dressing_table") for seat in SEATS),
+        *((bed, "nightstand") for bed in ("double_bed", "single_bed", "kids_bed")),
+        ("l_shaped_sofa", "coffee_table"), ("coffee_table",), ("tv_stand", "plant"),
+    )
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rooms():
+    return generate_rooms(300, 5)
+
+
+def footprint(room, k):
+    x, _, z = room.size[k]
+    turned = affinity.rotate(box(-x / 2, -z / 2, x / 2, z / 2), -room.yaw[k], (0, 0), use_radians=True)
+    return affinity.translate(turned, room.position[k, 0], room.position[k, 2])
+
+
+def test_rooms_are_a_function_of_seed_and_number(rooms):
+    again = generate_rooms(3, 5, start=100)
+    for first, second in zip(rooms[100:103], again, strict=True):
+        assert first.to_json() == second.to_json()
+    assert generate_rooms(1, 6)[0].to_json()["objects"] != rooms[0].to_json()["objects"]
+    assert max(generate_rooms(1, 5, styles=4)[0].styles) < 4
+
+
+def test_words_models_and_frames(rooms):
+    words = vocabulary()
+    for room in rooms:
+        assert words.room_type(room.room_type).name == room.room_type
+        for category, style, model in zip(room.categories, room.styles, room.models, strict=True):
+            assert words.category(category).name == category
+            assert model == f"s{style}_{category}"
+        low, high = room.floor_polygon.min(0), room.floor_polygon.max(0)
+        assert np.allclose(low + high, 0, atol=1e-9)
+        assert (room.size > 0).all()
+        assert (np.abs(room.yaw) <= np.pi).all()
+
+
+@pytest.mark.parametrize("room_type", TYPES)
+def test_floors_are_simple_polygons_with_walls_facing_inwards(room_type):
+    rng = np.random.default_rng(3)
+    shapes = set()
+    for _ in range(60):
+        floor = sample_floor(room_type_statistics(room_type), rng)
+        polygon = Polygon(floor.polygon)
+        assert polygon.is_valid
+        assert polygon.area == pytest.approx(floor.area)
+        shapes.add(len(floor.polygon))
+        for wall in floor.walls:
+            x, z = wall.point(wall.length / 2, 0.02)
+            assert polygon.contains(box(x - 0.01, z - 0.01, x + 0.01, z + 0.01))
+        distance, met = floor.opposite(floor.walls[0], floor.walls[0].length / 2)
+        assert met is not None
+        x, z = floor.walls[0].point(floor.walls[0].length / 2, distance - 0.02)
+        assert polygon.buffer(1e-6).contains(box(x - 0.001, z - 0.001, x + 0.001, z + 0.001))
+    assert len(shapes) > 1
+
+
+def test_furniture_stands_on_the_floor_without_accidental_collisions(rooms):
+    for room in rooms:
+        floor = Polygon(room.floor_polygon).buffer(0.06, join_style="mitre")
+        prints = [footprint(room, k) for k in range(len(room))]
+        lamps = ["_lamp" in category and room.position[k, 1] > 0 for k, category in enumerate(room.categories)]
+        for i in range(len(room)):
+            if not lamps[i]:
+                assert prints[i].difference(floor).area < 1e-6, (room.id, room.categories[i])
+            for j in range(i):
+                apart = room.position[i, 1] >= room.position[j, 1] + room.size[j, 1] - 1e-9
+                apart |= room.position[j, 1] >= room.position[i, 1] + room.size[i, 1] - 1e-9
+                if apart or lamps[i] or lamps[j]:
+                    continue
+                shared = prints[i].intersection(prints[j])
+                if shared.area and frozenset((room.categories[i], room.categories[j])) not in MEANT:
+                    x0, z0, x1, z1 = shared.bounds
+                    assert min(x1 - x0, z1 - z0) < 0.08, (room.id, room.categories[i], room.categories[j])
+
+
+def test_overlap_test_agrees_with_polygons():
+    rng = np.random.default_rng(8)
+    for _ in range(400):
+        a, b = (
+            Item("chair", (*rng.uniform(0.3, 2, 3),), *rng.uniform(-1, 1, 3) * [1, 0, 1],
+                 yaw=rng.choice([0.0, np.pi / 2, 0.5, 2.2]))
+            for _ in range(2)
+        )  # fmt: skip
+        shapes = [
+            affinity.translate(
+                affinity.rotate(box(-i.size[0] / 2, -i.size[2] / 2, i.size[0] / 2, i.size[2] / 2), -i.yaw, (0, 0),
+                                use_radians=True), i.x, i.z)
+            for i in (a, b)
+        ]  # fmt: skip
+        assert overlaps(a, b, 0.0) == (shapes[0].intersection(shapes[1]).area > 1e-9)
+
+
+def test_numbers_resemble_real_rooms():
+    for room_type, wished in (("bedroom", 5.0), ("living_dining_room", 14.0), ("living_room", 9.0)):
+        drawn = generate_rooms(250, 9, room_type=room_type)
+        assert abs(np.median([len(room) for room in drawn]) - wished) <= 1.0
+        statistics = room_type_statistics(room_type)
+        for category, (share, _, _) in statistics.presence.items():
+            if share > 0.5:
+                got = np.mean([category in room.categories for room in drawn])
+                assert abs(got - share) < 0.15, (room_type, category)
+
+
+def test_unknown_room_type_is_named():
+    with pytest.raises(ValueError, match="no statistics for room type 'garage': allowed are bedroom"):
+        generate_room(np.random.default_rng(0), "garage")
