@@ -1,0 +1,208 @@
+"""Changing a graph where it stands: the result is the wanted graph, and nothing else on the stage has moved."""
+
+from __future__ import annotations
+
+import pytest
+from graph_strategies import graphs as scene_graphs
+from hypothesis import given, settings
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from echousd.graph import Node, Relation, SceneGraph
+from echousd.stage import StageError, graph_layer, read_graph, save_layer, update_graph, write_graph
+
+SOME = settings(max_examples=40, deadline=None)
+
+GRAPH = SceneGraph(
+    "bedroom",
+    (
+        Node("bed", "double_bed", size=(1.6, 0.9, 2.1), attributes={"colour": "red"}),
+        Node("stand", "nightstand", style="oak", locked=True),
+        Node("closet", "wardrobe"),
+    ),
+    (Relation("stand", "left", "bed"), Relation("closet", "taller_than", "bed", 0.5)),
+)
+
+
+@given(first=scene_graphs(), second=scene_graphs())
+@SOME
+def test_any_graph_becomes_any_other(first, second):
+    layer = graph_layer(first)
+    write_graph(second, layer)
+    assert read_graph(Usd.Stage.Open(layer)) == second
+    assert len(layer.rootPrims) == 1
+
+
+@given(first=scene_graphs(), second=scene_graphs())
+@SOME
+def test_in_a_stronger_layer_and_back(first, second):
+    base = graph_layer(first)
+    before = base.ExportToString()
+    mine = Sdf.Layer.CreateAnonymous(".usda")
+    mine.subLayerPaths.append(base.identifier)
+    stage = Usd.Stage.Open(mine)
+    update_graph(stage, second)
+    assert read_graph(stage) == second
+    update_graph(stage, first)
+    assert read_graph(stage) == first
+    assert base.ExportToString() == before
+
+
+@given(first=scene_graphs(), second=scene_graphs())
+@SOME
+def test_over_a_reference(first, second):
+    source = graph_layer(first)
+    before = source.ExportToString()
+    stage = Usd.Stage.CreateInMemory()
+    stage.DefinePrim("/House/Bedroom").GetReferences().AddReference(source.identifier)
+    write_graph(second, stage, root="/House/Bedroom")
+    assert read_graph(stage) == second
+    assert source.ExportToString() == before
+
+
+@given(graph=scene_graphs())
+@SOME
+def test_the_same_graph_authors_nothing(graph):
+    layer = graph_layer(graph)
+    before = layer.ExportToString()
+    update_graph(layer, graph)
+    assert layer.ExportToString() == before
+    mine = Sdf.Layer.CreateAnonymous(".usda")
+    mine.subLayerPaths.append(layer.identifier)
+    untouched = mine.ExportToString()
+    update_graph(Usd.Stage.Open(mine), graph)
+    assert mine.ExportToString() == untouched
+
+
+def furnished() -> Sdf.Layer:
+    """A room on whose prims somebody else has worked, too."""
+    layer = graph_layer(GRAPH)
+    stage = Usd.Stage.Open(layer)
+    bed = UsdGeom.Xform.Get(stage, "/Room/Objects/bed")
+    bed.AddTranslateOp().Set(Gf.Vec3d(1, 0, 2))
+    mesh = UsdGeom.Mesh.Define(stage, "/Room/Objects/bed/mesh")
+    mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    closet = stage.GetPrimAtPath("/Room/Objects/closet")
+    closet.GetReferences().AddReference("./closet.usda")
+    closet.SetCustomDataByKey("studio:asset", 42)
+    lamp = UsdGeom.Xform.Define(stage, "/Room/Lights/lamp")
+    lamp.GetPrim().CreateRelationship("studio:aims").SetTargets(["/Room/Objects/bed"])
+    stage.OverridePrim("/Room/SceneGraph/stand__left__bed").CreateAttribute(
+        "studio:note", Sdf.ValueTypeNames.String
+    ).Set("checked by Kim")
+    return layer
+
+
+def specs(layer: Sdf.Layer) -> dict[str, str]:
+    """The text of every property and the metadata of every prim, by path."""
+    found: dict[str, str] = {}
+
+    def visit(path: Sdf.Path) -> None:
+        spec = layer.GetObjectAtPath(path)
+        if isinstance(spec, Sdf.PropertySpec):
+            keys = {key: str(spec.GetInfo(key)) for key in sorted(spec.ListInfoKeys())}
+            targets = str(spec.targetPathList) if isinstance(spec, Sdf.RelationshipSpec) else ""
+            found[str(path)] = f"{keys} {targets}"
+        elif isinstance(spec, Sdf.PrimSpec):
+            found[str(path)] = str({key: str(spec.GetInfo(key)) for key in sorted(spec.ListInfoKeys())})
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, visit)
+    return found
+
+
+EDITS = {
+    "lock": (lambda g: g.lock("bed"), {"/Room/Objects/bed.echo:locked"}),
+    "unlock": (lambda g: g.lock("stand", False), {"/Room/Objects/stand.echo:locked"}),
+    "relabel": (
+        lambda g: g.relabel_node("bed", "single_bed"),
+        {"/Room/Objects/bed.echo:category", "/Room/Objects/bed.semantics:labels:category"},
+    ),
+    "attribute": (
+        lambda g: g.update_node("bed", attributes={"colour": "blue", "pillows": 2}),
+        {"/Room/Objects/bed.echo:attributes:colour", "/Room/Objects/bed.echo:attributes:pillows"},
+    ),
+    "unrelate a relation with a foreign note": (
+        lambda g: g.unrelate("stand", "left", "bed"),
+        {"/Room/SceneGraph/stand__left__bed"},
+    ),
+    "unrelate": (
+        lambda g: g.unrelate("closet", "taller_than", "bed"),
+        {
+            "/Room/SceneGraph/closet__taller_than__bed" + part
+            for part in ("", ".echo:subject", ".echo:object", ".echo:predicate", ".echo:confidence")
+        },
+    ),
+    "confidence": (
+        lambda g: g.change_relation("closet", "taller_than", "bed", "taller_than", confidence=0.25),
+        {"/Room/SceneGraph/closet__taller_than__bed.echo:confidence"},
+    ),
+    "remove an object with foreign content": (
+        lambda g: g.remove_node("bed"),
+        {"/Room/Objects/bed"}
+        | {"/Room/SceneGraph/stand__left__bed"}
+        | {
+            "/Room/SceneGraph/closet__taller_than__bed" + part
+            for part in ("", ".echo:subject", ".echo:object", ".echo:predicate", ".echo:confidence")
+        },
+    ),
+    "room type": (
+        lambda g: SceneGraph("study", g.nodes, g.relations),
+        {"/Room/SceneGraph.echo:roomType"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_only_the_prims_concerned_change(name):
+    edit, touched = EDITS[name]
+    layer = furnished()
+    before = specs(layer)
+    wanted = edit(GRAPH)
+    update_graph(layer, wanted)
+    after = specs(layer)
+    assert {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)} == touched
+    stage = Usd.Stage.Open(layer)
+    assert read_graph(stage) == wanted
+    assert stage.GetAttributeAtPath("/Room/Objects/bed.xformOp:translate") or name.startswith("remove an object")
+
+
+def test_an_object_taken_out_comes_back_with_what_was_on_it():
+    layer = furnished()
+    before = layer.ExportToString()
+    update_graph(layer, GRAPH.remove_node("bed"))
+    stage = Usd.Stage.Open(layer)
+    assert not stage.GetPrimAtPath("/Room/Objects/bed").IsActive()
+    assert layer.GetPrimAtPath("/Room/Objects/bed/mesh")
+    update_graph(layer, GRAPH)
+    assert read_graph(stage) == GRAPH
+    assert not stage.GetPrimAtPath("/Room/Objects/bed").HasAuthoredActive()
+    assert sorted(before.split()) == sorted(
+        word for line in layer.ExportToString().splitlines() if "reorder" not in line for word in line.split()
+    )
+
+
+def test_another_predicate_renames_the_prim_in_place():
+    layer = graph_layer(GRAPH)
+    update_graph(layer, GRAPH.change_relation("stand", "left", "bed", "right"))
+    names = [spec.name for spec in layer.GetPrimAtPath("/Room/SceneGraph").nameChildren]
+    assert names == ["stand__right__bed", "closet__taller_than__bed"]
+
+
+def test_a_room_in_an_instance_is_refused():
+    source = graph_layer(GRAPH)
+    stage = Usd.Stage.CreateInMemory()
+    room = stage.DefinePrim("/House/Bedroom")
+    room.GetReferences().AddReference(source.identifier)
+    room.SetInstanceable(True)
+    before = stage.GetRootLayer().ExportToString()
+    with pytest.raises(StageError, match=r"the room is an instance, allowed: rooms with instanceable = false"):
+        update_graph(stage, GRAPH.lock("bed"))
+    assert stage.GetRootLayer().ExportToString() == before
+
+
+def test_a_usdc_on_disk(tmp_path):
+    path = tmp_path / "room.usdc"
+    save_layer(graph_layer(GRAPH), path)
+    stage = Usd.Stage.Open(str(path))
+    update_graph(stage, GRAPH.lock("closet"))
+    stage.Save()
+    assert read_graph(path) == GRAPH.lock("closet")
