@@ -51,7 +51,10 @@ def one_line(text: str, most: int = 200) -> str:
 
 
 def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
-    """Write a layer to `path` (.usd, .usda or .usdc) by a temporary file beside it and a rename; raises StageError."""
+    """Write a layer to `path` (.usd, .usda or .usdc) by a temporary file beside it and a rename.
+
+    A layer of this process that was loaded from `path` is reloaded. Raises StageError, `path` left as it was.
+    """
     path = Path(path)
     if path.suffix not in WRITABLE:
         raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(WRITABLE)}")
@@ -72,3 +75,6 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
         ) from None
     finally:
         Path(temporary).unlink(missing_ok=True)
+    loaded = Sdf.Layer.Find(str(path.absolute()))
+    if loaded:  # a stage of this process has the file open: let it follow
+        loaded.Reload(force=True)

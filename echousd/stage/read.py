@@ -196,10 +196,11 @@ _FIELDS = {
 
 def value(prim: Usd.Prim, name: str) -> Any:
     """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
-    found = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
-    if isinstance(found, str) and len(found) > MAX_TEXT:
-        raise StageError(f"{place(prim)}: {name} is a text of {len(found)} characters, allowed: {MAX_TEXT}")
-    return usd.plain(found)
+    found = usd.plain(prim.GetAttribute(name).Get()) if prim.HasAttribute(name) else None
+    for text in found if isinstance(found, tuple) else (found,):
+        if isinstance(text, str) and len(text) > MAX_TEXT:
+            raise StageError(f"{place(prim)}: {name} is a text of {len(text)} characters, allowed: {MAX_TEXT}")
+    return found
 
 
 def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:

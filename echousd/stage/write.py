@@ -52,7 +52,8 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/
 def prim_path(root: str | Sdf.Path) -> Sdf.Path:
     """`root` as an absolute prim path; raises StageError."""
     text = str(root)
-    if not Sdf.Path.IsValidPathString(text) or not Sdf.Path(text).IsAbsoluteRootOrPrimPath() or text == "/":
+    valid = Sdf.Path.IsValidPathString(text)
+    if not valid or not Sdf.Path(text).IsPrimPath() or not Sdf.Path(text).IsAbsolutePath():
         raise usd.StageError(f"room {text!r} is no prim path, allowed: an absolute path of identifiers such as /Room")
     return Sdf.Path(text)
 
