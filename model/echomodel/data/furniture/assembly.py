@@ -1,0 +1,74 @@
+"""Solids put together: one mesh with materials and texture coordinates, one signed distance, a fit to the wanted size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+
+from echomodel.data.furniture.solids import Solid
+from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
+
+THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
+MATERIALS = ("wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen")
+
+
+def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None) -> trimesh.Trimesh:
+    """All solids as one mesh of closed parts that overlap as boards and cushions do, stretched to fill `size`.
+
+    Arguments:
+        solids: parts in the object's frame, metres.
+        size: (3,) float, the box to fill, metres; None keeps the parts' own extents.
+
+    The mesh stands on y = 0, centred in x and z. `face_attributes["part"]` (m,) int numbers the solids,
+    `face_attributes["material"]` (m,) int indexes `MATERIALS`, `face_attributes["uv"]` (m, 3, 2) float holds texture
+    coordinates per corner, box-projected, in metres.
+    """
+    pieces = [solid.mesh() for solid in solids]
+    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in pieces])
+    vertices = np.concatenate([vertices for vertices, _ in pieces])
+    faces = np.concatenate([faces + offset for (_, faces), offset in zip(pieces, offsets, strict=False)])
+    counts = [len(faces) for _, faces in pieces]
+    lower, upper = vertices.min(0), vertices.max(0)
+    stretch = np.ones(3) if size is None else np.asarray(size, float) / (upper - lower)
+    vertices = (vertices - [(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2]) * stretch
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.face_attributes["part"] = np.repeat(np.arange(len(solids)), counts)
+    mesh.face_attributes["material"] = np.repeat([MATERIALS.index(s.material) for s in solids], counts)
+    mesh.face_attributes["uv"] = box_uv(mesh.vertices, mesh.faces)
+    return mesh
+
+
+def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Texture coordinates (m, 3, 2) per corner: each triangle projected along the main axis of its normal, metres."""
+    corners = np.asarray(vertices)[faces]
+    normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    axis = normal.argmax(1)
+    first, second = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
+    rows = np.arange(len(faces))[:, None]
+    columns = np.arange(3)[None]
+    return np.stack([corners[rows, columns, first[:, None]], corners[rows, columns, second[:, None]]], axis=-1)
+
+
+def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
+    """Box-normalised TSDF (64, 64, 64) float32 of the union of the solids, thin parts thickened to about a voxel."""
+    boxes = [solid.mesh()[0] for solid in solids]
+    lower = np.min([vertices.min(0) for vertices in boxes], axis=0)
+    upper = np.max([vertices.max(0) for vertices in boxes], axis=0)
+    scale = np.maximum(upper - lower, 1e-6) / FILLED
+    axes = [
+        ((np.arange(RESOLUTION) - (RESOLUTION - 1) / 2) * scale[i] + (upper[i] + lower[i]) / 2).astype(np.float32)
+        for i in range(3)
+    ]
+    margin = int(np.ceil(TRUNCATION))
+    grid = np.full((RESOLUTION,) * 3, TRUNCATION, np.float32)
+    for solid, vertices in zip(solids, boxes, strict=True):
+        reach = voxels_from_points(vertices, lower, upper)
+        start = np.maximum(np.floor(reach.min(0)).astype(int) - margin, 0)
+        stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
+        where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
+        x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
+        distance = solid.distance(x, y, z, scale) - max(0.0, THINNEST - solid.inradius(scale))
+        np.minimum(grid[where], distance, out=grid[where])
+    return truncated(grid)

@@ -1,0 +1,232 @@
+"""What all furniture shares: boards, cushions, tops, legs and bases, fronts with drawers and doors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from echomodel.data.furniture.solids import IDENTITY, Ball, Block, Solid, Tube, Turned, rotation, upright
+from echomodel.data.furniture.style import Style
+
+Size = np.ndarray  # (3,) width x, height y, depth z, metres
+SLENDER = {"metal": 0.55}
+
+
+def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0) -> Block:
+    """The block between two corners (3,)."""
+    a, b = np.asarray(low, float), np.asarray(high, float)
+    return Block(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), radius=radius, material=material)
+
+
+def cushion(low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY) -> Solid:
+    """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging when very soft."""
+    a, b = np.asarray(low, float), np.asarray(high, float)
+    centre, half = (a + b) / 2, np.maximum((b - a) / 2, 1e-3)
+    if style.softness > 0.85 and half.min() / half.max() > 0.12:
+        return Ball(centre=centre, half=half * 1.02, power=5.0, turn=turn, material=material)
+    radius = float(half.min() * (0.25 + 0.7 * style.softness))
+    return Block(centre=centre, half=half, radius=radius, turn=turn, material=material)
+
+
+def top(shape: str, width: float, depth: float, y: float, thick: float, style: Style, material: str = "wood") -> Solid:
+    """A table top whose upper face lies at `y`: `square`, `corners` (rounded) or `round` (circle or oval)."""
+    half = (width / 2, depth / 2)
+    power = {"square": np.inf, "corners": 5.0 + 6 * (1 - style.corner), "round": 2.0}[shape]
+    rounding = 0.0 if shape == "square" else thick * 0.3 * style.softness
+    return Turned(
+        centre=np.array([0.0, y - thick, 0.0]),
+        low=half,
+        high=half,
+        height=thick,
+        power=power,
+        rounding=rounding,
+        material=material,
+    )
+
+
+def leg(foot: tuple, head: tuple, thick: float, style: Style, material: str = "wood", taper: float = 1.0) -> Turned:
+    """A leg from the floor to `head` (both (3,)), `thick` at its head and `taper` times that at the foot."""
+    bottom, above = np.asarray(foot, float), np.asarray(head, float)
+    power = 2.0 if style.profile == "round" else np.inf
+    half = thick / 2
+    return Turned(
+        centre=bottom,
+        turn=upright(bottom, above),
+        low=(half * taper, half * taper),
+        high=(half, half),
+        height=float(np.linalg.norm(above - bottom)),
+        power=power,
+        material=material,
+    )
+
+
+def turned_leg(x: float, z: float, height: float, thick: float, material: str = "wood") -> list[Solid]:
+    """A leg off the lathe: a slim foot, a swelling shaft, a ring and a square head."""
+    r = thick / 2
+
+    def section(y0: float, y1: float, low: float, high: float, power: float = 2.0) -> Turned:
+        return Turned(
+            centre=np.array([x, y0 * height, z]),
+            low=(low * r, low * r),
+            high=(high * r, high * r),
+            height=(y1 - y0) * height,
+            power=power,
+            material=material,
+        )
+
+    ring = Ball(centre=np.array([x, 0.68 * height, z]), half=np.array([1.25 * r, 0.45 * r, 1.25 * r]), material=material)
+    return [section(0, 0.08, 0.9, 0.55), section(0.08, 0.7, 0.55, 1.0), ring, section(0.7, 1, 1.05, 1.05, np.inf)]
+
+
+def base(
+    style: Style, width: float, depth: float, height: float, thick: float, kind: str | None = None, *, tie: bool = False
+) -> list[Solid]:
+    """What a top, seat or carcass stands on, from the floor to `height`, inside a footprint `width` by `depth`.
+
+    Arguments:
+        thick: thickness of a leg, metres.
+        kind: a kind of `Style.legs` instead of the style's own.
+        tie: stretchers between the legs where the kind allows them.
+    """
+    kind = kind or style.legs
+    x, z, h = width / 2 - thick / 2, depth / 2 - thick / 2, height
+    corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
+    if kind == "plinth":
+        return [box((-width / 2 * 0.94, 0, -depth / 2 * 0.94), (width / 2 * 0.94, h, depth / 2 * 0.9), "accent")]
+    if kind == "bun":
+        return [
+            Ball(centre=np.array([cx, h / 2, cz]), half=np.array([thick * 0.8, h / 2, thick * 0.8]), power=2.5)
+            for cx, cz in corners
+        ]
+    if kind == "turned":
+        return [part for cx, cz in corners for part in turned_leg(cx, cz, h, thick * 1.15)]
+    if kind == "sled":
+        return _sled(x, z, h, thick)
+    if kind == "trestle":
+        return _trestle(x, z, h, thick)
+    if kind == "hairpin":
+        r = max(0.006, thick * 0.16)
+        return [
+            Tube(points=np.array([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]]), radius=r,
+                 material="metal")
+            for cx, cz in corners
+            for d in (min(0.12, width * 0.12),)
+        ]  # fmt: skip
+    spread = np.tan(style.splay) * h if kind == "splayed" else 0.0
+    spread = min(spread, 0.3 * min(width, depth))
+    taper = style.taper if kind in ("tapered", "splayed") else 1.0
+    material = "metal" if style.family == "industrial" else "wood"
+    inner = [(np.sign(cx) * (x - spread), np.sign(cz) * (z - spread)) for cx, cz in corners]
+    parts: list[Solid] = [
+        leg((cx, 0, cz), (ix, h, iz), thick, style, material, taper)
+        for (cx, cz), (ix, iz) in zip(corners, inner, strict=True)
+    ]
+    if tie and h > 0.3:
+        y, t = h * 0.35, thick * 0.35
+        mx, mz = x - spread * 0.35, z - spread * 0.35
+        parts += [box((s * mx - t, y - t, -mz), (s * mx + t, y + t, mz), material) for s in (-1, 1)]
+        parts.append(box((-mx, y - t, -t), (mx, y + t, t), material))
+    return parts
+
+
+def _sled(x: float, z: float, h: float, thick: float) -> list[Solid]:
+    t = max(thick * 0.3, 0.008)
+    parts: list[Solid] = []
+    for side in (-x, x):
+        parts.append(box((side - t, 0, -z), (side + t, 2 * t, z), "metal"))
+        parts += [box((side - t, 0, end - t), (side + t, h, end + t), "metal") for end in (-z, z)]
+        parts.append(box((side - t, h - 2 * t, -z), (side + t, h, z), "metal"))
+    return parts
+
+
+def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
+    t = thick / 2
+    parts: list[Solid] = []
+    for side in (-x * 0.82, x * 0.82):
+        parts.append(box((side - t, 0, -z), (side + t, thick, z)))
+        parts.append(box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)))
+        parts += [
+            Turned(centre=np.array([side, thick * 0.5, s * z * 0.25]), low=(t, t), high=(t, t), height=h - thick,
+                   power=np.inf, turn=rotation(x=-s * 0.12))
+            for s in (-1, 1)
+        ]  # fmt: skip
+    parts.append(box((-x * 0.82, h * 0.45, -t), (x * 0.82, h * 0.45 + thick, t)))
+    return parts
+
+
+def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
+    """A column on a disc or a cross of feet, from the floor to `height`."""
+    r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
+    material = "metal" if style.family in ("modern", "industrial") else "wood"
+    spread = min(width, depth) * 0.32
+    column = Turned(low=(r, r), high=(r * 0.8, r * 0.8), height=height, material=material)
+    if style.family in ("classic", "rustic"):
+        feet: list[Solid] = [
+            Tube(points=np.array([[0, height * 0.3, 0], [s * spread * c, height * 0.14, s * spread * d * 0.9],
+                                  [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d]]), radius=r * 0.6)
+            for s in (-1, 1)
+            for c, d in ((0.7, 0.7), (0.7, -0.7))
+        ]  # fmt: skip
+        bulb = Ball(centre=np.array([0, height * 0.55, 0]), half=np.array([r * 1.5, height * 0.12, r * 1.5]))
+        return [column, bulb, *feet]
+    if style.contrast > 0.6:
+        cone = Turned(low=(spread * 0.95, spread * 0.95), high=(r, r), height=height * 0.95, material=material)
+        return [cone, replace(column, height=height)]
+    disc = Turned(low=(spread, spread), high=(spread * 0.9, spread * 0.9), height=max(0.015, height * 0.04),
+                  material=material)  # fmt: skip
+    return [disc, column]
+
+
+def front(
+    low: tuple[float, float], high: tuple[float, float], z: float, rows: int, columns: int, kind: str, style: Style
+) -> list[Solid]:
+    """Drawer fronts or doors that fill the rectangle `low` to `high` (x, y) on the plane z, gaps between, with handles.
+
+    `kind` is `drawer` or `door`; thickness and frames follow the style.
+    """
+    gap, thick = style.gap, 0.018
+    parts: list[Solid] = []
+    xs = np.linspace(low[0], high[0], columns + 1)
+    ys = np.linspace(low[1], high[1], rows + 1)
+    for i in range(columns):
+        for j in range(rows):
+            x0, x1, y0, y1 = xs[i] + gap, xs[i + 1] - gap, ys[j] + gap, ys[j + 1] - gap
+            if style.fronts == "recessed":
+                parts.append(box((x0, y0, z - 0.022), (x1, y1, z - 0.004), "accent"))
+            else:
+                parts.append(box((x0, y0, z - 0.005), (x1, y1, z + thick), "accent"))
+            if style.fronts == "framed":
+                parts += _frame(x0, x1, y0, y1, z + thick, 0.15 * min(x1 - x0, y1 - y0))
+            parts += _handle(x0, x1, y0, y1, z + thick, kind, hinge_left=i % 2 == 0, style=style)
+    return parts
+
+
+def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float) -> list[Solid]:
+    b, t = max(border, 0.02), 0.014
+    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
+    return [box((*lo, z - 0.004), (*hi, z + t), "accent") for lo, hi in bars]
+
+
+def _handle(
+    x0: float, x1: float, y0: float, y1: float, z: float, kind: str, *, hinge_left: bool, style: Style
+) -> list[Solid]:
+    if style.handles == "none":
+        return []
+    w, h = x1 - x0, y1 - y0
+    door = kind == "door"
+    x = (x1 - 0.12 * w if hinge_left else x0 + 0.12 * w) if door else (x0 + x1) / 2
+    y = (y0 + y1) / 2
+    if style.handles == "knob":
+        r = 0.016
+        count = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
+        return [Ball(centre=np.array([x + dx, y, z + r]), half=np.array([r, r, r * 1.2]), material="metal")
+                for dx in count]  # fmt: skip
+    if style.handles == "edge":
+        if door:
+            return [box((x - 0.008, y0 + 0.1 * h, z), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal")]
+        return [box((x0 + 0.1 * w, y1 - 0.02, z), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal")]
+    length = min(0.3, 0.45 * h) / 2 if door else min(0.25, 0.4 * w) / 2
+    if door:
+        return [box((x - 0.008, y - length, z), (x + 0.008, y + length, z + 0.028), "metal", 0.004)]
+    return [box((x - length, y - 0.008, z), (x + length, y + 0.008, z + 0.028), "metal", 0.004)]

@@ -1,0 +1,134 @@
+"""A style: the choices that the pieces of one suite share, drawn from a family of furniture making."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+# Per family: how often each kind occurs. Missing kinds do not occur in that family.
+FAMILIES: dict[str, dict[str, dict[str, float]]] = {
+    "modern": {
+        "legs": {"straight": 3, "tapered": 2, "sled": 2, "plinth": 3, "hairpin": 1},
+        "profile": {"square": 3, "round": 2},
+        "back": {"panel": 4, "cushion": 3, "shell": 3, "frame": 1},
+        "arms": {"box": 4, "slim": 3, "shell": 2, "none": 1},
+        "headboard": {"panel": 4, "channels": 3, "low": 2, "cushions": 2},
+        "fronts": {"flat": 5, "recessed": 2, "open": 2},
+        "handles": {"none": 4, "bar": 3, "edge": 2},
+        "shade": {"drum": 3, "sphere": 3, "dome": 2, "cylinder": 2, "ring": 2},
+    },
+    "scandinavian": {
+        "legs": {"splayed": 5, "tapered": 4, "straight": 1},
+        "profile": {"round": 5, "square": 1},
+        "back": {"spindles": 3, "frame": 2, "shell": 3, "panel": 2, "rails": 2},
+        "arms": {"slim": 5, "none": 2, "box": 1},
+        "headboard": {"panel": 3, "slats": 3, "low": 2, "cushions": 1},
+        "fronts": {"flat": 5, "open": 3},
+        "handles": {"knob": 4, "none": 3, "edge": 1},
+        "shade": {"cone": 4, "dome": 3, "sphere": 2, "drum": 2},
+    },
+    "industrial": {
+        "legs": {"straight": 3, "sled": 4, "hairpin": 3, "trestle": 2},
+        "profile": {"square": 5, "round": 1},
+        "back": {"panel": 3, "rails": 4, "frame": 3},
+        "arms": {"slim": 4, "box": 2, "none": 2},
+        "headboard": {"slats": 4, "panel": 3, "low": 1},
+        "fronts": {"flat": 3, "open": 4},
+        "handles": {"bar": 4, "edge": 2, "none": 1},
+        "shade": {"dome": 4, "cone": 3, "cylinder": 2, "sphere": 1},
+    },
+    "classic": {
+        "legs": {"turned": 4, "tapered": 3, "bun": 2},
+        "profile": {"round": 3, "square": 2},
+        "back": {"frame": 3, "spindles": 2, "cushion": 3, "oval": 3},
+        "arms": {"rolled": 5, "box": 2, "slim": 1},
+        "headboard": {"arched": 4, "channels": 2, "panel": 2, "posts": 2},
+        "fronts": {"framed": 6, "flat": 1},
+        "handles": {"knob": 5, "bar": 2},
+        "shade": {"cone": 4, "drum": 2, "arms": 3},
+    },
+    "rustic": {
+        "legs": {"straight": 4, "trestle": 3, "plinth": 2, "bun": 1},
+        "profile": {"square": 5, "round": 1},
+        "back": {"rails": 4, "spindles": 2, "panel": 2},
+        "arms": {"box": 3, "rolled": 2, "slim": 1},
+        "headboard": {"slats": 3, "panel": 3, "posts": 3},
+        "fronts": {"framed": 5, "flat": 2, "open": 2},
+        "handles": {"knob": 4, "bar": 3},
+        "shade": {"cone": 3, "cylinder": 2, "arms": 2, "dome": 1},
+    },
+}
+
+
+@dataclass(frozen=True)
+class Style:
+    """What the pieces of one suite share: kinds of parts, proportions (0 to 1 where not said otherwise) and looks.
+
+    Lengths are metres; `bulk` scales thicknesses (about 1), `splay` and `rake` are angles in radians.
+    """
+
+    family: str
+    legs: str
+    profile: str
+    back: str
+    arms: str
+    headboard: str
+    fronts: str
+    handles: str
+    shade: str
+    bulk: float
+    splay: float
+    rake: float
+    taper: float
+    leg_height: float
+    softness: float
+    corner: float
+    top: float
+    overhang: float
+    gap: float
+    round_tops: float
+    tufting: float
+    contrast: float
+    arm_height: float
+    seat_depth: float
+    size_shift: tuple[float, float, float]
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Style:
+        """Draw a style: first a family, then its kinds and proportions."""
+        family = str(rng.choice(list(FAMILIES)))
+        kinds = {name: weighted(rng, odds) for name, odds in FAMILIES[family].items()}
+        slender = {"modern": 0.9, "scandinavian": 0.85, "industrial": 0.9, "classic": 1.1, "rustic": 1.3}[family]
+        soft = {"modern": 0.35, "scandinavian": 0.5, "industrial": 0.25, "classic": 0.7, "rustic": 0.45}[family]
+        return cls(
+            family=family,
+            **kinds,
+            bulk=float(slender * rng.uniform(0.85, 1.2)),
+            splay=float(np.radians(rng.uniform(5, 13))),
+            rake=float(np.radians(rng.uniform(3, 16))),
+            taper=float(rng.uniform(0.4, 0.8)),
+            leg_height=float(rng.uniform(0.04, 0.2)),
+            softness=float(np.clip(soft + rng.uniform(-0.25, 0.3), 0.05, 1)),
+            corner=float(rng.uniform(0, 1) ** 1.5),
+            top=float(rng.uniform(0.018, 0.05)),
+            overhang=float(rng.uniform(0, 0.05)),
+            gap=float(rng.uniform(0.004, 0.01)),
+            round_tops=float(rng.uniform(0, 1)),
+            tufting=float(rng.uniform(0, 1)),
+            contrast=float(rng.uniform(0, 1)),
+            arm_height=float(rng.uniform(0, 1)),
+            seat_depth=float(rng.uniform(0, 1)),
+            size_shift=tuple(rng.normal(0, 1, 3).tolist()),
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """All fields as plain data, for catalogues and previews."""
+        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
+
+
+def weighted(rng: np.random.Generator, odds: dict[str, float]) -> str:
+    """One key of `odds`, drawn with probability in proportion to its value."""
+    names = list(odds)
+    share = np.array([odds[name] for name in names], float)
+    return names[int(rng.choice(len(names), p=share / share.sum()))]
