@@ -39,7 +39,7 @@ HABITS = (
     Habit(("dresser", "dressing_table", "desk"), BEDS, (), ("right", "left")),
     Habit(("wardrobe",), BEDS, ("taller_than",), ("right", "left")),
     Habit(("coffee_table",), SOFAS, ("front",)),
-    Habit(("tv_stand",), (*SOFAS, *BEDS), ("front",)),
+    Habit(("tv_stand",), ("coffee_table", *SOFAS, *BEDS), ("front",)),
     Habit(("dining_table",), SOFAS, (), ("right",)),
     Habit(("armchair", "lounge_chair", "lazy_sofa"), (*SOFAS, *TABLES), (), ("right", "left")),
     Habit(("side_table", "corner_side_table", "round_end_table"), (*SOFAS, *BEDS), ("close_by",), ("left", "right")),

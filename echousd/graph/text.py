@@ -88,8 +88,8 @@ def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
     for name in needed:
         if name not in fields:
             first = next(iter(fields.values()), None)
-            named = f" of {shown(first)}" if isinstance(first, str) else ""
-            raise GraphError(f"{'.'.join(map(str, about))}: {name}{named} is missing", about)
+            named = f" {shown(first)}" if isinstance(first, str) else ""
+            raise GraphError(f"{'.'.join(map(str, about))}{named}: {name} is missing", about)
     try:
         return model(**fields)
     except GraphError as error:

@@ -1,0 +1,246 @@
+"""`echousd new` writes a scene graph, `echousd graph` shows one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from echousd.graph import Node, SceneGraph
+
+NEW_EXAMPLES = """Examples:
+
+    echousd new bedroom.usda --from samples/bedroom.yaml
+
+    echousd new bedroom.usda --room bedroom --count nightstand=2 --count desk=1 --size 4 3.5
+
+    echousd new bedroom.yaml --room bedroom     (a text to edit by hand)"""
+
+GRAPH_EXAMPLES = """Examples:
+
+    echousd graph bedroom.usda
+
+    echousd graph bedroom.usda --png bedroom.png
+
+    echousd graph house.usda --room /House/Bedroom --json > bedroom.json
+
+    echousd graph --schema > scenegraph.schema.json"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands `new` and `graph`."""
+    app.command("new", epilog=NEW_EXAMPLES)(new)
+    app.command("graph", epilog=GRAPH_EXAMPLES)(graph)
+
+
+def _room_types(incomplete: str) -> list[str]:
+    from echomodel.vocabulary import vocabulary
+
+    return [kind.name for kind in vocabulary().room_types if kind.name.startswith(incomplete)]
+
+
+def _counts(incomplete: str) -> list[str]:
+    from echomodel.vocabulary import vocabulary
+
+    return [f"{entry.name}=" for entry in vocabulary().categories if entry.name.startswith(incomplete)]
+
+
+def new(
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .usda, .usdc, .usd, .yaml or .json.")],
+    source: Annotated[
+        Path | None, typer.Option("--from", metavar="GRAPH", help="YAML, JSON or stage to take the graph of.")
+    ] = None,
+    room: Annotated[
+        str | None,
+        typer.Option(
+            "--room", autocompletion=_room_types, help="Room type: begin with what such a room usually holds."
+        ),
+    ] = None,
+    count: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CATEGORY=N", autocompletion=_counts, help="Objects of a category; 0 leaves it out."),
+    ] = None,
+    relate: Annotated[
+        list[str] | None,
+        typer.Option(metavar="'A PREDICATE B'", help="One more relation, such as 'desk left of double_bed'."),
+    ] = None,
+    size: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="X Z", help="Extents of the floor, metres.")
+    ] = None,
+    height: Annotated[float | None, typer.Option(metavar="M", help="Height of the room, metres.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite OUT.")] = False,
+) -> None:
+    """Author a scene graph, as a stage or as text, from a file or from a room type."""
+    from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
+    from echousd.graph.text import graph_from_plain, plain
+
+    if (source is None) == (room is None):
+        raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
+    if source is not None and count:
+        raise GraphError("--count goes with --room; edit the objects of a file in the file")
+    if out.exists() and not force:
+        raise GraphError(f"{out} exists, allowed: a new path, or --force to overwrite it")
+    given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
+    if source is not None:
+        made = load_graph(source)
+        made = made.replaced(room=made.room.replaced(**given)) if given else made
+    else:
+        assert room is not None
+        made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())))
+    if relate:
+        form = plain(made)
+        made = graph_from_plain({**form, "relations": [*form["relations"], *relate]})
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
+    save_graph(made, out)
+    typer.echo(f"wrote {out}: {_summary(made)}")
+
+
+def _counted(text: str) -> tuple[str, int]:
+    word, _, number = text.partition("=")
+    if not number.strip().isdecimal():
+        raise ValueError(f"--count {text}: allowed: a category and a number, such as nightstand=2")
+    return word, int(number)
+
+
+def graph(
+    source: Annotated[
+        Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML or JSON.")
+    ] = None,
+    room: Annotated[str | None, typer.Option(metavar="PRIM", help="Prim path of one room of several.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the canonical JSON form.")] = False,
+    as_yaml: Annotated[bool, typer.Option("--yaml", help="Print the short YAML form.")] = False,
+    as_dot: Annotated[bool, typer.Option("--dot", help="Print Graphviz' dot.")] = False,
+    as_table: Annotated[bool, typer.Option("--table", help="Print tables instead of a tree.")] = False,
+    png: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into a PNG file.")] = None,
+    svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into an SVG file.")] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
+    ] = False,
+) -> None:
+    """Show the scene graph of a stage or a text file: objects, and how they relate."""
+    from echousd.graph import GraphError, SceneGraph, load_graph
+    from echousd.graph.files import STAGE_FORMS
+
+    forms = {"--json": as_json, "--yaml": as_yaml, "--dot": as_dot, "--table": as_table, "--schema": schema}
+    chosen = [name for name, wanted in forms.items() if wanted]
+    if len(chosen) > 1:
+        raise GraphError(f"{' and '.join(chosen)} exclude each other")
+    if schema:
+        typer.echo(json.dumps(SceneGraph.model_json_schema(), indent=2))
+        return
+    if source is None:
+        raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file")
+    for path, suffix in ((png, ".png"), (svg, ".svg")):
+        if path is not None and path.suffix.lower() != suffix:
+            raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {suffix}")
+    if not chosen and png is None and svg is None and room is None and source.suffix.lower() in STAGE_FORMS:
+        shown = _rooms(source)
+    else:
+        shown = {"": load_graph(source, room)}
+    only = next(iter(shown.values()))
+    for path in (png, svg):
+        if path is not None:
+            from echousd.graph.picture import draw_graph
+
+            draw_graph(only, path)
+            typer.echo(f"wrote {path}: {_summary(only)}", err=True)
+    if as_json:
+        typer.echo(only.to_json(), nl=False)
+    elif as_yaml:
+        typer.echo(only.to_yaml(), nl=False)
+    elif as_dot:
+        from echousd.graph.picture import to_dot
+
+        typer.echo(to_dot(only), nl=False)
+    elif as_table or (png is None and svg is None):
+        from rich.console import Console
+
+        console = Console(highlight=False)
+        if not console.is_terminal:
+            console.width = 160
+        for path, each in shown.items():
+            (_print_table if as_table else _print_tree)(console, each, path)
+
+
+def _rooms(source: Path) -> dict[str, SceneGraph]:
+    """All rooms of a stage by prim path; a single one goes without."""
+    from echousd.stage import open_stage, read_graph, read_rooms
+
+    stage = open_stage(source)
+    rooms = read_rooms(stage)
+    return rooms if len(rooms) > 1 else {"": read_graph(stage)}
+
+
+def _summary(made: SceneGraph) -> str:
+    objects, relations = len(made.nodes), len(made.relations)
+    return (
+        f"{_words(made.room.type)}, {objects} object{'s' * (objects != 1)}, "
+        f"{relations} relation{'s' * (relations != 1)}"
+    )
+
+
+def _words(token: str) -> str:
+    return token.replace("_", " ")
+
+
+def _heading(made: SceneGraph, path: str) -> str:
+    extents, height = made.room.extents, made.room.height
+    known = [f"{extents[0]:.4g} x {extents[1]:.4g} m"] if extents else []
+    known += [f"{height:.4g} m high"] if height else []
+    return ", ".join([f"{path} {_summary(made)}".strip(), *known])
+
+
+def _facts(node: Node) -> list[str]:
+    """What is known of a node besides name and category."""
+    facts = [f"style {node.style}"] if node.style else []
+    if node.size:
+        facts.append("size " + " x ".join(f"{value:.3g}" for value in node.size))
+    if node.position:
+        facts.append("at " + " ".join(f"{value:.3g}" for value in node.position))
+    if node.yaw is not None:
+        facts.append(f"yaw {node.yaw:.3g}")
+    facts += ["locked"] if node.locked else []
+    return facts + [f"{key}={value}" for key, value in node.attributes.items()]
+
+
+def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
+    from rich.text import Text
+    from rich.tree import Tree
+
+    tree = Tree(Text(_heading(made, path), style="bold"), guide_style="dim")
+    for node in made.nodes:
+        label = Text(node.name, style="bold cyan")
+        if node.category != node.name:
+            label.append(f"  {_words(node.category)}", style="default not bold")
+        for fact in _facts(node):
+            label.append(f"  {fact}", style="not bold dim")
+        branch = tree.add(label)
+        for relation in made.relations:
+            if relation.subject == node.name:
+                line = Text(f"{_words(relation.predicate)} ", style="yellow").append(relation.object, style="cyan")
+                if relation.confidence != 1:
+                    line.append(f"  confidence {relation.confidence:.3g}", style="dim")
+                branch.add(line)
+    console.print(tree)
+
+
+def _print_table(console: Console, made: SceneGraph, path: str) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    objects = Table("object", "category", "fixed and free data", box=box.SIMPLE_HEAD)
+    for node in made.nodes:
+        objects.add_row(*map(Text, (node.name, node.category, ", ".join(_facts(node)))))
+    relations = Table("subject", "predicate", "object", "confidence", box=box.SIMPLE_HEAD)
+    for relation in made.relations:
+        relations.add_row(*map(Text, (*relation.triple, f"{relation.confidence:.3g}")))
+    console.print(Text(_heading(made, path), style="bold"), objects, relations, sep="\n")
