@@ -166,8 +166,8 @@ def graph(
         console = Console(highlight=False)
         if not console.is_terminal:
             console.width = 160
-        for path, each in shown.items():
-            (_print_table if as_table else _print_tree)(console, each, path)
+        for prim, each in shown.items():
+            (_print_table if as_table else _print_tree)(console, each, prim)
 
 
 def _rooms(source: Path) -> dict[str, SceneGraph]:

@@ -17,7 +17,7 @@ from echousd.graph.scene import Node, SceneGraph
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-KINDS = {
+KINDS: dict[str, tuple[str, Any, tuple[str, ...]]] = {
     "direction": ("#3b6ea8", "solid", ("left", "right", "front", "behind")),
     "support": ("#c46a1b", "solid", ("standing_on", "above", "in")),
     "closeness": ("#7a7f87", "solid", ("close_by", "symmetrical_to")),
@@ -105,7 +105,8 @@ def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None
     from matplotlib.patches import FancyBboxPatch
 
     colour = COLOURS.get(vocabulary().category(node.category).coarse, "#eeeeee")
-    corner = place - (WIDTH / 2, HEIGHT / 2)
+    across, up = (float(value) for value in place)
+    corner = (across - WIDTH / 2, up - HEIGHT / 2)
     shape = FancyBboxPatch(
         corner, WIDTH, HEIGHT, boxstyle="round,pad=0,rounding_size=0.14", facecolor=colour, edgecolor="#4a4f57",
         linewidth=2.2 * shrink if node.locked else 1.1 * shrink, zorder=3,
@@ -116,7 +117,6 @@ def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None
         below = f"{below or node.category.replace('_', ' ')} · {node.style}"
     style: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 4, "clip_on": True, "parse_math": False}
     name = node.name if len(node.name) <= 22 else node.name[:20] + "…"
-    across, up = place
     axes.text(across, up + (0.12 if below else 0), name, fontsize=10 * shrink, weight="bold", color="#1d2026", **style)
     if below:
         below = below if len(below) <= 32 else below[:30] + "…"
@@ -148,7 +148,7 @@ def _draw_arrows(axes: Axes, joined: list[Arrow], where: dict[str, np.ndarray], 
             middle = (start_edge + end_edge) / 2 + 0.5 * bend * np.array([along[1], -along[0]])
             box = {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
             style: dict[str, Any] = {"ha": "center", "va": "center", "linespacing": 1.0, "zorder": 5, "bbox": box}
-            axes.text(*middle, "\n".join(arrow.words), fontsize=7.5 * shrink, color=colour, **style)
+            axes.text(middle[0], middle[1], "\n".join(arrow.words), fontsize=7.5 * shrink, color=colour, **style)
 
 
 def _edge(start: np.ndarray, end: np.ndarray, bend: float) -> np.ndarray:

@@ -31,13 +31,13 @@ _RESOLVERS = {
 class _Loader(yaml.SafeLoader):
     """The safe loader with YAML 1.2's core schema."""
 
-    yaml_implicit_resolvers: ClassVar[dict] = {}
+    yaml_implicit_resolvers: ClassVar[dict] = {}  # type: ignore[misc]
 
 
 class Dumper(yaml.SafeDumper):
     """The safe dumper that quotes whatever `_Loader` would not read as text."""
 
-    yaml_implicit_resolvers: ClassVar[dict] = {}
+    yaml_implicit_resolvers: ClassVar[dict] = {}  # type: ignore[misc]
 
 
 for _kind, (_pattern, _first) in _RESOLVERS.items():
