@@ -33,6 +33,7 @@ def export(room: str | Path, out: str | Path, *, arkit: bool = False, force: boo
 
     Raises ValueError for other endings, a file in the way, a stage that does not open, or a path that is not writable.
     """
+    from echousd.room.assets import layer_bytes
     from echousd.room.save import write_whole
 
     out = Path(out)
@@ -47,11 +48,7 @@ def export(room: str | Path, out: str | Path, *, arkit: bool = False, force: boo
     elif out.suffix == ".usdz":
         content = usdz(Path(room), arkit=arkit)
     else:
-        with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
-            layer = flat_layer(Path(room))
-            file = Path(scratch) / f"flat{out.suffix}"
-            layer.Export(str(file))
-            content = file.read_bytes()
+        content = layer_bytes(flat_layer(Path(room)), out.suffix)
     write_whole(out, content)
     return out
 

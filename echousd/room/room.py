@@ -127,7 +127,8 @@ class Room:
         """Write the layered room and return the path of its root layer.
 
         Arguments:
-            folder: created if need be; a room of ours in it is regenerated, all other files stay untouched.
+            folder: created if need be, its name names the room; a room of ours in it is regenerated, all other files
+                stay untouched.
             force: also write into a folder that holds other things than a room of ours.
             preview: draw `<name>.png` (needs the extra `render`; left out without it).
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,14 @@ from pxr import Sdf, Usd
 
 import echousd
 from echousd.room import folder as folders
+from echousd.room.assets import layer_bytes
 from echousd.room.compose import LAYERS, room_files
 from echousd.room.room import Room
 
 
 def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True) -> Path:
     """Write the layered room; see `Room.save`."""
+    room = replace(room, name=identifier(folder.resolve().name))
     old = folders.claim(folder, force=force)
     recorded: dict[str, str] = old.get("files", {})
     files = room_files(room)
@@ -44,6 +47,12 @@ def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = 
     return folder / root
 
 
+def identifier(word: str) -> str:
+    """A file's or folder's name as a USD identifier."""
+    name = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in word) or "room"
+    return name if not name[0].isdigit() else f"_{name}"
+
+
 def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
     """Write the room as one `.usda` or `.usdc` file without references (variants of the layout included).
 
@@ -57,10 +66,7 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
         raise ValueError(f"{path}: exists; choose another file or use --force")
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         root = save_room(room, Path(scratch) / room.name, preview=False)
-        layer = flat_layer(root, layouts=room)
-        out = Path(scratch) / f"flat{path.suffix}"
-        layer.Export(str(out))
-        write_whole(path, out.read_bytes())
+        write_whole(path, layer_bytes(flat_layer(root, layouts=room), path.suffix))
     return path
 
 

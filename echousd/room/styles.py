@@ -10,7 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
 
-SIZE_TOLERANCE = 0.08  # largest relative difference of an extent that still is the same piece of furniture
+ALIKE = 0.15  # largest relative difference of an extent that may be the same piece of furniture
+EQUAL = 1e-3  # largest relative difference of an extent within one asset
 AGREEMENT = 0.75  # least intersection over union of two shapes in their boxes
 ROOM_STYLE = "room"
 
@@ -56,6 +57,37 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     return {node.name: out[node.name] for node in graph.nodes}
 
 
+def equal_sizes(
+    names: Sequence[str],
+    categories: Sequence[str],
+    styles: Mapping[str, str],
+    size: np.ndarray,
+    free: np.ndarray,
+) -> np.ndarray:
+    """(n, 3) sizes in which objects of one category and one style group that are nearly alike are exactly alike.
+
+    Arguments:
+        names, categories: n words each.
+        styles: object name -> style, see `style_groups`.
+        size: (n, 3) float, metres.
+        free: (n,) bool, sizes that may change.
+    """
+    out = np.array(size, float)
+    left = [i for i in range(len(names)) if free[i] and styles[names[i]] != ROOM_STYLE]
+    while left:
+        first = left[0]
+        group = [
+            i
+            for i in left
+            if categories[i] == categories[first]
+            and styles[names[i]] == styles[names[first]]
+            and np.abs(size[i] / size[first] - 1).max() <= ALIKE
+        ]
+        out[group] = size[group].mean(0)
+        left = [i for i in left if i not in group]
+    return out
+
+
 def shared_assets(
     names: Sequence[str],
     categories: Sequence[str],
@@ -65,7 +97,7 @@ def shared_assets(
 ) -> dict[str, str]:
     """Object name -> name of the object whose asset it uses (itself if nothing agrees).
 
-    Objects agree when they have one category and one style group, their sizes differ by at most `SIZE_TOLERANCE`, and
+    Objects agree when they have one category and one style group, their sizes are equal (`equal_sizes`), and
     their shapes overlap by at least `AGREEMENT`.
 
     Arguments:
@@ -89,7 +121,7 @@ def shared_assets(
 
 
 def _agree(i: int, j: int, size: np.ndarray, occupancy: np.ndarray | None) -> bool:
-    if np.abs(size[i] / size[j] - 1).max() > SIZE_TOLERANCE:
+    if np.abs(size[i] / size[j] - 1).max() > EQUAL:
         return False
     if occupancy is None:
         return True
