@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import shutil
+import uuid
 from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
@@ -60,21 +61,20 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
         raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(WRITABLE)}")
     if not path.parent.is_dir():
         raise StageError(f"{path}: the folder {path.parent} does not exist")
+    temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:12]}{path.suffix}")
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise StageError(f"{path}: cannot be written ({error.strerror})") from None
-    os.close(handle)
-    try:
-        if not layer.Export(temporary):
+        temporary.touch(exist_ok=False)  # with the rights that the umask gives
+        if path.is_file():
+            shutil.copymode(path, temporary)
+        if not layer.Export(str(temporary)):
             raise StageError(f"{path}: cannot be written")
-        Path(temporary).replace(path)
+        temporary.replace(path)
     except (OSError, Tf.ErrorException) as error:
         raise StageError(
             f"{path}: cannot be written ({said(error) if isinstance(error, Tf.ErrorException) else error.strerror})"
         ) from None
     finally:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
     loaded = Sdf.Layer.Find(str(path.absolute()))
     if loaded:  # a stage of this process has the file open: let it follow
         loaded.Reload(force=True)

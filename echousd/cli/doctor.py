@@ -1,0 +1,158 @@
+"""`echousd plugin-path` and `echousd doctor`: where the schema lies, and what is missing on this machine."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from importlib import import_module, metadata, resources, util
+
+import typer
+
+# Optional extra of the distribution, the modules it brings, what needs it.
+EXTRAS = (
+    ("render", ("embreex",), "fast ray casting for pictures"),
+    ("texture", ("xatlas",), "texture coordinates"),
+    ("validate", ("usd_validation_nvidia",), "NVIDIA's rules in `echousd check`"),
+    ("ray", ("ray",), "`echousd batch --ray`"),
+    ("text", ("open_clip",), "text features of the released models"),
+    ("train", ("tensorboard", "h5py"), "training"),
+)
+OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at; `state` is ok, gap (something will not work) or optional (an extra not installed)."""
+
+    name: str
+    state: str
+    found: str
+    remedy: str = ""
+
+
+def diagnose() -> list[Finding]:
+    """Look at the USD provider, the schema plugin, torch, the weights and the optional extras."""
+    checks: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _usd, _plugin, _torch, _weights, _extras)
+    return [finding for check in checks for finding in check()]
+
+
+def _python() -> Iterator[Finding]:
+    yield Finding("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+
+
+def _usd() -> Iterator[Finding]:
+    if util.find_spec("pxr") is None:
+        yield Finding("usd", "gap", "no pxr module", "pip install usd-core")
+        return
+    from pxr import Usd
+
+    version = Usd.GetVersion()
+    by = sorted({f"{name} {metadata.version(name)}" for name in metadata.packages_distributions().get("pxr", [])})
+    text = f"OpenUSD {version[1]}.{version[2]:02d} from {' and '.join(by) or import_module('pxr').__path__[0]}"
+    if len(by) > 1:
+        yield Finding("usd", "gap", text, "two distributions share the module pxr: uninstall one of them")
+    elif version < OLDEST or util.find_spec("pxr.UsdSemantics") is None:
+        yield Finding("usd", "gap", text, "OpenUSD 24.11 or newer is needed (UsdSemantics): pip install -U usd-core")
+    else:
+        yield Finding("usd", "ok", text)
+
+
+def _plugin() -> Iterator[Finding]:
+    from echousd import plugin
+
+    folder = plugin.plugin_path()
+    if util.find_spec("pxr") is None:
+        yield Finding("schema plugin", "gap", f"not active, {folder}", "install a pxr first")
+    elif plugin.is_active():
+        yield Finding("schema plugin", "ok", f"active, {folder}")
+    else:
+        remedy = f"import echousd before a stage is opened, or set {plugin.ENVIRONMENT_VARIABLE}={folder}"
+        yield Finding("schema plugin", "gap", f"not active, {folder}", remedy)
+
+
+def _torch() -> Iterator[Finding]:
+    if util.find_spec("torch") is None:
+        yield Finding("torch", "gap", "not installed", "pip install torch")
+        return
+    import torch
+
+    devices = [f"cpu ({torch.get_num_threads()} threads)"]
+    devices += [f"cuda:{i} ({torch.cuda.get_device_name(i)})" for i in range(torch.cuda.device_count())]
+    if torch.backends.mps.is_available():
+        devices.append("mps")
+    yield Finding("torch", "ok", f"{torch.__version__}, devices: {', '.join(devices)}")
+
+
+def _weights() -> Iterator[Finding]:
+    folder = resources.files("echomodel").joinpath("weights")
+    entries = folder.iterdir() if folder.is_dir() else ()
+    files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
+    if files:
+        sizes = (len(folder.joinpath(name).read_bytes()) / 2**20 for name in files)
+        told = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
+        yield Finding("weights", "ok", f"{told} in {folder}")
+    else:
+        yield Finding("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
+
+
+def _extras() -> Iterator[Finding]:
+    for extra, modules, purpose in EXTRAS:
+        missing = [module for module in modules if util.find_spec(module) is None]
+        if missing:
+            remedy = f"pip install 'echousd[{extra}]'"
+            yield Finding(f"extra {extra}", "optional", f"not installed ({purpose})", remedy)
+        else:
+            yield Finding(f"extra {extra}", "ok", f"installed ({purpose})")
+
+
+def register(app: typer.Typer) -> None:
+    """Add `plugin-path` and `doctor`."""
+
+    @app.command("plugin-path")
+    def plugin_path() -> None:
+        """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD).
+
+        Example: PXR_PLUGINPATH_NAME=$(echousd plugin-path) usdview bedroom.usda
+        """
+        from echousd import plugin
+
+        typer.echo(plugin.plugin_path())
+
+    @app.command()
+    def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+        """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one.
+
+        Example: echousd doctor --json
+        """
+        findings = diagnose()
+        healthy = all(finding.state != "gap" for finding in findings)
+        if as_json:
+            typer.echo(json.dumps({"ok": healthy, "findings": [asdict(finding) for finding in findings]}, indent=2))
+        else:
+            _show(findings)
+        raise typer.Exit(0 if healthy else 1)
+
+
+def _show(findings: list[Finding]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    colours = {"ok": "green", "gap": "red", "optional": "yellow"}
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("", "state", "found", "remedy"):
+        table.add_column(heading, overflow="fold")
+    for finding in findings:
+        state = f"[{colours[finding.state]}]{finding.state}[/]"
+        table.add_row(finding.name, state, _plain(finding.found), _plain(finding.remedy))
+    console = Console()
+    if not console.is_terminal:
+        console.width = 200  # nobody's window: keep paths on one line
+    console.print(table)
+
+
+def _plain(text: str) -> str:
+    from rich.markup import escape
+
+    return escape(text)
