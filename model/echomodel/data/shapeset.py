@@ -1,0 +1,221 @@
+"""Sets of shapes on disk: sharded, memory-mapped, 4-bit TSDFs under zstd, a few kilobytes a shape.
+
+A folder holds `shapes.json` (what the set is, written last) and shards `shapes-0000.bin`: a header, one fixed-size entry
+per shape, then the compressed grids. Shape number `style * C + category` of a parametric set is the piece of that
+category in that style, C being the number of categories; rooms name it `s{style}_{category}`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zstandard
+
+from echomodel.data.furniture import Style, sample_size, solids, tsdf_of
+from echomodel.data.furniture.solids import Solid
+from echomodel.data.tsdf import RESOLUTION, TRUNCATION
+from echomodel.vocabulary import vocabulary
+
+# Magnitudes of the 16 levels in voxels: finest about the surface, where the zero crossing is read off.
+MAGNITUDES = np.array([0.12, 0.38, 0.68, 1.05, 1.5, 2.1, 2.95, 4.0])
+LEVELS = (np.concatenate([-MAGNITUDES[::-1], MAGNITUDES]) / TRUNCATION).astype(np.float32)
+EDGES = (LEVELS[1:] + LEVELS[:-1]) / 2
+MAGIC = b"ECHOSHP1"
+ENTRY = np.dtype(
+    [("offset", "<u8"), ("length", "<u4"), ("category", "<i4"), ("style", "<i4"), ("held_out", "<i4"), ("size", "<f4", 3)]
+)
+STYLES_PER_SHARD = 8
+COMPRESSION = 12
+HELD_OUT_EVERY = 20  # every twentieth style is kept out of training
+STYLES = {"smoke": 2, "packed": 160, "full": 327}  # per recipe; times 46 categories
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeRecord:
+    """One shape to store: its TSDF (64, 64, 64), category id, style (or -1), size (3,) in metres, and its split."""
+
+    tsdf: np.ndarray
+    category: int
+    style: int
+    size: np.ndarray
+    held_out: bool
+
+
+def piece(seed: int, style: int, category: str) -> tuple[Style, np.ndarray, list[Solid]]:
+    """The piece of `category` in style number `style` of the world with this seed: its style, size (3,) and solids."""
+    position = vocabulary().category_id(category)
+    look = Style.draw(np.random.default_rng([seed, style]))
+    rng = np.random.default_rng([seed, style, position])
+    size = sample_size(category, rng, look)
+    return look, size, solids(category, look, rng, size)
+
+
+def quantised(tsdf: np.ndarray) -> np.ndarray:
+    """TSDF values in [-1, 1] -> level numbers 0..15, uint8."""
+    return np.searchsorted(EDGES, tsdf).astype(np.uint8)
+
+
+def build_shapes(
+    directory: str | os.PathLike[str],
+    styles: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> ShapeSet:
+    """Make all categories in `styles` styles, shard by shard; the same bytes for the same seed, whenever interrupted.
+
+    Arguments:
+        directory: folder of the set; shards that are complete there are kept.
+        styles: number of styles, at least 1.
+        seed: seed of the world.
+        progress: called with (shapes done, shapes in all) after each style.
+
+    Raises ValueError where the folder holds a set with another seed or number of styles.
+    """
+    if styles < 1:
+        raise ValueError(f"number of styles is {styles}, need at least 1")
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [category.name for category in vocabulary().categories]
+    plan = {"kind": "parametric", "seed": seed, "styles": styles, "categories": names}
+    _claim(folder, plan)
+    total = styles * len(names)
+    for number, first in enumerate(range(0, styles, STYLES_PER_SHARD)):
+        chunk = range(first, min(first + STYLES_PER_SHARD, styles))
+        path = folder / f"shapes-{number:04d}.bin"
+        if not path.exists():
+            write_shard(path, _records(chunk, names, seed, lambda done: progress and progress(done, total)))
+        elif progress:
+            progress(chunk[-1] * len(names) + len(names), total)
+    _write_json(folder / "shapes.json", {**plan, "count": total, "resolution": RESOLUTION, "truncation": TRUNCATION})
+    return ShapeSet(folder)
+
+
+def _records(styles: range, names: list[str], seed: int, done: Callable[[int], object]) -> Iterable[ShapeRecord]:
+    for style in styles:
+        for category, name in enumerate(names):
+            _, size, parts = piece(seed, style, name)
+            yield ShapeRecord(tsdf_of(parts), category, style, size, style % HELD_OUT_EVERY == HELD_OUT_EVERY - 1)
+        done((style + 1) * len(names))
+
+
+def _claim(folder: Path, plan: dict) -> None:
+    """Remember what the folder is being filled with; refuse a folder that was begun with something else."""
+    note = folder / "plan.json"
+    if note.exists():
+        found = json.loads(note.read_text("utf-8"))
+        wrong = [key for key in plan if found.get(key) != plan[key]]
+        if wrong:
+            told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
+            raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
+    else:
+        _write_json(note, plan)
+
+
+def _write_json(path: Path, content: dict) -> None:
+    part = path.with_suffix(path.suffix + ".part")
+    part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+    part.replace(path)
+
+
+def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) -> int:
+    """Write one shard, complete or not at all, and return the number of its shapes."""
+    path = Path(path)
+    compressor = zstandard.ZstdCompressor(level=COMPRESSION, write_content_size=True)
+    blobs, entries, offset = [], [], 0
+    for record in records:
+        blob = compressor.compress(quantised(record.tsdf).tobytes())
+        entries.append((offset, len(blob), record.category, record.style, int(record.held_out), tuple(record.size)))
+        blobs.append(blob)
+        offset += len(blob)
+    table = np.array(entries, ENTRY)
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        file.write(MAGIC + np.array([len(table)], "<u8").tobytes() + table.tobytes())
+        file.writelines(blobs)
+    part.replace(path)
+    return len(table)
+
+
+class ShapeSet:
+    """A set of shapes on disk, read shape by shape through memory maps.
+
+    Arguments:
+        directory: folder with `shapes.json` and its shards.
+
+    Attributes: `category` (n,) int class ids, `style` (n,) int, `size` (n, 3) float32 metres, `held_out` (n,) bool and
+    `info`, the content of `shapes.json`. Raises ValueError for a folder without a finished set or with a damaged shard.
+    """
+
+    def __init__(self, directory: str | os.PathLike[str]):
+        self.directory = Path(directory)
+        index = self.directory / "shapes.json"
+        if not index.exists():
+            hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no shapes.json"
+            raise ValueError(f"{self.directory}: not a shape set ({hint})")
+        self.info: dict = json.loads(index.read_text("utf-8"))
+        self.categories: tuple[str, ...] = tuple(self.info["categories"])
+        paths = sorted(self.directory.glob("shapes-*.bin"))
+        self._shards = [np.memmap(path, np.uint8, mode="r") for path in paths]
+        tables = [_table(path, shard) for path, shard in zip(paths, self._shards, strict=True)]
+        count = sum(len(table) for table in tables)
+        if count != self.info["count"]:
+            raise ValueError(f"{self.directory}: shards hold {count} shapes, shapes.json says {self.info['count']}")
+        self._table = np.concatenate(tables)
+        self._shard_of = np.repeat(np.arange(len(tables)), [len(table) for table in tables])
+        self._begin = [len(MAGIC) + 8 + table.nbytes for table in tables]
+        self._decompressor = zstandard.ZstdDecompressor()
+        self.category = self._table["category"].astype(np.int64)
+        self.style = self._table["style"].astype(np.int64)
+        self.size = self._table["size"].copy()
+        self.held_out = self._table["held_out"].astype(bool)
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def __getstate__(self) -> dict:
+        return {"directory": self.directory}
+
+    def __setstate__(self, state: dict) -> None:
+        self.__init__(state["directory"])  # type: ignore[misc]
+
+    def codes(self, index: int) -> np.ndarray:
+        """Level numbers (64, 64, 64) uint8 of one shape; `LEVELS[codes]` is its TSDF."""
+        entry, shard = self._table[index], int(self._shard_of[index])
+        start = self._begin[shard] + int(entry["offset"])
+        raw = self._decompressor.decompress(self._shards[shard][start : start + int(entry["length"])].data)
+        return np.frombuffer(raw, np.uint8).reshape((RESOLUTION,) * 3)
+
+    def __getitem__(self, index: int) -> np.ndarray:
+        """TSDF (64, 64, 64) float32 of one shape."""
+        return LEVELS.take(self.codes(index))
+
+    def tsdf(self, indices: Sequence[int] | np.ndarray) -> np.ndarray:
+        """TSDFs (n, 64, 64, 64) float32 of several shapes."""
+        return LEVELS.take(np.stack([self.codes(int(i)) for i in indices]))
+
+    def index_of(self, name: str) -> int:
+        """Shape number of a model name `s{style}_{category}` of a parametric set; raises ValueError."""
+        style, _, category = name.removeprefix("s").partition("_")
+        if not name.startswith("s") or not style.isdigit() or category not in self.categories:
+            raise ValueError(f"model {name!r} is not a shape of this set, names are s<style>_<category>")
+        index = int(style) * len(self.categories) + self.categories.index(category)
+        if index >= len(self):
+            raise ValueError(f"model {name!r}: the set has styles 0 to {len(self) // len(self.categories) - 1}")
+        return index
+
+
+def _table(path: Path, shard: np.ndarray) -> np.ndarray:
+    if bytes(shard[:8]) != MAGIC:
+        raise ValueError(f"{path}: not a shard of shapes (begins with {bytes(shard[:8])!r}, expected {MAGIC!r})")
+    count = int(np.frombuffer(shard[8:16].tobytes(), "<u8")[0])
+    end = 16 + count * ENTRY.itemsize
+    table = np.frombuffer(shard[16:end].tobytes(), ENTRY)
+    need = end + int(table["length"].sum())
+    if len(shard) != need:
+        raise ValueError(f"{path}: damaged shard, {len(shard)} bytes of {need}; remove it and build again")
+    return table
