@@ -127,12 +127,13 @@ class Builder:
         x, z = anchor.local(lateral, forward)
         return self.put(category, size, x, z, anchor.yaw + turn, style, play=play, ignore=ignore, doors=doors)
 
-    def wall_spot(self, width: float, corner: float) -> tuple[Wall, float] | None:
+    def wall_spot(self, width: float, corner: float, margin: float = 0.0) -> tuple[Wall, float] | None:
         """A wall that is long enough and the place along it of something `width` wide.
 
         Arguments:
             width: metres.
             corner: share of the draws that go into a corner.
+            margin: distance in metres that the others keep from the wall's ends, where it is long enough.
         """
         fits = [wall for wall in self.floor.walls if wall.length >= width - 0.02]
         if not fits:
@@ -143,18 +144,19 @@ class Builder:
             along = min(abs(self.rng.normal(0.0, 0.06)), free)
             along = along if self.rng.random() < 0.5 else free - along
         else:
-            along = free * self.rng.random()
+            margin = min(margin, free / 2)
+            along = margin + (free - 2 * margin) * self.rng.random()
         return wall, along + width / 2
 
     def against_wall(
         self, category: str, *, size: Size | None = None, corner: float = 0.3, gap: float | None = None,
-        style: int | None = None, tries: int = 12, yaw: float | None = None,
+        style: int | None = None, tries: int = 12, yaw: float | None = None, margin: float = 0.0,
     ) -> Item | None:  # fmt: skip
         """Place one item with its back to a wall; `yaw` asks for walls of that direction only."""
         size = size or self.size(category)
         style = self.style() if style is None else style
         for _ in range(tries):
-            spot = self.wall_spot(size[0], corner)
+            spot = self.wall_spot(size[0], corner, margin)
             if spot is None:
                 return None
             wall, along = spot

@@ -84,23 +84,28 @@ class Floor:
 
 def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Floor:
     """Draw the floor of a room of the given kind: extents, cut corners, height, one or two doors, a window."""
-    z = rng.standard_normal(2)
-    short = quantile(statistics.short, z[0])
-    long = max(quantile(statistics.long, 0.55 * z[0] + 0.84 * z[1]), short)
-    short, long = round(short / 2, 2), round(long / 2, 2)
-    half_x, half_z = (long, short) if rng.random() < 0.45 else (short, long)
-    sizes: list[tuple[float, float]] = [(0.0, 0.0)] * 4
-    if rng.random() >= statistics.rectangular:
-        sizes = _cuts(half_x, half_z, statistics.cuts, rng)
+    target = math.log(quantile(statistics.area, rng.standard_normal()))
+    rectangular = rng.random() < statistics.rectangular
+    best, half_x, half_z, sizes = math.inf, 0.0, 0.0, [(0.0, 0.0)] * 4
+    for _ in range(5):  # of several outlines, the one whose area is nearest to the drawn one
+        short = round(quantile(statistics.short, rng.standard_normal()) / 2, 2)
+        long = max(round(quantile(statistics.long, rng.standard_normal()) / 2, 2), short)
+        x, z = (long, short) if rng.random() < 0.45 else (short, long)
+        cuts = [(0.0, 0.0)] * 4 if rectangular else _cuts(x, z, statistics.cuts, rng)
+        area = 4 * x * z - sum(w * d for w, d in cuts)
+        if abs(math.log(area) - target) < best:
+            best, half_x, half_z, sizes = abs(math.log(area) - target), x, z, cuts
     polygon = _trace(half_x, half_z, sizes)
-    cuts = tuple(_cut(half_x, half_z, sx, sz, *size) for (sx, sz), size in zip(CORNERS, sizes, strict=True) if size[0])
+    removed = tuple(
+        _cut(half_x, half_z, sx, sz, *size) for (sx, sz), size in zip(CORNERS, sizes, strict=True) if size[0]
+    )
     walls = _walls(polygon)
     area = 4 * half_x * half_z - sum(w * d for w, d in sizes)
     height = float(np.round(quantile(statistics.height, rng.standard_normal()), 2))
     doors = [_opening(walls, rng.uniform(0.8, 1.0), DOOR_DEPTH, rng) for _ in range(1 + (area > 18) + (area > 30))]
     windows = [_opening(walls, rng.uniform(1.0, 2.0), 0.35, rng) for _ in range(1 + (area > 25))]
     return Floor(
-        half_x, half_z, polygon, height, cuts, walls,
+        half_x, half_z, polygon, height, removed, walls,
         tuple(d for d in doors if d), tuple(w for w in windows if w), area,
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ import math
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item, Size
 
 SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa", "sofa", "chaise_longue_sofa", "lazy_sofa")
+LOW_ROOM = 3.7
 BEDS = ("double_bed", "single_bed", "kids_bed")
 
 
@@ -20,14 +21,17 @@ def bed_group(room: Builder, category: str) -> Item | None:
     bed: Item | None = None
     for attempt in range(30):
         # With two nightstands the group needs its whole width at the wall; a crowded room gives up one of them.
-        sides = min(count, 2 if attempt < 12 else 1 if attempt < 20 else 0)
+        sides = min(count, 2 if attempt < 16 else 1 if attempt < 22 else 0)
         width = size[0] + sides * (stand[0] + 0.05)
-        spot = room.wall_spot(width, 0.12 if sides == 2 else 0.35)
+        spot = room.wall_spot(width, 0.05 if sides == 2 else 0.25, 0.2)
         if spot is None:
             continue
         wall, along = spot
         if room.chance(0.35) and wall.length > width:  # in the middle of its wall
             along = wall.length / 2 + room.rng.normal(0.0, 0.12)
+        across, _ = room.floor.opposite(wall, along)
+        if across > LOW_ROOM and attempt < 10 and room.chance(0.5):  # beds stand across the room rather than along it
+            continue
         if sides == 1:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
         x, z = wall.point(along, size[2] / 2 + room.wall_gap())
@@ -38,7 +42,7 @@ def bed_group(room: Builder, category: str) -> Item | None:
         return None
     _nightstands(room, bed, stand, count, style)
     for foot, share in (("bench", 1.0), ("ottoman", 0.75)):
-        if room.wanted.get(foot) and room.chance(share):
+        if room.wanted.get(foot) and room.chance(share):  # at the foot
             piece = room.size(foot)
             forward = size[2] / 2 + piece[2] / 2 + room.uniform(0.0, 0.15)
             if room.beside(bed, foot, piece, room.rng.normal(0, 0.05), forward, 0.0, style):
@@ -51,7 +55,7 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
         return
     gap = abs(room.rng.normal(0.0, 0.09)) - 0.06 if room.chance(0.85) else room.uniform(0.1, 0.4)
     lateral = bed.size[0] / 2 + size[0] / 2 + gap
-    shift = room.uniform(-0.05, 0.06) if room.chance(0.75) else room.uniform(0, 0.2)
+    shift = room.uniform(-0.1, 0.05) if room.chance(0.75) else room.uniform(0, 0.2)
     forward = -bed.size[2] / 2 + size[2] / 2 + shift
     sides = [1, -1] if room.chance(0.5) else [-1, 1]
     placed = 0
@@ -98,17 +102,22 @@ def sofa_group(room: Builder, category: str) -> Item | None:
     size = room.size(category)
     wants_tv = room.wanted.get("tv_stand", 0) > 0
     sofa = None
-    for attempt in range(24):
-        spot = room.wall_spot(size[0], 0.12)
+    sides = 0.4 if any(room.wanted.get(table) for table in ("side_table", "round_end_table", "floor_lamp")) else 0.15
+    pulled = room.chance(0.1)
+    for attempt in range(30):
+        spot = room.wall_spot(size[0], 0.3 if category == "l_shaped_sofa" else 0.02, sides if attempt < 20 else 0.0)
         if spot is None:
             break
         wall, along = spot
         distance, _ = room.floor.opposite(wall, along)
-        gap = room.wall_gap() if room.chance(0.85) else room.uniform(0.2, 1.4)
-        if attempt < 16 and distance < (2.6 if wants_tv else 1.9):
+        gap = abs(room.rng.normal(0.03, 0.06))
+        low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
+        if attempt < 14 and not (low < distance < high):
             continue
-        if wants_tv and distance > 4.6 and room.chance(0.7):  # a sofa does not stand far from its television
-            gap = min(distance - size[2] / 2 - room.uniform(2.9, 3.5), distance - 3.0)
+        if attempt < 22 and distance < (2.6 if wants_tv else 1.8):
+            continue
+        if wants_tv and distance > 4.8 and pulled:  # then the sofa comes towards its television
+            gap = max(min(distance - size[2] / 2 - room.uniform(2.9, 3.5), distance - 3.0), gap)
         x, z = wall.point(along, size[2] / 2 + gap)
         sofa = room.put(category, size, x, z, wall.yaw, style)
         if sofa:
@@ -186,12 +195,13 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
         if not count or not room.chance(0.85):
             continue
         size = room.size(category)
-        askew = category in ("armchair", "lounge_chair") and room.chance(0.48)
+        askew = category in ("armchair", "lounge_chair") and room.chance(0.55)
+        stray = category in ("ottoman", "stool")
         chair_style = style if room.chance(0.6) else room.style()
         side = 1 if room.chance(0.5) else -1
-        for _ in range(min(count, 3)):
-            for attempt in range(8):
-                if attempt < 5 or room.chance(0.5):
+        for _ in range(min(count, 4)):
+            for attempt in range(12):
+                if attempt < 8 or room.chance(0.5):
                     lateral = side * max(
                         reach + size[2] / 2 + room.uniform(0.2, 0.7), sofa.size[0] / 2 + room.uniform(-0.1, 0.7)
                     )
@@ -202,12 +212,14 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
                     forward = forward_table + reach * 0.6 + size[2] / 2 + room.uniform(0.3, 0.7)
                     turn = math.pi
                 if askew:
-                    turn += -side * room.uniform(-0.8, 0.8)
+                    turn += room.pick([-side, side], [0.6, 0.4]) * room.uniform(0.12, 0.85)
+                if stray:
+                    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.45, 0.28, 0.13, 0.14])
                 if room.beside(sofa, category, size, lateral, forward, turn, chair_style):
                     room.wanted[category] -= 1
                     side = -side
                     break
-                if attempt == 3:
+                if attempt in (3, 6):
                     side = -side
 
 
@@ -271,7 +283,7 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
 
 def _chairs_around(room: Builder, table: Item, category: str, size: Size, count: int, style: int) -> None:
     length, depth = table.size[0], table.size[2]
-    per_side = 2 if count <= 6 or length < 1.9 else 3
+    per_side = 2 if count <= 6 else min((count - 1) // 2, 4)
     if (count == 2 and room.chance(0.5)) or length < 0.95:
         per_side = 1
     if count == 6 and length > 1.9 and room.chance(0.6):
@@ -297,14 +309,17 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
             count -= 1
 
 
-def desk_group(room: Builder, category: str = "desk", seats: tuple[str, ...] = ("office_chair",)) -> Item | None:
+def desk_group(
+    room: Builder, category: str = "desk", seats: tuple[str, ...] = ("office_chair",), yaw: float | None = None
+) -> Item | None:
     """A desk or dressing table at a wall (a desk may stand free) with its chair."""
     style = room.style()
     size = room.size(category)
     desk = None
-    if category == "desk" and room.chance(0.3):
+    if category == "desk" and room.chance(0.42):
         desk = room.somewhere(category, size=size, style=style, clearance=0.3)
-    desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=16)
+    desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=20, yaw=yaw)
+    desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=12)
     if desk is None:
         return None
     seat = next((s for s in seats if room.wanted.get(s)), None)

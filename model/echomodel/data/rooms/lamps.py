@@ -38,7 +38,12 @@ def _bed_pendants(room: Builder, bed: Item, count: int) -> None:
         else:
             x, z = 0.5 * bed.x + room.rng.normal(0.0, 0.15), 0.5 * bed.z + room.rng.normal(0.0, 0.15)
         _hang(room, "pendant_lamp", room.size("pendant_lamp"), x, z, _turn(room, None))
-    if count >= 2:
+    if count == 2 and room.chance(0.5):  # a pair along the bed's middle
+        size = room.size("pendant_lamp")
+        for forward in (-0.2, 0.75):
+            x, z = bed.local(room.rng.normal(0.0, 0.3), forward + room.rng.normal(0.0, 0.2))
+            _hang(room, "pendant_lamp", size, x, z, _turn(room, None))
+    elif count >= 2:
         size = room.size("pendant_lamp")
         shrink = min(1.0, 0.45 / max(size[0], size[2]))
         size = (size[0] * shrink, size[1], size[2] * shrink)
@@ -81,7 +86,7 @@ def _over(room: Builder, anchor: Item | None) -> tuple[float, float]:
 
 def _turn(room: Builder, anchor: Item | None) -> float:
     base = anchor.yaw if anchor is not None and room.chance(0.5) else 0.0
-    return base + room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.55, 0.17, 0.1, 0.18])
+    return base + room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.34, 0.25, 0.18, 0.23])
 
 
 def _hang(

@@ -26,8 +26,9 @@ SUBSTITUTES = {
 }
 # Seldom seen things that the default graphs still ask for.
 EXTRAS = {"table_lamp": 0.05, "tv": 0.04, "wall_lamp": 0.03, "bench": 0.04}
-# Of these a room holds one kind.
-EXCLUSIVE = (BEDS, ("pendant_lamp", "ceiling_lamp"))
+SOFA_KINDS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa")
+# Of these a room mostly holds one kind.
+EXCLUSIVE = (BEDS, SOFA_KINDS, ("pendant_lamp", "ceiling_lamp"))
 STORAGE = (
     "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
     "children_cabinet",
@@ -51,7 +52,9 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
             want[category] = counts[int(np.searchsorted(cumulative, rng.random()))]
     for group in EXCLUSIVE:
         held = [category for category in group if category in want]
-        keep = 0.12 if group[0] == "pendant_lamp" else 0.0
+        keep = 0.0
+        if group[0] == "pendant_lamp":
+            keep = 0.12 if statistics.name == "bedroom" else 0.6
         if len(held) > 1 and rng.random() >= keep:
             weights = np.array([statistics.presence[category][0] for category in held])
             chosen = held[int(np.searchsorted(np.cumsum(weights / weights.sum()), rng.random()))]
@@ -89,7 +92,8 @@ def _bedroom(room: Builder) -> None:
         television(room, beds[0])
     _wardrobe(room, beds[0] if beds else None)
     if room.take("dressing_table"):
-        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair", "dining_chair", "ottoman"))
+        yaw = beds[0].yaw + room.pick([0.0, math.pi], [1, 1]) if beds and room.chance(0.9) else None
+        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair", "dining_chair", "ottoman"), yaw=yaw)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, list(beds))
@@ -98,14 +102,29 @@ def _bedroom(room: Builder) -> None:
 def _wardrobe(room: Builder, bed: Item | None) -> None:
     """Wardrobes along the side walls of the bed."""
     for _ in range(room.take("wardrobe")):
-        placed = None
         size, style = room.size("wardrobe"), room.style()
-        if bed is not None and room.chance(0.85):
-            turn = bed.yaw + room.pick([HALF_PI, -HALF_PI], [1, 1])
-            for yaw in (turn, turn + math.pi):
-                placed = placed or room.against_wall("wardrobe", size=size, style=style, corner=0.5, yaw=yaw)
-        if placed is None:
+        if bed is None or not room.chance(0.88) or not _beside_bed(room, bed, size, style):
             room.against_wall("wardrobe", size=size, style=style, corner=0.5, tries=16)
+
+
+def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], style: int) -> Item | None:
+    """A wardrobe at a side wall, level with the bed or in the corner beside its head."""
+    walls = [wall for wall in room.floor.walls if abs(math.sin(wall.yaw - bed.yaw)) > 0.9 and wall.length >= size[0]]
+    for attempt in range(10):
+        if not walls:
+            return None
+        wall = walls[int(room.rng.integers(len(walls)))]
+        level = (bed.x - wall.x) * wall.dx + (bed.z - wall.z) * wall.dz
+        along = level + room.rng.normal(0.0, 0.12 + 0.06 * attempt)
+        ends = (size[0] / 2 + 0.01, wall.length - size[0] / 2 - 0.01)
+        if room.chance(0.5):
+            along = min(ends, key=lambda end: abs(end - level))
+        along = min(max(along, ends[0]), max(ends))
+        x, z = wall.point(along, size[2] / 2 + abs(room.rng.normal(0.03, 0.02)))
+        placed = room.put("wardrobe", size, x, z, wall.yaw, style)
+        if placed:
+            return placed
+    return None
 
 
 def _living_room(room: Builder) -> None:
@@ -173,7 +192,7 @@ def _desks(room: Builder) -> None:
 def _rest(room: Builder) -> None:
     """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
     for _ in range(room.take("tv_stand")):
-        room.against_wall("tv_stand", corner=0.15)
+        room.against_wall("tv_stand", corner=0.05, margin=0.2)
     for category in STORAGE:
         count = room.take(category)
         if count:
@@ -201,8 +220,8 @@ def _by_the_wall(room: Builder, category: str) -> None:
     size, style = room.size(category), room.style()
     stands = [item for item in room.items if item.category == "tv_stand"]
     turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2])
-    if category == "floor_lamp" and room.chance(0.3):
-        turn += room.uniform(-0.7, 0.7)
+    if category == "floor_lamp" and room.chance(0.4):
+        turn += room.uniform(0.12, 0.75)
     if stands and category == "plant" and room.chance(0.5):
         stand = stands[0]
         for side in (1, -1) if room.chance(0.5) else (-1, 1):
@@ -223,11 +242,12 @@ def _loose(room: Builder, category: str, size: tuple[float, float, float], style
     """A loose seat: near a wall with its back to it and often askew, or on open floor."""
     if room.chance(0.6):
         for _ in range(8):
-            spot = room.wall_spot(size[0] + 0.1, 0.4)
+            spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
             if spot is None:
                 break
-            x, z = spot[0].point(spot[1], size[2] / 2 + room.uniform(0.03, 0.6))
-            turn = room.uniform(-0.8, 0.8) if room.chance(0.4) else 0.0
+            x, z = spot[0].point(spot[1], size[2] / 2 + room.uniform(0.1, 0.8))
+            askew = category in ("lounge_chair", "armchair", "chair") and room.chance(0.55)
+            turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.15, 0.8) if askew else 0.0
             if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
                 return
     room.somewhere(category, size=size, style=style)

@@ -1,0 +1,1 @@
+"""Measures: relations kept, room figures, sizes, and (shapes) reconstruction and set distances."""

@@ -1,0 +1,279 @@
+"""Figures of a set of rooms: counts, presence, sizes, distances to walls, pairs of furniture, relations, overlaps.
+
+They come in the form of `echomodel/data/room_statistics.json`, so that any set stands beside the real rooms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_rooms
+from echomodel.vocabulary import UnknownWord, vocabulary
+
+FIVE, THREE, QUARTERS = (5, 25, 50, 75, 95), (5, 50, 95), (25, 50, 75)
+LAMPS = ("pendant_lamp", "ceiling_lamp")
+
+
+def known_category(word: str) -> str | None:
+    """The vocabulary's name for a category of any source, None where it has none."""
+    try:
+        return vocabulary().category(word).name
+    except UnknownWord:
+        return None
+
+
+def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
+    """The rooms in the vocabulary's words, without the objects that it does not hold."""
+    out = []
+    for room in rooms:
+        names = [known_category(word) for word in room.categories]
+        keep = [k for k, name in enumerate(names) if name is not None]
+        styles = room.styles or (-1,) * len(room)
+        models = room.models or ("",) * len(room)
+        out.append(
+            RoomBoxes(
+                id=room.id,
+                room_type=vocabulary().room_type(room.room_type).name,
+                floor_polygon=room.floor_polygon,
+                height=room.height,
+                categories=tuple(names[k] or "" for k in keep),
+                size=room.size[keep],
+                position=room.position[keep],
+                yaw=room.yaw[keep],
+                models=tuple(models[k] for k in keep),
+                styles=tuple(styles[k] for k in keep),
+            )
+        )
+    return out
+
+
+def room_figures(rooms: Sequence[RoomBoxes]) -> dict:
+    """All figures of rooms in the vocabulary's words (see `with_known_words`).
+
+    Returns:
+        `rooms` (per type), `sizes`, `walls` (per class), `pairs`, `relations`, `overlap`: percentiles in metres, shares
+        0 to 1, in the form of `room_statistics.json`.
+    """
+    return {
+        "rooms": {kind: _type_figures(group) for kind, group in _by_type(rooms).items()},
+        "sizes": _sizes(rooms),
+        "walls": _walls(rooms),
+        "pairs": _pairs(rooms),
+        "relations": _relations(rooms),
+        "overlap": _overlap(rooms),
+    }
+
+
+def polygon_area(polygon: np.ndarray) -> float:
+    """Area of a polygon (k, 2), square metres."""
+    x, z = polygon.T
+    return float(abs(np.dot(x, np.roll(z, -1)) - np.dot(z, np.roll(x, -1))) / 2)
+
+
+def _by_type(rooms: Iterable[RoomBoxes]) -> dict[str, list[RoomBoxes]]:
+    groups: dict[str, list[RoomBoxes]] = defaultdict(list)
+    for room in rooms:
+        groups[room.room_type].append(room)
+    return groups
+
+
+def _type_figures(rooms: list[RoomBoxes]) -> dict:
+    extents = np.sort([np.ptp(room.floor_polygon, axis=0) for room in rooms], axis=-1)
+    counts = [Counter(room.categories) for room in rooms]
+    area = np.array([polygon_area(room.floor_polygon) for room in rooms])
+    number = np.array([len(room) for room in rooms])
+    presence = {}
+    for category in sorted({c for count in counts for c in count}):
+        held = [count[category] for count in counts if count[category]]
+        presence[category] = {
+            "share": len(held) / len(rooms),
+            "counts": {str(k): v for k, v in sorted(Counter(held).items())},
+        }
+    return {
+        "rooms": len(rooms),
+        "area": _percentiles(area, FIVE),
+        "short": _percentiles(extents[:, 0], FIVE),
+        "long": _percentiles(extents[:, 1], FIVE),
+        "objects": _percentiles(number, FIVE),
+        "rectangular": float(np.mean([len(room.floor_polygon) == 4 for room in rooms])),
+        "height": _percentiles([room.height for room in rooms], FIVE),
+        "area_count_correlation": float(np.corrcoef(area, number)[0, 1]) if len(rooms) > 2 else 0.0,
+        "presence": presence,
+    }
+
+
+def _sizes(rooms: Iterable[RoomBoxes]) -> dict:
+    boxes: dict[str, list[np.ndarray]] = defaultdict(list)
+    for room in rooms:
+        for k, category in enumerate(room.categories):
+            boxes[category].append(np.append(room.size[k], room.position[k, 1]))
+    out = {}
+    for category, rows in boxes.items():
+        table = np.percentile(rows, THREE, axis=0)
+        out[category] = {
+            "n": len(rows),
+            **{name: table[i, :3].tolist() for i, name in enumerate(("p5", "median", "p95"))},
+            "mount": table[:, 3].tolist(),
+        }
+    return out
+
+
+def ray_lengths(polygon: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Distance from points to the first wall met in their directions.
+
+    Arguments:
+        polygon: (k, 2) float, x and z of the corners.
+        origin: (n, 2) float. direction: (n, 2) float, unit vectors.
+
+    Returns:
+        (n,) float, infinity where no wall is met.
+    """
+    start, side = polygon, np.roll(polygon, -1, axis=0) - polygon
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = direction[:, None, 0] * side[None, :, 1] - direction[:, None, 1] * side[None, :, 0]
+        gap = start[None] - origin[:, None]
+        length = (gap[..., 0] * side[None, :, 1] - gap[..., 1] * side[None, :, 0]) / across
+        along = (gap[..., 0] * direction[:, None, 1] - gap[..., 1] * direction[:, None, 0]) / across
+        met = (np.abs(across) > 1e-9) & (length >= 0) & (along >= -1e-9) & (along <= 1 + 1e-9)
+    return np.where(met, length, np.inf).min(-1)
+
+
+def _walls(rooms: Iterable[RoomBoxes]) -> dict:
+    rows: dict[str, list[tuple[float, ...]]] = defaultdict(list)
+    for room in rooms:
+        if not len(room):
+            continue
+        front = np.stack([np.sin(room.yaw), np.cos(room.yaw)], -1)
+        right = np.stack([np.cos(room.yaw), -np.sin(room.yaw)], -1)
+        plan = room.position[:, [0, 2]]
+        reach = [ray_lengths(room.floor_polygon, plan, d) for d in (-front, right, -right, front)]
+        back = reach[0] - room.size[:, 2] / 2
+        side = np.minimum(reach[1], reach[2]) - room.size[:, 0] / 2
+        askew = np.abs((room.yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4)
+        for k, category in enumerate(room.categories):
+            if category not in LAMPS and np.isfinite(back[k]):
+                centre = min(length[k] for length in reach)
+                rows[category].append((back[k], side[k], askew[k], centre))
+    out = {}
+    for category, values in rows.items():
+        back, side, askew, centre = np.array(values).T
+        out[category] = {
+            "n": len(back),
+            "back_gap": _percentiles(back, QUARTERS),
+            "back": float((back < 0.15).mean()),
+            "side": float((side < 0.15).mean()),
+            "axis_aligned": float((askew < math.radians(5)).mean()),
+            "centre_wall": _percentiles(centre, QUARTERS),
+        }
+    return out
+
+
+# The pairs of room_statistics.json: what stands near what.
+PAIRS = (
+    ("nightstand", "double_bed"), ("dining_chair", "dining_table"), ("coffee_table", "multi_seat_sofa"),
+    ("tv_stand", "multi_seat_sofa"), ("tv_stand", "double_bed"), ("side_table", "multi_seat_sofa"),
+    ("armchair", "multi_seat_sofa"), ("armchair", "coffee_table"), ("lounge_chair", "coffee_table"),
+    ("wardrobe", "double_bed"), ("dressing_table", "double_bed"), ("dining_chair", "desk"),
+    ("pendant_lamp", "dining_table"), ("pendant_lamp", "double_bed"), ("pendant_lamp", "coffee_table"),
+    ("ottoman", "double_bed"), ("ottoman", "coffee_table"), ("sideboard", "dining_table"),
+    ("dining_table", "multi_seat_sofa"), ("floor_lamp", "multi_seat_sofa"), ("plant", "multi_seat_sofa"),
+    ("plant", "tv_stand"),
+)  # fmt: skip
+
+
+def _pairs(rooms: Iterable[RoomBoxes]) -> list[dict]:
+    rows: dict[tuple[str, str], list[tuple[float, ...]]] = {pair: [] for pair in PAIRS}
+    for room in rooms:
+        present = set(room.categories)
+        for child, anchor in PAIRS:
+            if child in present and anchor in present:
+                rows[child, anchor].extend(_pair_rows(room, child, anchor))
+    out = []
+    for (child, anchor), values in rows.items():
+        if not values:
+            continue
+        lateral, forward, gap, turn, faces = np.array(values).T
+        quarter = np.round(turn / (math.pi / 2)).astype(int) % 4
+        out.append(
+            {
+                "child": child,
+                "anchor": anchor,
+                "n": len(values),
+                "lateral": _percentiles(np.abs(lateral), FIVE),
+                "forward": _percentiles(forward, FIVE),
+                "gap": _percentiles(np.maximum(gap, 0), FIVE),
+                "near": float((gap < 0.45).mean()),
+                "overlap": float((gap < 0).mean()),
+                "turn": [float((quarter == k).mean()) for k in range(4)],
+                "faces": float((faces < math.radians(30)).mean()),
+            }
+        )
+    return out
+
+
+def _pair_rows(room: RoomBoxes, child: str, anchor: str) -> list[tuple[float, ...]]:
+    """Per child and its nearest anchor: lateral, forward (anchor's frame), gap of the hulls, turn, angle off facing."""
+    names = np.array(room.categories)
+    plan = room.position[:, [0, 2]]
+    anchors = np.flatnonzero(names == anchor)
+    out = []
+    for c in np.flatnonzero(names == child):
+        a = anchors[np.argmin(((plan[anchors] - plan[c]) ** 2).sum(-1))]
+        dx, dz = plan[c] - plan[a]
+        cos, sin = math.cos(room.yaw[a]), math.sin(room.yaw[a])
+        lateral, forward = cos * dx - sin * dz, sin * dx + cos * dz
+        turn = (room.yaw[c] - room.yaw[a]) % (2 * math.pi)
+        tc, ts = abs(math.cos(turn)), abs(math.sin(turn))
+        half_x = (tc * room.size[c, 0] + ts * room.size[c, 2]) / 2
+        half_z = (ts * room.size[c, 0] + tc * room.size[c, 2]) / 2
+        gap_x = abs(lateral) - room.size[a, 0] / 2 - half_x
+        gap_z = abs(forward) - room.size[a, 2] / 2 - half_z
+        gap = math.hypot(max(gap_x, 0), max(gap_z, 0)) if max(gap_x, gap_z) > 0 else max(gap_x, gap_z)
+        towards = math.atan2(-dx, -dz)
+        faces = abs((room.yaw[c] - towards + math.pi) % (2 * math.pi) - math.pi)
+        out.append((lateral, forward, gap, turn, faces))
+    return out
+
+
+def _relations(rooms: Sequence[RoomBoxes]) -> dict[str, float]:
+    """Share of ordered pairs that carry each relation, by the rules of SG-FRONT."""
+    pairs = sum(len(room) * (len(room) - 1) for room in rooms)
+    ids = np.concatenate([edges[:, 1] for edges in label_rooms(rooms, rules="sgfront")]) if rooms else np.zeros(0, int)
+    return {p.name: float((ids == p.id).sum() / max(pairs, 1)) for p in vocabulary().predicates if 0 < p.id < 13}
+
+
+def _overlap(rooms: Iterable[RoomBoxes]) -> dict[str, float]:
+    """Share of pairs on the floor that share more than 0.01 square metres, of objects with over 10% outside."""
+    from shapely.geometry import Polygon
+
+    meets = pairs = outside = objects = 0
+    for room in rooms:
+        floor = Polygon(room.floor_polygon)
+        prints = [Polygon(corners) for corners in footprints(room)]
+        low = room.position[:, 1] < 0.05
+        for i in np.flatnonzero(low):
+            objects += 1
+            outside += prints[i].difference(floor).area > 0.1 * max(prints[i].area, 1e-9)
+            for j in np.flatnonzero(low[:i]):
+                pairs += 1
+                meets += prints[i].intersection(prints[j]).area > 0.01
+    return {"floor_pairs": meets / max(pairs, 1), "outside_floor": outside / max(objects, 1)}
+
+
+def footprints(room: RoomBoxes) -> np.ndarray:
+    """(n, 4, 2) corners of the boxes in plan, x and z in metres."""
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
+    local = signs[None] * np.maximum(room.size[:, None, [0, 2]], 1e-6)
+    cos, sin = np.cos(room.yaw)[:, None], np.sin(room.yaw)[:, None]
+    x = cos * local[..., 0] + sin * local[..., 1]
+    z = cos * local[..., 1] - sin * local[..., 0]
+    return np.stack([x, z], -1) + room.position[:, None, [0, 2]]
+
+
+def _percentiles(values: Iterable[float], at: tuple[int, ...]) -> list[float]:
+    return np.percentile(np.asarray(values, float), at).tolist()
