@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -52,6 +53,17 @@ def claim(folder: Path, *, force: bool) -> dict:
         shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
         raise ValueError(f"{folder}: holds {shown} and no room of EchoUSD; choose another folder or use --force")
     return {}
+
+
+def check_writable(folder: Path) -> None:
+    """Raises ValueError where nothing can be written into `folder`, or where it cannot be created."""
+    nearest = folder
+    while not nearest.exists():
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise ValueError(f"{folder}: {nearest} is a file, not a folder")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise ValueError(f"{folder}: {nearest} is not writable (permission denied)")
 
 
 def write_together(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import tempfile
@@ -19,7 +20,15 @@ from echousd.room.room import Room
 
 
 def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True) -> Path:
-    """Write the layered room; see `Room.save`."""
+    """Write the layered room and its preview; see `Room.save`."""
+    root = save_layers(room, folder, force=force)
+    if preview:
+        write_preview(root)
+    return root
+
+
+def save_layers(room: Room, folder: Path, *, force: bool = False) -> Path:
+    """Write the layers, assets and the manifest of a room; see `Room.save`."""
     room = replace(room, name=identifier(folder.resolve().name))
     old = folders.claim(folder, force=force)
     recorded: dict[str, str] = old.get("files", {})
@@ -42,8 +51,6 @@ def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = 
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [root, manifest]
     folders.write_together(folder, files, last=last, remove=stale)
-    if preview:
-        write_preview(folder / root)
     return folder / root
 
 
@@ -65,22 +72,20 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another file or use --force")
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
-        root = save_room(room, Path(scratch) / room.name, preview=False)
+        root = save_layers(room, Path(scratch) / room.name)
         write_whole(path, layer_bytes(flat_layer(root, layouts=room), path.suffix))
     return path
 
 
 def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
-    from echousd.render import render_file
+    from echousd.render import RenderUnavailable, render_file
 
     out = root.with_suffix(".png")
     try:
         picture = render_file(root, view="perspective", size=512)
-    except ImportError:
+    except RenderUnavailable:
         return None
-    import io
-
     buffer = io.BytesIO()
     picture.save(buffer, "PNG")
     write_whole(out, buffer.getvalue())

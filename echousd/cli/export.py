@@ -1,0 +1,26 @@
+"""`echousd export`: a room as one file for other software."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")
+    def export(
+        room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+        output: Annotated[
+            Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)
+        ],
+        arkit: Annotated[bool, typer.Option("--arkit", help="usdz for Apple's viewers (a usdc inside).")] = False,
+        force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
+    ) -> None:
+        """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
+        from echousd.export import export as write
+
+        typer.echo(str(write(room, output, arkit=arkit, force=force)))

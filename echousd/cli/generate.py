@@ -1,0 +1,168 @@
+"""`echousd generate`: from a graph to a room on disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from echousd.room import Room
+
+TITLES = {
+    "read": "Reading the graph",
+    "load": "Loading the model",
+    "layout": "Placing the furniture",
+    "repair": "Repairing the layout",
+    "shapes": "Shaping the furniture",
+    "meshes": "Cleaning the meshes",
+    "write": "Writing the layers",
+    "preview": "Drawing the preview",
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: echousd generate samples/bedroom.usda -o out/bedroom --seed 7")
+    def generate(
+        graph: Annotated[
+            Path, typer.Argument(help="Scene graph (.usda, .usdc, .usd, .yaml, .json).", show_default=False)
+        ],
+        output: Annotated[
+            Path,
+            typer.Option(
+                "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
+            ),
+        ],
+        seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+        preset: Annotated[str, typer.Option(help="Which model: compact.")] = "compact",
+        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+        shapes: Annotated[str, typer.Option(help="generate: shapes from the model; boxes: plain boxes.")] = "generate",
+        samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
+        steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
+        faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
+        up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
+        walls: Annotated[bool, typer.Option("--walls", help="Add walls around the floor.")] = False,
+        atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
+        repair: Annotated[
+            bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
+        ] = True,
+        flat: Annotated[bool, typer.Option("--flat", help="Write one file instead of a folder of layers.")] = False,
+        crate: Annotated[
+            str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
+        ] = None,
+        timings: Annotated[bool, typer.Option("--timings", help="Print how long each stage took.")] = False,
+        force: Annotated[
+            bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
+        ] = False,
+    ) -> None:
+        """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD."""
+        started = time.perf_counter()
+        check_output(output, flat=flat, force=force)
+        set_crate_version(crate)
+        with progress_bar() as listen:
+            from echousd.room.pipeline import PRESETS
+            from echousd.room.pipeline import generate as make
+            from echousd.room.room import RoomOptions
+            from echousd.room.save import save_flat, save_layers, write_preview
+
+            if preset not in PRESETS:
+                raise ValueError(f"preset is {preset!r}, allowed: {', '.join(PRESETS)}")
+            options = RoomOptions(up_axis.upper(), walls, atlas)
+            imported = time.perf_counter() - started
+            room = make(
+                graph, seed=seed, shapes=shapes, model=weights, repair=repair, samples=samples, steps=steps,
+                faces=faces, options=options, progress=listen,
+            )  # fmt: skip
+            spent = {"imports": imported, **room.timings}
+            listen("write", 0, 1)
+            mark = time.perf_counter()
+            root = save_flat(room, output, force=force) if flat else save_layers(room, output, force=force)
+            spent["write"] = time.perf_counter() - mark
+            listen("write", 1, 1)
+            preview = None
+            if not flat:
+                listen("preview", 0, 1)
+                mark = time.perf_counter()
+                preview = write_preview(root)
+                spent["preview"] = time.perf_counter() - mark
+                listen("preview", 1, 1)
+        report(room, root, preview)
+        if timings:
+            spent["total"] = time.perf_counter() - started
+            for stage, seconds in spent.items():
+                typer.echo(f"{stage:>10} {seconds:7.2f} s")
+
+
+def check_output(output: Path, *, flat: bool, force: bool) -> None:
+    """Refuse before the long work what would be refused after it; raises ValueError."""
+    if flat:
+        if output.suffix not in (".usda", ".usdc"):
+            raise ValueError(f"{output}: with --flat the output is a file that ends in .usda or .usdc")
+        if output.exists() and not force:
+            raise ValueError(f"{output}: exists; choose another file or use --force")
+        return
+    if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
+        raise ValueError(f"{output}: the output is a folder; --flat writes one file")
+    from echousd.room.folder import check_writable, claim
+
+    claim(output, force=force)
+    check_writable(output)
+
+
+def set_crate_version(version: str | None) -> None:
+    """Make USD write usdc files of an older version; must come before USD writes its first one."""
+    if version is None:
+        return
+    import os
+    import re
+
+    if not re.fullmatch(r"0\.\d{1,2}\.\d", version):
+        raise ValueError(f"crate version is {version!r}, allowed: 0.7.0 and newer, such as 0.8.0")
+    os.environ["USD_WRITE_NEW_USDC_FILES_AS_VERSION"] = version
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar per stage on a terminal, a plain line per stage elsewhere (on stderr)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        told: set[str] = set()
+
+        def plain(stage: str, done: int, total: int) -> None:
+            if stage not in told:
+                told.add(stage)
+                typer.echo(TITLES.get(stage, stage), err=True)
+
+        yield plain
+        return
+    bar = Progress(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), console=console)
+    tasks: dict[str, Any] = {}
+    with bar:
+
+        def listen(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(TITLES.get(stage, stage), total=total)
+            bar.update(tasks[stage], completed=done, total=total)
+
+        yield listen
+
+
+def report(room: Room, root: Path, preview: Path | None) -> None:
+    """Say what was made and what the graph asked for in vain."""
+    kept = sum(verdict.state == "kept" for verdict in room.verdicts)
+    broken = [verdict for verdict in room.verdicts if verdict.state == "broken"]
+    typer.echo(f"room     {root}")
+    if preview is not None:
+        typer.echo(f"preview  {preview}")
+    typer.echo(f"graph    {len(room.names)} objects, {kept} of {kept + len(broken)} measured relations kept")
+    for verdict in broken:
+        typer.echo(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")

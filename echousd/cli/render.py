@@ -1,0 +1,33 @@
+"""`echousd render`: a picture of any stage, without a GPU or a display."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(epilog="Example: echousd render out/bedroom/bedroom.usda -o top.png --view top")
+    def render(
+        room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+        output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write (.png).", show_default=False)],
+        view: Annotated[str, typer.Option(help="top or perspective.")] = "perspective",
+        size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
+        colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
+    ) -> None:
+        """Draw a room from above or from a corner."""
+        import io
+
+        from echousd.render import render_file
+        from echousd.room.save import write_whole
+
+        if output.suffix.lower() != ".png":
+            raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")
+        buffer = io.BytesIO()
+        render_file(room, view=view, size=size, colors=colors).save(buffer, "PNG")
+        write_whole(output, buffer.getvalue())
+        typer.echo(str(output))
