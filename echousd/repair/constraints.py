@@ -9,6 +9,8 @@ import numpy as np
 from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
 
+# Predicates whose rules look at the same geometry of a pair (sides at the overlap, sizes at the volumes or tops).
+SHARING = ((1, 2, 3, 4), (5,), (6,), (7,), (8, 9), (10, 11), (12,))
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG = range(7)
 
 
@@ -45,24 +47,40 @@ def relation_margins(
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import margins
+    from echomodel.rules.geometry import pairs
+    from echomodel.rules.sets import rule_set
 
     e, n = len(triplets), len(size)
-    gradient = np.zeros((e, n, COLUMNS))
-    if not e:
-        return np.zeros(0), gradient
+    value, gradient = np.zeros(e), np.zeros((e, n, COLUMNS))
     # Each edge gets its own copy of its two boxes, so one backward pass gives every edge's own gradient.
     ends = np.concatenate((triplets[:, 0], triplets[:, 2]))
     own_size = torch.tensor(size[ends], dtype=torch.float32, requires_grad=True)
     own_position = torch.tensor(position[ends], dtype=torch.float32, requires_grad=True)
     boxes = Boxes(own_size, own_position, torch.tensor(yaw[ends], dtype=torch.float32))
-    copies = torch.stack((torch.arange(e), torch.as_tensor(triplets[:, 1]), torch.arange(e, 2 * e)), 1)
-    value = margins(boxes, copies, rules=rules, center=torch.tensor(centre, dtype=torch.float32))
-    by_size, by_position = torch.autograd.grad(value.sum(), (own_size, own_position))
-    rows = np.tile(np.arange(e), 2)
-    both = np.concatenate((by_position.numpy(), by_size.numpy() * size[ends]), 1)
-    np.add.at(gradient, (rows, ends), np.nan_to_num(both))
-    return value.detach().numpy().astype(float), gradient
+    middle = torch.tensor([centre[0], 0.0, centre[1]], dtype=torch.float32).expand(2 * e, 3)
+    chosen_rules = rule_set(rules)
+    total = torch.zeros(())
+    for group in SHARING:
+        known = [predicate for predicate in group if predicate in chosen_rules.margins]
+        rows = np.flatnonzero(np.isin(triplets[:, 1], known))
+        if not len(rows):
+            continue
+        subject = torch.as_tensor(rows)
+        pair = pairs(boxes, subject, subject + e, middle, oriented=chosen_rules.oriented)
+        each = torch.stack([chosen_rules.margins[predicate](pair) for predicate in known])
+        which = torch.as_tensor([known.index(predicate) for predicate in triplets[rows, 1]])
+        margin = each.gather(0, which[None])[0]
+        value[rows] = margin.detach().numpy()
+        total = total + margin.sum()
+    if total.requires_grad:
+        by_size, by_position = torch.autograd.grad(total, (own_size, own_position), allow_unused=True)
+        both = np.zeros((2 * e, COLUMNS))
+        if by_position is not None:
+            both[:, :3] = by_position.numpy()
+        if by_size is not None:
+            both[:, 3:] = by_size.numpy() * size[ends]
+        np.add.at(gradient, (np.tile(np.arange(e), 2), ends), both)
+    return value, gradient
 
 
 def linearise(
