@@ -20,7 +20,7 @@ class PluginNotActive(UserWarning):
 def plugin_path() -> Path:
     """Folder that holds plugInfo.json: what `PXR_PLUGINPATH_NAME` must list. Raises FileNotFoundError if it is gone."""
     try:
-        folder = Path(str(resources.files("echousd.schemas"))) / "resources"
+        folder = Path(str(resources.files("echousd.schemas").joinpath("resources")))
     except (ModuleNotFoundError, TypeError):  # the source tree on sys.path without an installation
         folder = Path(__file__).parents[1] / "schemas" / "resources"
     if not (folder / "plugInfo.json").is_file():

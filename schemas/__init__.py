@@ -1,0 +1,1 @@
+"""The USD schema, and the codeless plugin generated from it (resources/)."""
