@@ -13,7 +13,7 @@ import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
 from echousd.room.looks import kind_of
-from echousd.room.surface import Surface
+from echousd.room.surface import Surface, surface
 
 LICENCE = "Apache-2.0"
 # Solids that may be wrapped in one hull; everything else has room below or inside that other things need.
@@ -53,23 +53,23 @@ def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
         return path.read_bytes()
 
 
-def write_mesh(stage: Usd.Stage, path: str, surface: Surface) -> UsdGeom.Mesh:
+def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
     """Author a UsdGeomMesh with indexed normals and `st`, and a GeomSubset per material group if there are several."""
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(surface.points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(surface.faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(surface.faces.ravel()))
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(surface.extent))
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(form.points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(form.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(form.faces.ravel()))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(form.extent))
     primvars = UsdGeom.PrimvarsAPI(mesh)
     normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
-    normals.Set(Vt.Vec3fArray.FromNumpy(surface.normals))
-    normals.SetIndices(Vt.IntArray.FromNumpy(surface.normal_index))
+    normals.Set(Vt.Vec3fArray.FromNumpy(form.normals))
+    normals.SetIndices(Vt.IntArray.FromNumpy(form.normal_index))
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-    st.Set(Vt.Vec2fArray.FromNumpy(surface.st))
-    st.SetIndices(Vt.IntArray.FromNumpy(surface.st_index))
-    if len(surface.groups) > 1:
-        for name, faces in surface.groups.items():
+    st.Set(Vt.Vec2fArray.FromNumpy(form.st))
+    st.SetIndices(Vt.IntArray.FromNumpy(form.st_index))
+    if len(form.groups) > 1:
+        for name, faces in form.groups.items():
             subset = UsdGeom.Subset.Define(stage, f"{path}/{name}")
             subset.CreateElementTypeAttr(UsdGeom.Tokens.face)
             subset.CreateFamilyNameAttr("materialBind")
@@ -86,19 +86,15 @@ def collider(mesh: trimesh.Trimesh, category: str) -> tuple[trimesh.Trimesh, str
     return _reduced(mesh, COLLIDER_FACES), "convexDecomposition"
 
 
-def geometry_layer(name: str, surface: Surface, collision: trimesh.Trimesh, data: Mapping[str, Any]) -> Sdf.Layer:
+def geometry_layer(name: str, form: Surface, collision: trimesh.Trimesh, data: Mapping[str, Any]) -> Sdf.Layer:
     """`<name>_geo`: the mesh `<name>_mesh` and, as a guide, `<name>_collider`."""
     stage = new_stage(name, ".usdc", data)
     UsdGeom.Xform.Define(stage, f"/{name}")
-    write_mesh(stage, f"/{name}/{name}_mesh", surface)
-    guide = UsdGeom.Mesh.Define(stage, f"/{name}/{name}_collider")
+    write_mesh(stage, f"/{name}/{name}_mesh", form)
+    path = f"/{name}/{name}_collider"
+    every = np.arange(len(collision.faces))
+    guide = write_mesh(stage, path, surface(collision, {"collider": every}))
     guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
-    guide.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-    points = np.asarray(collision.vertices, np.float32)
-    guide.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    guide.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(collision.faces), 3, np.int32)))
-    guide.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.asarray(collision.faces, np.int32).ravel()))
-    guide.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
     return stage.GetRootLayer()
 
 

@@ -76,26 +76,29 @@ def taubin(mesh: trimesh.Trimesh, rounds: int = PASS_BAND) -> np.ndarray:
 
 
 def decimate(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """At most about `faces` triangles by quadric error; tries gentler settings until a closed mesh stays closed."""
+    """At most `faces` triangles by quadric error; tries other settings until a closed mesh stays closed."""
     if len(mesh.faces) <= faces:
         return mesh
     import fast_simplification
 
     points, triangles = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
-    best: trimesh.Trimesh | None = None
-    for aggression in (5, 3, 7):
+    tried: list[trimesh.Trimesh] = []
+    for aggression in (3, 5, 4, 6):
         p, t = fast_simplification.simplify(points, triangles, target_count=faces, agg=aggression)
         reduced = trimesh.Trimesh(p, t, process=False)
         reduced.merge_vertices()
         reduced.update_faces(reduced.nondegenerate_faces() & reduced.unique_faces())
         reduced.remove_unreferenced_vertices()
-        if reduced.is_watertight or not mesh.is_watertight:
+        tried.append(reduced)
+        if reduced.is_watertight and reduced.is_winding_consistent and len(reduced.faces) <= 1.05 * faces:
             return reduced
-        best = best or reduced
-    assert best is not None
-    filled = best.copy()
-    filled.fill_holes()
-    return filled if filled.is_watertight else best
+    return min(tried, key=lambda m: (not m.is_winding_consistent, _open_edges(m)))
+
+
+def _open_edges(mesh: trimesh.Trimesh) -> int:
+    """Edges that do not belong to exactly two faces."""
+    _, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    return int((count != 2).sum())
 
 
 def fit(mesh: trimesh.Trimesh, size: np.ndarray) -> trimesh.Trimesh:

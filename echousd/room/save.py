@@ -123,6 +123,10 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
         "graph": json.loads(room.graph.to_json()),
         "assets": dict(room.assets),
+        "meshes": {
+            name: {"faces": len(room.meshes[name].faces), "watertight": bool(room.meshes[name].is_watertight)}
+            for name in sorted(set(room.assets.values()))
+        },
         "files": dict(sorted(files.items())),
     }
 
