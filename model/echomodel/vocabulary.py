@@ -110,9 +110,12 @@ class Vocabulary:
             for predicate in self.predicates:
                 if key in predicate.swapped:
                     raise UnknownWord(f"unknown predicate {word!r}: swap the two objects and say {predicate.name}")
-        near = list(dict.fromkeys(self._name(kind, index[m]) for m in difflib.get_close_matches(key, index, n=3)))
+        unsupported = kind == "category" and key in self.unsupported
+        close = [] if unsupported else difflib.get_close_matches(key, index, n=3)
+        close = [match for match in close if _alike(key, match) > _alike(key, close[0]) - 0.1]
+        near = list(dict.fromkeys(self._name(kind, index[match]) for match in close))
         hint = f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(self._names(kind))}"
-        known = " (seen in real rooms, not supported)" if kind == "category" and key in self.unsupported else ""
+        known = " (seen in real rooms, not supported)" if unsupported else ""
         raise UnknownWord(f"unknown {kind} {word!r}{known}: {hint}")
 
     def _names(self, kind: str) -> list[str]:
@@ -121,6 +124,10 @@ class Vocabulary:
 
     def _name(self, kind: str, position: int) -> str:
         return self._names(kind)[position]
+
+
+def _alike(one: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, one, other).ratio()
 
 
 def normalised(word: str) -> str:

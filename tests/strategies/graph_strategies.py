@@ -11,9 +11,9 @@ WORDS = vocabulary()
 names = st.from_regex(r"[A-Za-z_][A-Za-z0-9_]{0,12}", fullmatch=True)
 numbers = st.floats(-1e6, 1e6, allow_nan=False)
 metres = st.floats(1e-3, 1e3)
-texts = st.text(
-    st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20
-).filter(lambda text: bool(text.strip()))
+texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20).filter(
+    lambda text: bool(text.strip())
+)
 scalars = st.one_of(
     st.booleans(),
     st.integers(-(2**63), 2**63 - 1),
