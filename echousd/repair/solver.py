@@ -34,6 +34,7 @@ class RepairConfig:
     Arguments:
         move: metres that cost as much as `stretch`.
         stretch: change of the logarithm of a size that costs as much as `move`.
+        limit: largest change of the logarithm of a size.
         slack: metres or ratio by which relations are to hold.
         rounds: most linearisations per attempt.
         attempts: how often a stuck room is tried again with other separating axes.
@@ -41,6 +42,7 @@ class RepairConfig:
 
     move: float = 0.3
     stretch: float = 0.12
+    limit: float = 0.4
     slack: float = 0.004
     rounds: int = 16
     attempts: int = 3
@@ -48,6 +50,7 @@ class RepairConfig:
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
 STIFFNESS = {RELATION: 1e5, COLLISION: 1e5, FLOOR: 1e5, WALL: 3e2, SUPPORT: 1e5, CEILING: 1e3, OVERHANG: 1e4}
+LIMIT_STIFFNESS = 1e6
 SOFT = 1e-2  # weight of a metre to the wall or the ceiling against a metre of collision when results are compared
 LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.25, 0.25, 0.25])
 
@@ -117,6 +120,8 @@ def _descend(
     weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
     origin = np.concatenate((position, np.log(size)), 1)
     stiffnesses = np.array([STIFFNESS[kind] for kind in range(len(STIFFNESS))])
+    sides = np.eye(n * COLUMNS).reshape(n, COLUMNS, -1)[:, 3:].reshape(3 * n, -1)
+    bounds = np.concatenate((-sides, sides))
     state = origin.copy()
     best: Solution | None = None
     before = np.inf
@@ -135,11 +140,12 @@ def _descend(
             break
         # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
         damping = 1.0 if number < 6 else 4.0 * (number - 5)
+        grown = (state - origin)[:, 3:].ravel()
         step = newton(
-            at.gradient[:, free],
-            at.value,
-            at.equal,
-            stiffnesses[at.kind],
+            np.concatenate((at.gradient, bounds))[:, free],
+            np.concatenate((at.value, config.limit - grown, config.limit + grown)),
+            np.concatenate((at.equal, np.zeros(len(bounds), bool))),
+            np.concatenate((stiffnesses[at.kind], np.full(len(bounds), LIMIT_STIFFNESS))),
             weight,
             (state - origin).ravel()[free],
             damping,
@@ -147,6 +153,7 @@ def _descend(
         full = np.zeros(n * COLUMNS)
         full[free] = step
         state = state + np.clip(full.reshape(n, COLUMNS), -LARGEST_STEP, LARGEST_STEP)
+        state[:, 3:] = np.clip(state[:, 3:], origin[:, 3:] - config.limit, origin[:, 3:] + config.limit)
     assert best is not None
     return best
 

@@ -1,0 +1,236 @@
+"""Repair on small rooms whose right answer is known, and on noisy rooms whose relations are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.rules import margins, verdicts
+from echomodel.vocabulary import vocabulary
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.repair import RepairConfig, repair, repair_boxes
+from echousd.repair.constraints import relation_margins
+from echousd.repair.geometry import floor_from_polygon, inside, separation
+
+FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
+
+
+def boxes(size, position, yaw) -> Boxes:
+    return Boxes(*(torch.tensor(np.asarray(v, float), dtype=torch.float32) for v in (size, position, yaw)))
+
+
+def bedroom() -> tuple[SceneGraph, np.ndarray, np.ndarray, np.ndarray]:
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.0, 3.6), height=2.7),
+        (
+            Node("bed", "double_bed"),
+            Node("left_stand", "nightstand"),
+            Node("right_stand", "nightstand"),
+            Node("wardrobe", "wardrobe"),
+            Node("lamp", "pendant_lamp"),
+            Node("bench", "tv_stand"),
+            Node("tv", "tv"),
+        ),
+        (
+            Relation("left_stand", "left", "bed"),
+            Relation("right_stand", "right", "bed"),
+            Relation("left_stand", "close_by", "bed"),
+            Relation("wardrobe", "taller_than", "bed"),
+            Relation("bench", "front", "bed"),
+            Relation("tv", "standing_on", "bench"),
+            Relation("lamp", "above", "bed"),
+            Relation("bed", "bigger_than", "wardrobe"),
+            Relation("left_stand", "same_style_as", "right_stand"),
+        ),
+    )
+    size = np.array(
+        [
+            [1.8, 0.9, 2.0],
+            [0.5, 0.5, 0.4],
+            [0.5, 0.5, 0.4],
+            [1.2, 2.2, 0.6],
+            [0.6, 0.7, 0.6],
+            [1.4, 0.5, 0.4],
+            [1, 0.6, 0.1],
+        ]
+    )
+    position = np.array(
+        [[-0.9, 0.1, 0], [-1.6, 0, -0.7], [-1.9, 0, 1.3], [0.6, 0, 1.7], [1.0, 1.5, 0.9], [2.0, -0.1, 0], [1.6, 0, 0.2]]
+    )
+    q = np.pi / 2
+    return graph, size, position, np.array([q, q, q + 0.1, np.pi, 0.0, -q, -q])
+
+
+def test_everything_that_was_asked_for_holds_afterwards() -> None:
+    graph, size, position, yaw = bedroom()
+    result = repair(graph, boxes(size, position, yaw))
+    assert not result.broken
+    assert not result.conflicts
+    assert not result.collisions
+    assert not result.outside
+    assert len(result.kept) == 8
+    assert [str(r) for r in result.unmeasured] == ["left_stand same_style_as right_stand"]
+    found = dict(zip(graph.names, result.boxes.position.numpy(), strict=True))
+    sizes = dict(zip(graph.names, result.boxes.size.numpy(), strict=True))
+    for name in ("bed", "left_stand", "right_stand", "wardrobe", "bench"):
+        assert found[name][1] == 0.0
+    assert found["tv"][1] == pytest.approx(sizes["bench"][1], abs=1e-5)
+    assert found["lamp"][1] + sizes["lamp"][1] == pytest.approx(2.7, abs=0.01)
+    # Backs against their walls: bed and nightstands at x = -2, wardrobe at z = 1.8, bench at x = 2.
+    assert found["bed"][0] - sizes["bed"][2] / 2 == pytest.approx(-2.0, abs=0.03)
+    assert found["right_stand"][0] - sizes["right_stand"][2] / 2 == pytest.approx(-2.0, abs=0.03)
+    assert found["wardrobe"][2] + sizes["wardrobe"][2] / 2 == pytest.approx(1.8, abs=0.03)
+    assert result.boxes.yaw[2].item() == pytest.approx(np.pi / 2, abs=1e-6)
+
+
+def test_a_good_room_stays_as_it_is() -> None:
+    graph, size, position, yaw = bedroom()
+    once = repair(graph, boxes(size, position, yaw))
+    again = repair(graph, once.boxes)
+    assert max(again.moved.values()) < 0.01
+    assert max(again.resized.values()) < 0.01
+
+
+def test_locked_and_known_objects_never_move() -> None:
+    graph, size, position, yaw = bedroom()
+    graph = graph.lock("bed").update_node("wardrobe", position=tuple(position[3]), size=(1.2, 2.2, 0.6))
+    result = repair(graph, boxes(size, position, yaw))
+    for number in (0, 3):
+        assert torch.equal(result.boxes.position[number], torch.tensor(position[number], dtype=torch.float32))
+        assert torch.equal(result.boxes.size[number], torch.tensor(size[number], dtype=torch.float32))
+    assert result.boxes.yaw[0].item() == pytest.approx(np.pi / 2)
+    assert not result.broken
+
+
+def test_the_same_boxes_give_the_same_room() -> None:
+    graph, size, position, yaw = bedroom()
+    first, second = (repair(graph, boxes(size, position, yaw)) for _ in range(2))
+    assert torch.equal(first.boxes.position, second.boxes.position)
+    assert torch.equal(first.boxes.size, second.boxes.size)
+
+
+def test_relations_in_conflict_are_named() -> None:
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(6.0, 6.0)),
+        (Node("a", "plant", position=(-2.5, 0, 0), locked=True), Node("b", "plant", position=(2.5, 0, 0), locked=True),
+         Node("c", "ottoman"), Node("d", "wardrobe")),
+        (Relation("c", "close_by", "a"), Relation("c", "close_by", "b"), Relation("d", "taller_than", "c")),
+    )  # fmt: skip
+    result = repair(
+        graph,
+        boxes(
+            [[0.4, 1, 0.4], [0.4, 1, 0.4], [0.5, 0.4, 0.5], [1, 2, 0.6]],
+            [[-2.5, 0, 0], [2.5, 0, 0], [0, 0, 0], [0, 0, 2]],
+            [0] * 4,
+        ),
+    )
+    assert {str(r) for r in result.broken} == {"c close_by a", "c close_by b"}
+    assert result.conflicts == ("cannot hold together: 'c close_by a', 'c close_by b'",)
+
+
+def test_too_much_furniture_is_reported_not_hidden() -> None:
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(2.0, 2.0)),
+        tuple(Node(f"bed_{i}", "double_bed", size=(1.6, 0.5, 1.9)) for i in range(3)),
+    )
+    result = repair(graph, boxes([[1.6, 0.5, 1.9]] * 3, [[0, 0, 0], [0.1, 0, 0], [-0.1, 0, 0.1]], [0.0] * 3))
+    assert result.collisions or result.outside
+    assert result.conflicts
+    assert "apart" in " ".join(result.conflicts)
+
+
+def test_chairs_may_be_under_the_table_but_not_in_one_another() -> None:
+    size = np.array([[1.6, 0.75, 0.9], [0.5, 0.9, 0.5], [0.5, 0.9, 0.5]])
+    position = np.array([[0.0, 0, 0], [0.3, 0, 0.5], [0.35, 0, 0.55]])
+    done = repair_boxes(
+        ["dining_table", "dining_chair", "dining_chair"], size, position, np.zeros(3), np.zeros((0, 3), int)
+    )
+    assert not done.collisions
+    pairs = np.array([(0, 1), (0, 2), (1, 2)])
+    gaps = separation(done.size, done.position, done.yaw, pairs)
+    assert gaps[2] > -1e-6
+    assert gaps[:2].min() < -0.1
+
+
+def test_noisy_rooms_get_their_relations_back() -> None:
+    rng = np.random.default_rng(5)
+    kept = measured = hit = 0
+    ids = {p.name: p.id for p in vocabulary().predicates}
+    for _ in range(6):
+        n = 8
+        categories = ["armchair", "plant", "side_table", "stool", "ottoman", "floor_lamp", "cabinet", "coffee_table"]
+        spots = rng.permutation([(x, z) for x in (-2.1, -0.7, 0.7, 2.1) for z in (-2.0, 0.0, 2.0)])[:n]
+        position = np.stack((spots[:, 0], np.zeros(n), spots[:, 1]), 1)
+        size = rng.uniform(0.4, 1.0, (n, 3))
+        every = [
+            (i, p, j) for i in range(n) for j in range(n) if i != j for p in range(1, 12) if p != ids["standing_on"]
+        ]
+        triplets = torch.tensor(every)
+        clean = Boxes(*(torch.tensor(v, dtype=torch.float32) for v in (size, position, np.zeros(n))))
+        triplets = triplets[margins(clean, triplets) >= 1e-3]
+        floor = np.array([(-3, -3), (3, -3), (3, 3), (-3, 3.0)])
+        start = position + rng.normal(0, 0.3, position.shape) * (1, 0.3, 1)
+        done = repair_boxes(
+            categories, size * np.exp(rng.normal(0, 0.1, size.shape)), start, np.zeros(n), triplets.numpy(),
+            floor_polygon=floor, height=2.6,
+        )  # fmt: skip
+        kept, measured = kept + int((done.verdict == 1).sum()), measured + int((done.verdict >= 0).sum())
+        hit += len(done.collisions)
+        assert not done.outside
+    assert measured > 500
+    assert kept / measured >= 0.995
+    assert hit == 0
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_margins_and_gradients_are_those_of_the_rules(rules: str) -> None:
+    rng = np.random.default_rng(1)
+    n = 6
+    size, position, yaw = rng.uniform(0.4, 1.2, (n, 3)), rng.normal(0, 1, (n, 3)), rng.uniform(-3, 3, n)
+    triplets = np.array([(i, p, j) for i in range(n) for j in range(n) if i != j for p in range(1, 16)])
+    value, gradient = relation_margins(size, position, yaw, triplets, rules=rules, centre=np.array([0.2, -0.1]))
+    tensors = [torch.tensor(v, dtype=torch.float32, requires_grad=True) for v in (size, position)]
+    plain = margins(
+        Boxes(*tensors, torch.tensor(yaw, dtype=torch.float32)),
+        torch.as_tensor(triplets), rules=rules, center=torch.tensor([0.2, -0.1]),
+    )  # fmt: skip
+    np.testing.assert_allclose(value, plain.detach().numpy(), atol=1e-5)
+    for row in rng.choice(len(triplets), 40, replace=False):
+        by_size, by_position = torch.autograd.grad(plain[row], tensors, retain_graph=True)
+        np.testing.assert_allclose(gradient[row, :, :3], by_position.numpy(), atol=1e-4)
+        np.testing.assert_allclose(gradient[row, :, 3:], by_size.numpy() * size, atol=1e-4)
+
+
+def test_verdicts_are_those_of_the_returned_boxes() -> None:
+    graph, size, position, yaw = bedroom()
+    result = repair(graph, boxes(size, position, yaw), config=RepairConfig(rounds=0))
+    index = {name: i for i, name in enumerate(graph.names)}
+    triplets = torch.tensor(
+        [(index[r.subject], vocabulary().predicate_id(r.predicate), index[r.object]) for r in graph.relations]
+    )
+    found = verdicts(result.boxes, triplets).tolist()
+    assert [str(r) for r, v in zip(graph.relations, found, strict=True) if v == 0] == [str(r) for r in result.broken]
+    assert result.broken
+
+
+def test_inside_of_a_floor_with_a_notch() -> None:
+    floor = floor_from_polygon(np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], float)[::-1])
+    distance, gradient = inside(floor, np.array([(0.5, 0.5), (1.5, 1.5), (1.2, 0.9), (-0.25, 1.0)]))
+    np.testing.assert_allclose(distance, [0.5, -0.5, 0.1, -0.25], atol=1e-12)
+    np.testing.assert_allclose(gradient[3], [1.0, 0.0], atol=1e-12)
+    assert floor.reflex.tolist() == [[1.0, 1.0]]
+
+
+def test_bad_input_is_named() -> None:
+    graph, size, position, yaw = bedroom()
+    with pytest.raises(ValueError, match=r"6 boxes for a graph of 7 objects"):
+        repair(graph, boxes(size[:6], position[:6], yaw[:6]))
+    position[2, 0] = np.nan
+    with pytest.raises(ValueError, match=r"box 2 \(nightstand\) is not finite"):
+        repair(graph, boxes(size, position, yaw))
+    with pytest.raises(ValueError, match="not a floor"):
+        repair_boxes(
+            ["bed"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3)), floor_polygon=np.zeros((4, 2))
+        )
