@@ -59,9 +59,9 @@ class AutoencoderConfig:
     """
 
     patch: int = 4
-    channels: int = 4
+    channels: int = 6
     width: int = 64
-    blocks: int = 2
+    blocks: int = 1
     levels: int = 0
 
 

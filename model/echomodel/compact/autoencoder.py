@@ -13,9 +13,10 @@ GRID = 64
 class Autoencoder(nn.Module):
     """Grids (N, 64, 64, 64) in [-1, 1] <-> latents (N, C, G, G, G), G = 64 / patch.
 
-    Encoder and decoder are the linear maps of a PCA of patches plus residual convolutions on the latent grid, so that
-    an untrained decoder after `initialise` is the PCA. The latent is continuous, or rounded to `levels` values per
-    channel (finite scalar quantisation, Mentzer et al. 2023) with straight-through gradients.
+    The encoder is a PCA of patches, fitted once by `initialise` and fixed: the decoder can be trained further without
+    spoiling a denoiser trained on its latents. The decoder is the PCA's inverse plus residual convolutions over the
+    latent grid, which see the neighbouring patches. The latent is continuous, or rounded to `levels` values per channel
+    (finite scalar quantisation, Mentzer et al. 2023).
     """
 
     def __init__(self, config: CompactConfig) -> None:
@@ -23,10 +24,13 @@ class Autoencoder(nn.Module):
         settings = config.autoencoder
         self.patch, self.levels, self.channels = settings.patch, settings.levels, settings.channels
         voxels = self.patch**3
-        self.encode_patch = nn.Linear(voxels, settings.channels)
+        self.register_buffer("basis", torch.zeros(settings.channels, voxels))
+        self.register_buffer("offset", torch.zeros(settings.channels))
         self.decode_patch = nn.Linear(settings.channels, voxels)
-        self.analysis = _Refiner(voxels, settings.width, settings.channels, 1)
         self.synthesis = _Refiner(settings.channels, settings.width, voxels, settings.blocks)
+
+    basis: Tensor
+    offset: Tensor
 
     @property
     def cells(self) -> int:
@@ -35,28 +39,30 @@ class Autoencoder(nn.Module):
 
     @torch.no_grad()
     def initialise(self, grids: Tensor) -> None:
-        """Set the linear maps to the PCA of the grids' patches (M, 64, 64, 64), scaled so that latents have unit power."""
+        """Fit the PCA to the patches of grids (M, X, Y, Z), scaled so that latents have unit power."""
         patches = to_patches(grids, self.patch).flatten(2).transpose(1, 2).reshape(-1, self.patch**3).double()
         mean = patches.mean(0)
         centred = patches - mean
         values, vectors = torch.linalg.eigh(centred.T @ centred / len(centred))
         basis = vectors[:, -self.channels :].flip(1)
         scale = values[-self.channels :].mean().sqrt()
-        self.encode_patch.weight.copy_((basis / scale).T)
-        self.encode_patch.bias.copy_(-(mean @ basis) / scale)
+        self.basis.copy_((basis / scale).T)
+        self.offset.copy_(-(mean @ basis) / scale)
         self.decode_patch.weight.copy_(basis * scale)
         self.decode_patch.bias.copy_(mean)
 
     def encode(self, grids: Tensor) -> Tensor:
         """Latents of grids: (N, X, Y, Z) -> (N, C, X/p, Y/p, Z/p); any multiples of the patch."""
         patches = to_patches(grids, self.patch)
-        latent = _per_cell(self.encode_patch, patches) + self.analysis(patches)
+        latent = nn.functional.conv3d(patches, self.basis[:, :, None, None, None], self.offset)
         return self.quantise(latent)
 
     def decode(self, latent: Tensor) -> Tensor:
         """Grids of latents: (N, C, G, G, G) -> (N, 64, 64, 64) in [-1, 1]."""
         latent = self.quantise(latent)
-        return from_patches(_per_cell(self.decode_patch, latent) + self.synthesis(latent), self.patch).clamp(-1, 1)
+        linear = self.decode_patch
+        patches = nn.functional.conv3d(latent, linear.weight[:, :, None, None, None], linear.bias)
+        return from_patches(patches + self.synthesis(latent), self.patch).clamp(-1, 1)
 
     def quantise(self, latent: Tensor) -> Tensor:
         """The latent itself, or rounded to `levels` values in [-2, 2] per channel."""
@@ -76,14 +82,15 @@ class _Refiner(nn.Module):
 
     def __init__(self, inputs: int, width: int, outputs: int, blocks: int) -> None:
         super().__init__()
-        self.enter = nn.Conv3d(inputs, width, 3 if inputs <= width // 2 else 1, padding="same")
+        self.enter = nn.Conv3d(inputs, width, 3, padding=1)
         self.blocks = nn.ModuleList(
-            nn.Sequential(nn.SiLU(), nn.Conv3d(width, width, 3, padding=1), nn.SiLU(), nn.Conv3d(width, width, 3, padding=1))
+            nn.Sequential(
+                nn.SiLU(), nn.Conv3d(width, width, 3, padding=1), nn.SiLU(), nn.Conv3d(width, width, 3, padding=1)
+            )
             for _ in range(blocks)
         )
-        self.leave = nn.Conv3d(width, outputs, 1)
+        self.leave = nn.Conv3d(width, outputs, 1, bias=False)
         nn.init.zeros_(self.leave.weight)
-        nn.init.zeros_(self.leave.bias)
 
     def forward(self, x: Tensor) -> Tensor:
         x = self.enter(x)
@@ -104,7 +111,3 @@ def from_patches(patches: Tensor, patch: int) -> Tensor:
     n, _, x, y, z = patches.shape
     cut = patches.reshape(n, patch, patch, patch, x, y, z).permute(0, 4, 1, 5, 2, 6, 3)
     return cut.reshape(n, x * patch, y * patch, z * patch)
-
-
-def _per_cell(linear: nn.Linear, x: Tensor) -> Tensor:
-    return nn.functional.conv3d(x, linear.weight[:, :, None, None, None], linear.bias)

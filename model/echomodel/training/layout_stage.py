@@ -85,12 +85,19 @@ class LayoutStage:
         rooms, held: packed rooms to train on and to validate with.
         nodes: node budget of a batch.
         relation_weight: weight of the relation hinge.
+        frozen: parts that stay as they are.
     """
 
-    trained = ("latent", "layout")
-
-    def __init__(self, rooms: PackedRooms, held: PackedRooms, nodes: int, relation_weight: float) -> None:
+    def __init__(
+        self,
+        rooms: PackedRooms,
+        held: PackedRooms,
+        nodes: int,
+        relation_weight: float,
+        frozen: tuple[str, ...] = (),
+    ) -> None:
         self.rooms, self.held, self.nodes, self.relation_weight = rooms, held, nodes, relation_weight
+        self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""

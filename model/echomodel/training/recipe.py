@@ -57,7 +57,8 @@ class Recipe:
         rooms: packed rooms, a file that `echousd train` makes from a rooms file (see `training.rooms`).
         held_rooms: packed rooms for validation.
         shapes, held_shapes: shape sets.
-        start: weights files to start from (parts that are not trained stay as they are).
+        start: weights files to start from.
+        frozen: parts that the stage would train but that stay as they are.
         nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         validate_every, save_every: steps.
@@ -75,6 +76,7 @@ class Recipe:
     shapes: str = ""
     held_shapes: str = ""
     start: tuple[str, ...] = ()
+    frozen: tuple[str, ...] = ()
     nodes: int = 512
     shapes_per_batch: int = 32
     relation_weight: float = 0.5

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-import numpy as np
 import torch
 from safetensors.torch import load_file, save_file
 from torch import Tensor
@@ -90,6 +89,7 @@ class LayoutBatch:
 
     Arguments:
         predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
+        rules: (S,) int64. style: (N,) int64.
         before: relations of the pseudo graph before the edit (EchoScene 3.2, inverse strategy).
         added, touched: (N,) bool, nodes missing from the pseudo graph, and all nodes that the edit meets.
     """
@@ -99,6 +99,7 @@ class LayoutBatch:
     pairs: Pairs
     predicates: Tensor
     rules: Tensor
+    style: Tensor
     before: Pairs
     added: Tensor
     touched: Tensor
@@ -138,7 +139,8 @@ def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *
     )  # fmt: skip
     before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
     boxes = Boxes(rooms.size[nodes], position, yaw)
-    return LayoutBatch(graph, boxes, pairs, predicates, rooms.rules[picked], before, added, touched)
+    style, rules = rooms.style[nodes], rooms.rules[picked]
+    return LayoutBatch(graph, boxes, pairs, predicates, rules, style, before, added, touched)
 
 
 def _bits(graph: GraphBatch) -> Tensor:
@@ -223,8 +225,3 @@ def _pseudo_edit(
     pseudo[changed] = wrong
     told = _told(pseudo, pairs.receiver, pairs.sender, counts)
     return pairs.without(~added, told), added, touched
-
-
-def room_seeds(seed: int, count: int) -> np.ndarray:
-    """Independent seeds for the rooms of a set: (count,) uint32."""
-    return np.random.SeedSequence(seed).generate_state(count)

@@ -1,0 +1,89 @@
+"""The autoencoder stage (recipes call it `vqvae`, after the paper): crops of signed distances there and back."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from echomodel.compact.model import CompactModel
+from echomodel.training.shapes import ShapeGrids, crops
+
+NOISE = 0.1  # standard deviation added to the latent, so that the decoder forgives a denoiser's small errors
+
+
+def reconstruction_loss(grids: Tensor, rebuilt: Tensor) -> Tensor:
+    """Mean absolute error, voxels near the surface counting up to four times as much."""
+    weight = 1 + 3 * (1 - grids.abs()).clamp_min(0)
+    return ((rebuilt - grids).abs() * weight).mean()
+
+
+class AutoencoderStage:
+    """What the trainer needs to know about the autoencoder.
+
+    Arguments:
+        shapes, held: shape sets to train on and to validate with.
+        batch: crops per batch, per process.
+        side: side of a crop in voxels.
+    """
+
+    trained = ("autoencoder",)
+
+    def __init__(self, shapes: ShapeGrids, held: ShapeGrids, batch: int, side: int = 64) -> None:
+        self.shapes, self.held, self.batch, self.side = shapes, held, batch, side
+
+    def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
+        """Start from the PCA of patches with a surface."""
+        model.autoencoder.initialise(crops(self.shapes, 512, self.side, generator))
+
+    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of one random batch."""
+        grids = crops(self.shapes, self.batch, self.side, generator)
+        latent = model.autoencoder.encode(grids)
+        noise = NOISE * torch.randn(latent.shape, generator=generator)
+        error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
+        return error, {"reconstruction": error}
+
+    @torch.no_grad()
+    def validate(self, model: CompactModel, count: int = 46) -> dict[str, float]:
+        """Mean absolute error, intersection over union and one-voxel F-score on held-out shapes."""
+        picked = np.linspace(0, len(self.held) - 1, min(count, len(self.held))).astype(int)
+        errors: list[Tensor] = []
+        unions: list[float] = []
+        scores: list[float] = []
+        for start in range(0, len(picked), 8):
+            grids = self.held.read(picked[start : start + 8])
+            rebuilt = model.autoencoder(grids)
+            errors.append((grids - rebuilt).abs().mean())
+            unions.extend(overlap(grids, rebuilt).tolist())
+            scores.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
+        means = {"l1": float(torch.stack(errors).mean()), "iou": np.mean(unions), "fscore": np.mean(scores)}
+        return {f"held/{name}": float(value) for name, value in means.items()}
+
+
+def overlap(a: Tensor, b: Tensor) -> Tensor:
+    """Intersection over union of the insides of grids: (N, 64, 64, 64) twice -> (N,)."""
+    inside, other = (a < 0).flatten(1), (b < 0).flatten(1)
+    return (inside & other).sum(1) / (inside | other).sum(1).clamp_min(1)
+
+
+def surface_score(a: Tensor, b: Tensor) -> float:
+    """F-score of two surfaces at one voxel (1/64 of the grid), points being marching cubes' vertices, 0 to 1."""
+    from scipy.spatial import cKDTree
+
+    points = [surface_points(grid) for grid in (a, b)]
+    if not len(points[0]) or not len(points[1]):
+        return 0.0
+    precision = float((cKDTree(points[0]).query(points[1])[0] <= 1.0).mean())
+    recall = float((cKDTree(points[1]).query(points[0])[0] <= 1.0).mean())
+    return 2 * precision * recall / max(precision + recall, 1e-9)
+
+
+def surface_points(grid: Tensor) -> np.ndarray:
+    """Vertices of the zero level in voxels (k, 3), none where there is no surface."""
+    from skimage.measure import marching_cubes
+
+    values = grid.numpy()
+    if not values.min() < 0 < values.max():
+        return np.zeros((0, 3))
+    return marching_cubes(values, 0.0)[0]

@@ -1,0 +1,173 @@
+"""The shape stage: denoising latents of all objects of a scene, joined by their echoes (EchoScene 3.4)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from echomodel.compact.model import CompactModel
+from echomodel.compact.pairs import Pairs, pairs_of
+from echomodel.graph import GraphBatch
+from echomodel.objectives import add_noise, clean_from, draw_levels, expand, output_from, target
+from echomodel.samplers import Predict
+from echomodel.training.layout_stage import draw_known
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
+from echomodel.training.shapes import EncodedShapes
+from echomodel.vocabulary import vocabulary
+
+LOWEST = 0.1  # level below which the loss weight 1 / level^2 of a predicted clean latent stops growing
+BUNDLE = 4  # objects in a suite
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeBatch:
+    """Scenes with the shape of every object.
+
+    Arguments:
+        graph, pairs: N nodes. shape: (N,) int64, number of the shape in the set.
+        room: the room that the scenes are, None for suites of furniture without a room.
+    """
+
+    graph: GraphBatch
+    pairs: Pairs
+    shape: Tensor
+    room: LayoutBatch | None = None
+
+
+def shape_loss(
+    model: CompactModel,
+    batch: ShapeBatch,
+    clean: Tensor,
+    size: Tensor,
+    generator: torch.Generator,
+    graph_latent: Tensor | None = None,
+) -> tuple[Tensor, dict[str, Tensor]]:
+    """Denoising loss of the unknown objects' latents.
+
+    Arguments:
+        clean: (N, C, G, G, G) float32 latents.
+        size: (N, 3) float32, metres.
+        graph_latent: (N, latent width) shared with the layout branch, None = encode the graph here.
+    """
+    settings, scenes = model.config.shape, batch.graph.num_scenes
+    objective = settings.objective
+    known = draw_known(batch.graph.scene, scenes, generator)
+    level = shifted(draw_levels(scenes, generator))[batch.graph.scene] * ~known
+    noise = torch.randn(clean.shape, generator=generator)
+    # equal furniture starts from equal noise when sampled, so half of the scenes train that way
+    shared = torch.rand(scenes, generator=generator) < 0.5
+    noise = torch.where(expand(shared[batch.graph.scene], noise), noise[first_of_group(batch)], noise)
+    noisy = torch.where(expand(known, clean), clean, add_noise(clean, noise, level, objective))
+    latent = model.latent(batch.graph.category, batch.pairs) if graph_latent is None else graph_latent
+    context = model.shape.context(batch.graph, size, batch.pairs, latent)
+    output = model.shape(noisy, level, context).float()
+    if settings.prediction == "sample":
+        output = output_from(output, noisy, level, objective, LOWEST)
+        wanted = output_from(clean, noisy, level, objective, LOWEST)
+    else:
+        wanted = target(clean, noise, level, objective)
+    free = (~known).float()
+    error = (output - wanted).square().flatten(1).mean(1)
+    loss = (error * free).sum() / free.sum().clamp_min(1)
+    return loss, {"shape": loss}
+
+
+def shifted(level: Tensor) -> Tensor:
+    """Uniform levels moved towards noise: neighbouring cells say much of each other, so little noise hides little."""
+    normal = 0.6 + math.sqrt(2) * 1.1 * torch.erfinv((2 * level - 1).clamp(-0.9999, 0.9999))
+    return torch.sigmoid(normal).clamp(0.02, 1.0)
+
+
+def first_of_group(batch: ShapeBatch) -> Tensor:
+    """(N,) int64: for every object the first of its scene with the same shape."""
+    same = (batch.graph.scene[:, None] == batch.graph.scene) & (batch.shape[:, None] == batch.shape)
+    return same.int().argmax(1)
+
+
+def draw_suites(count: int, styles: int, generator: torch.Generator) -> ShapeBatch:
+    """Suites: `BUNDLE` objects of random categories and at most two styles, told which belong together.
+
+    Rooms hold few of the rare categories; suites hold all alike.
+    """
+    coarse = torch.tensor([_COARSE.index(entry.coarse) for entry in vocabulary().categories])
+    nodes = count * BUNDLE
+    scene = torch.arange(count).repeat_interleave(BUNDLE)
+    category = torch.randint(len(coarse), (nodes,), generator=generator)
+    repeat = torch.rand(nodes, generator=generator) < 0.25
+    category = torch.where(repeat, category[scene * BUNDLE], category)
+    two = torch.randint(styles, (count, 2), generator=generator)
+    style = two[scene, (torch.rand(nodes, generator=generator) < 0.3).long()]
+    at, to = ((scene[:, None] == scene) & ~torch.eye(nodes, dtype=torch.bool)).nonzero(as_tuple=True)
+    same_style, same_coarse = style[at] == style[to], coarse[category[at]] == coarse[category[to]]
+    told = torch.stack([same_style, same_coarse, same_style & same_coarse], dim=1)
+    keep = torch.rand(count, generator=generator)[scene[at]]
+    told &= torch.rand(told.shape, generator=generator) < keep[:, None]
+    edge, predicate = told.nonzero(as_tuple=True)
+    graph = GraphBatch(
+        category=category, triplets=torch.stack([at[edge], predicate + 13, to[edge]], dim=1), scene=scene,
+        room_type=torch.randint(len(vocabulary().room_types), (count,), generator=generator),
+        floor=torch.full((count, 2), torch.nan),
+    )  # fmt: skip
+    return ShapeBatch(graph, pairs_of(graph), style * len(coarse) + category)
+
+
+_COARSE = vocabulary().coarse_categories
+
+
+class ShapeStage:
+    """What the trainer needs to know about shapes.
+
+    Arguments:
+        rooms: packed rooms, whose styles and categories name the shapes.
+        shapes, held: shape sets to train on and to validate with.
+        batch: objects per batch, per process.
+    """
+
+    trained: tuple[str, ...] = ("shape",)
+
+    def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, held: EncodedShapes, batch: int) -> None:
+        self.rooms, self.shapes, self.held, self.batch = rooms, shapes, held, batch
+
+    def draw(self, generator: torch.Generator) -> ShapeBatch:
+        """Rooms on even draws, suites on odd ones."""
+        if float(torch.rand(1, generator=generator)) < 0.5:
+            return draw_suites(max(1, self.batch // BUNDLE), self.shapes.styles, generator)
+        return room_shapes(draw_batch(self.rooms, self.batch, generator), self.shapes)
+
+    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of one random batch."""
+        batch = self.draw(generator)
+        clean = self.shapes.latents[batch.shape].float()
+        return shape_loss(model, batch, clean, self.shapes.sizes[batch.shape], generator)
+
+    @torch.no_grad()
+    def validate(self, model: CompactModel) -> dict[str, float]:
+        """Denoising loss on suites of held-out styles, the same draws every time."""
+        generator = torch.Generator().manual_seed(0)
+        losses = []
+        for _ in range(4):
+            batch = draw_suites(8, self.held.styles, generator)
+            clean, size = self.held.latents[batch.shape].float(), self.held.sizes[batch.shape]
+            losses.append(shape_loss(model, batch, clean, size, generator)[0])
+        return {"held/shape": float(torch.stack(losses).mean())}
+
+
+def room_shapes(room: LayoutBatch, shapes: EncodedShapes) -> ShapeBatch:
+    """The shapes of a batch of rooms; rooms that know more styles than the set share the set's."""
+    style = room.style % shapes.styles
+    return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category, room)
+
+
+def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
+    """What samplers call: the clean latent seen in a noisy one."""
+    context = model.shape.context(graph, size, pairs, latent)
+    settings = model.config.shape
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        output = model.shape(x, level, context)
+        return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
+
+    return predict
