@@ -104,13 +104,38 @@ def trace(scenery: Scenery, view: View, size: int, *, seed: int = 0) -> np.ndarr
     rng = np.random.default_rng(seed)
     scene = _embree(scenery)
     shift = rng.random((size, size, 4)).astype(np.float32)
-    image = np.zeros((size, size, 3), np.float32)
+    layers = np.zeros((size, size, LAYERS), np.float32)
     rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
     for start in range(0, size, rows):
         block = slice(start, min(size, start + rows))
         for sample in range(SUPERSAMPLES**2):
-            image[block] += _shade(scene, scenery, view, size, block, sample, shift[block])
-    return (image / SUPERSAMPLES**2) ** (1 / 2.2)
+            layers[block] += _shade(scene, scenery, view, size, block, sample, shift[block])
+    layers /= SUPERSAMPLES**2
+    light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
+    color = layers[..., ALBEDO] * light + layers[..., GLOW]
+    return _tone(color) ** (1 / 2.2)
+
+
+# What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
+ALBEDO, LIGHT, GLOW, NORMAL, POINT, LAYERS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), 15
+REACH = 2  # pixels
+
+
+def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Mean of the light over neighbours on the same flat piece of surface (joint bilateral filter), (h, w, 3) each."""
+    height, width = light.shape[:2]
+    padded = [np.pad(a, ((REACH, REACH), (REACH, REACH), (0, 0)), mode="edge") for a in (light, normal, point)]
+    total, weight = np.zeros_like(light), np.zeros((height, width, 1), np.float32)
+    for down in range(2 * REACH + 1):
+        for across in range(2 * REACH + 1):
+            there = slice(down, down + height), slice(across, across + width)
+            other_light, other_normal, other_point = (a[there] for a in padded)
+            turn = np.clip((normal * other_normal).sum(-1, keepdims=True), 0, 1)
+            step = np.abs((normal * (other_point - point)).sum(-1, keepdims=True))
+            share = turn**16 * (step < 0.02)
+            total += share * other_light
+            weight += share
+    return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
 
 
 SUN = np.array([0.38, 0.84, 0.32]) / np.linalg.norm([0.38, 0.84, 0.32])
@@ -134,7 +159,7 @@ def _embree(scenery: Scenery) -> Any:
 def _shade(
     scene: Any, scenery: Scenery, view: View, size: int, rows: slice, sample: int, shift: np.ndarray
 ) -> np.ndarray:
-    """(rows, size, 3) linear colour of one ray for each pixel of some rows."""
+    """(rows, size, LAYERS) what one ray for each pixel of some rows brings back."""
     across, down = sample % SUPERSAMPLES, sample // SUPERSAMPLES
     x = (np.arange(size) + (across + 0.5) / SUPERSAMPLES) / size * 2 - 1
     y = 1 - (np.arange(rows.start, rows.stop) + (down + 0.5) / SUPERSAMPLES) / size * 2
@@ -149,9 +174,10 @@ def _shade(
         origin = np.broadcast_to(eye, direction.shape)
     hit = scene.run(_f32(origin), _f32(direction), output=1)
     seen = np.flatnonzero(hit["primID"] >= 0)
-    color = np.tile(BACKGROUND.astype(np.float32), (len(u), 1))
+    out = np.zeros((len(u), LAYERS), np.float32)
+    out[:, GLOW] = BACKGROUND
     if not len(seen):
-        return color.reshape(-1, size, 3)
+        return out.reshape(-1, size, LAYERS)
     face = hit["primID"][seen]
     bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
     point = (scenery.triangles[face] * bary[..., None]).sum(1)
@@ -159,10 +185,11 @@ def _shade(
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     toward = -direction[seen]
     normal = np.where((normal * toward).sum(1, keepdims=True) < 0, -normal, normal)
-    albedo = scenery.colors(face, bary)
     lifted = point + 2e-3 * normal
-    color[seen] = _light(scene, scenery, lifted, normal, toward, albedo, face, sample, shift.reshape(-1, 4)[seen])
-    return color.reshape(-1, size, 3)
+    light, shine = _light(scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen])
+    glow = 0.5 * shine[:, None] + scenery.emissive[face]
+    out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
+    return out.reshape(-1, size, LAYERS)
 
 
 def _light(
@@ -171,11 +198,11 @@ def _light(
     point: np.ndarray,
     normal: np.ndarray,
     toward: np.ndarray,
-    albedo: np.ndarray,
     face: np.ndarray,
     sample: int,
     shift: np.ndarray,
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
+    """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
     count = len(point)
     sun = SUN + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
     sun /= np.linalg.norm(sun, axis=1, keepdims=True)
@@ -200,8 +227,7 @@ def _light(
     half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
     gloss = scenery.gloss[face]
     shine = gloss * np.clip((normal * half).sum(1), 0, None) ** (4 + 90 * gloss) * lit
-    out = albedo * (0.62 * direct + 0.78 * sky) + 0.5 * shine[:, None] + scenery.emissive[face]
-    return _tone(out)
+    return 0.62 * direct + 0.78 * sky, shine
 
 
 def _even(number: int, shift: np.ndarray) -> np.ndarray:

@@ -166,3 +166,5 @@ def report(room: Room, root: Path, preview: Path | None) -> None:
     typer.echo(f"graph    {len(room.names)} objects, {kept} of {kept + len(broken)} measured relations kept")
     for verdict in broken:
         typer.echo(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
+    for note in room.notes:
+        typer.echo(f"note     {note}")

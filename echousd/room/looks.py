@@ -30,7 +30,7 @@ PALETTES: Mapping[str, tuple[str, str, str, str, str, str, str]] = {
     "oak": ("b98f5f", "e7e1d6", "6f7f86", "ece7dd", "8c9ba0", "33353a", "d9d3c7"),
     "walnut": ("77502f", "8a6240", "b9803a", "efe8da", "b06a43", "b08d57", "b9623f"),
     "ash": ("d3b88f", "f0ece3", "a9b39c", "f3efe7", "8fa08a", "d0cfca", "8d9a92"),
-    "smoke": ("5d5148", "76695e", "4f5f75", "dfdcd6", "3f4f66", "9ea3a8", "3c4046"),
+    "smoke": ("7d6b5b", "9a8c7f", "5d7088", "dfdcd6", "3f4f66", "9ea3a8", "3c4046"),
     "cherry": ("8f4f34", "a4623f", "c9b594", "f0e9de", "93443a", "c2a15f", "e4ddd0"),
     "birch": ("dcc39a", "cfd8d3", "c48f85", "f5f0ea", "d5a79c", "8e9498", "c9b8a6"),
 }

@@ -102,12 +102,12 @@ def generate(
     with watch.stage("load"):
         echo = load_model(model)
     layouts = [sample_boxes(echo, graph, seed=seed, number=0, steps=steps, watch=watch)]
-    layouts[0] = _settled(graph, layouts[0], repair, watch)
+    layouts[0], notes = _settled(graph, layouts[0], repair, watch)
     sized = _with_sizes(graph, layouts[0])
     for number in range(1, samples):
         found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, watch=watch)
         found = Boxes(layouts[0].size, found.position, found.yaw)
-        layouts.append(_settled(sized, found, repair, watch))
+        layouts.append(_settled(sized, found, repair, watch)[0])
     boxes = layouts[0]
     grids = sample_shapes(echo, graph, boxes, seed=seed, steps=steps, watch=watch) if shapes == "generate" else None
     meshes, assets = make_meshes(graph, boxes, grids, faces=faces, watch=watch)
@@ -120,6 +120,7 @@ def generate(
         floor=room_floor(graph, layouts),
         verdicts=judge(graph, boxes),
         layouts=tuple(layouts),
+        notes=notes,
         provenance=Provenance(seed, "compact", getattr(echo, "hash", ""), shapes, source),
         options=options or RoomOptions(),
         timings=watch.seconds,
@@ -255,17 +256,31 @@ def room_floor(graph: SceneGraph, layouts: list[Boxes]) -> np.ndarray:
     return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
 
 
-def _settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> Boxes:
-    names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
-    free = np.array([node.size is None for node in graph.nodes])
-    size = equal_sizes(names, categories, style_groups(graph), np.asarray(boxes.size, float), free)
-    boxes = Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
+def _settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tuple[Boxes, tuple[str, ...]]:
+    """Sampled boxes after equal sizes within style groups and, if wanted, repair; and what could not be met."""
+    boxes = _alike(graph, boxes)
     if not repair:
-        return boxes
+        return boxes, ()
     from echousd.repair import repair as repaired
 
     with watch.stage("repair"):
-        return repaired(graph, boxes).boxes
+        found = repaired(graph, boxes)
+        same = _alike(graph, found.boxes)
+        if not torch.equal(
+            same.size, found.boxes.size
+        ):  # chairs of one set that had to shrink: all of them, if it fits
+            second = repaired(_with_sizes(graph, same), same)
+            if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
+                found = second
+    collisions = tuple(f"{a} and {b} collide by {depth:.2f} m" for a, b, depth in found.collisions)
+    return found.boxes, found.conflicts + collisions
+
+
+def _alike(graph: SceneGraph, boxes: Boxes) -> Boxes:
+    names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
+    free = np.array([node.size is None and not node.locked for node in graph.nodes])
+    size = equal_sizes(names, categories, style_groups(graph), np.asarray(boxes.size, float), free)
+    return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
 
 
 def _with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

@@ -79,6 +79,7 @@ class Room:
         floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
         verdicts: one per relation of the graph.
         layouts: all arrangements of the same furniture; the first is `boxes`.
+        notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
     """
 
@@ -90,6 +91,7 @@ class Room:
     floor: np.ndarray
     verdicts: tuple[Verdict, ...] = ()
     layouts: tuple[Boxes, ...] = ()
+    notes: tuple[str, ...] = ()
     provenance: Provenance = Provenance()
     options: RoomOptions = RoomOptions()
     timings: Mapping[str, float] = field(default_factory=dict)

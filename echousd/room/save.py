@@ -120,6 +120,7 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
         "up_axis": room.options.up_axis,
         "layouts": max(len(room.layouts), 1),
         "relations": {"kept": kept, "broken": broken, "unmeasured": len(room.verdicts) - kept - broken},
+        "notes": list(room.notes),
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
         "graph": json.loads(room.graph.to_json()),
         "assets": dict(room.assets),

@@ -83,7 +83,7 @@ def equal_sizes(
             and styles[names[i]] == styles[names[first]]
             and np.abs(size[i] / size[first] - 1).max() <= ALIKE
         ]
-        out[group] = size[group].mean(0)
+        out[group] = size[group].min(0)  # the smallest fits wherever one of them does
         left = [i for i in left if i not in group]
     return out
 
