@@ -187,7 +187,7 @@ PAIRS = (
 
 
 def _pairs(rooms: Iterable[RoomBoxes]) -> list[dict]:
-    rows: dict[tuple[str, str], list[tuple[float, ...]]] = {pair: [] for pair in PAIRS}
+    rows: dict[tuple[str, str], list[tuple[float, float, float, float, float]]] = {pair: [] for pair in PAIRS}
     for room in rooms:
         present = set(room.categories)
         for child, anchor in PAIRS:
@@ -216,7 +216,7 @@ def _pairs(rooms: Iterable[RoomBoxes]) -> list[dict]:
     return out
 
 
-def _pair_rows(room: RoomBoxes, child: str, anchor: str) -> list[tuple[float, ...]]:
+def _pair_rows(room: RoomBoxes, child: str, anchor: str) -> list[tuple[float, float, float, float, float]]:
     """Per child and its nearest anchor: lateral, forward (anchor's frame), gap of the hulls, turn, angle off facing."""
     names = np.array(room.categories)
     plan = room.position[:, [0, 2]]

@@ -127,15 +127,22 @@ class Builder:
         x, z = anchor.local(lateral, forward)
         return self.put(category, size, x, z, anchor.yaw + turn, style, play=play, ignore=ignore, doors=doors)
 
-    def wall_spot(self, width: float, corner: float, margin: float = 0.0) -> tuple[Wall, float] | None:
+    def wall_spot(
+        self, width: float, corner: float, margin: float = 0.0, yaw: float | None = None
+    ) -> tuple[Wall, float] | None:
         """A wall that is long enough and the place along it of something `width` wide.
 
         Arguments:
             width: metres.
             corner: share of the draws that go into a corner.
             margin: distance in metres that the others keep from the wall's ends, where it is long enough.
+            yaw: asks for walls of that direction only.
         """
-        fits = [wall for wall in self.floor.walls if wall.length >= width - 0.02]
+        fits = [
+            wall
+            for wall in self.floor.walls
+            if wall.length >= width - 0.02 and (yaw is None or math.cos(wall.yaw - yaw) > 0.9)
+        ]
         if not fits:
             return None
         wall = self.pick(fits, [w.length for w in fits])
@@ -151,23 +158,28 @@ class Builder:
     def against_wall(
         self, category: str, *, size: Size | None = None, corner: float = 0.3, gap: float | None = None,
         style: int | None = None, tries: int = 12, yaw: float | None = None, margin: float = 0.0,
+        near: Item | None = None,
     ) -> Item | None:  # fmt: skip
-        """Place one item with its back to a wall; `yaw` asks for walls of that direction only."""
+        """Place one item with its back to a wall, for `near` at the nearest of a few free places."""
         size = size or self.size(category)
         style = self.style() if style is None else style
+        found: list[Item] = []
         for _ in range(tries):
-            spot = self.wall_spot(size[0], corner, margin)
+            spot = self.wall_spot(size[0], corner, margin, yaw)
             if spot is None:
                 return None
             wall, along = spot
-            if yaw is not None and math.cos(wall.yaw - yaw) < 0.9:
-                continue
-            away = (self.wall_gap() if gap is None else gap) + size[2] / 2
-            x, z = wall.point(along, away)
-            placed = self.put(category, size, x, z, wall.yaw, style)
-            if placed:
-                return placed
-        return None
+            x, z = wall.point(along, (self.wall_gap() if gap is None else gap) + size[2] / 2)
+            item = Item(category, size, x, 0.0, z, wall.yaw)
+            if self.free(item):
+                found.append(item)
+                if near is None or len(found) == 4:
+                    break
+        if not found:
+            return None
+        if near is not None:
+            found.sort(key=lambda item: math.hypot(item.x - near.x, item.z - near.z))
+        return self.add(found[0], style)
 
     def wall_gap(self) -> float:
         """Gap between a back and its wall: a few centimetres, sometimes a hand's breadth."""

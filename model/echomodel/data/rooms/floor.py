@@ -10,7 +10,7 @@ import numpy as np
 from echomodel.data.rooms.statistics import RoomTypeStatistics, quantile
 
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
-DOOR_DEPTH = 0.75
+DOOR_DEPTH = 0.6
 CORRIDOR = 1.0  # what a cut must leave of a side
 
 
@@ -177,6 +177,6 @@ def _opening(walls: tuple[Wall, ...], width: float, depth: float, rng: np.random
     wall = fits[int(np.searchsorted(weights, rng.random() * weights[-1]))]
     free = wall.length - width
     # Doors and windows like the end of a wall.
-    start = free * rng.random() if rng.random() < 0.4 else (0.08 if rng.random() < 0.5 else free - 0.08)
+    start = free * rng.random() if rng.random() < 0.25 else (0.08 if rng.random() < 0.5 else free - 0.08)
     a, b = wall.point(start, 0.0), wall.point(start + width, depth)
     return (min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))

@@ -10,7 +10,7 @@ import numpy as np
 from echomodel.data.rooms.builder import Builder
 from echomodel.data.rooms.floor import sample_floor
 from echomodel.data.rooms.recipes import furnish, wanted
-from echomodel.data.rooms.statistics import room_type_statistics
+from echomodel.data.rooms.statistics import RoomTypeStatistics, room_type_statistics
 from echomodel.roomboxes import RoomBoxes
 
 # Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
@@ -19,8 +19,9 @@ STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
 
 
 def generate_room(
-    rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room"
-) -> RoomBoxes:
+    rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room",
+    statistics: RoomTypeStatistics | None = None,
+) -> RoomBoxes:  # fmt: skip
     """Draw one room.
 
     Arguments:
@@ -28,6 +29,7 @@ def generate_room(
         room_type: word of the vocabulary, or None to draw one from `MIX`.
         styles: number of style groups; objects refer to shape `s<style>_<category>`.
         name: the room's id.
+        statistics: what such rooms hold, default that of the real ones.
 
     Returns:
         The room with its floor's bounding box centred at the origin, metres and radians.
@@ -37,7 +39,7 @@ def generate_room(
     """
     if room_type is None:
         room_type = list(MIX)[int(np.searchsorted(np.cumsum(list(MIX.values())), rng.random() * 0.999999))]
-    statistics = room_type_statistics(room_type)
+    statistics = statistics or room_type_statistics(room_type)
     while True:
         builder = Builder(sample_floor(statistics, rng), rng, styles)
         builder.wanted = wanted(statistics, builder.floor.area, rng)

@@ -7,6 +7,7 @@ import math
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item, Size
 
 SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa", "sofa", "chaise_longue_sofa", "lazy_sofa")
+VANITY_SEATS = ("dressing_chair", "stool", "chair", "dining_chair", "ottoman")
 LOW_ROOM = 3.7
 BEDS = ("double_bed", "single_bed", "kids_bed")
 
@@ -16,6 +17,9 @@ def bed_group(room: Builder, category: str) -> Item | None:
     count = room.take("nightstand")
     style = room.style()
     size, stand = room.size(category), room.size("nightstand")
+    vanity = bool(room.wanted.get("dressing_table")) and room.chance(0.5)
+    if vanity:  # it takes the place of a nightstand
+        count = min(count, 1)
     if category == "kids_bed":
         size = (max(size[0], 0.7), size[1], max(size[2], 1.2))
     bed: Item | None = None
@@ -30,7 +34,8 @@ def bed_group(room: Builder, category: str) -> Item | None:
         if room.chance(0.35) and wall.length > width:  # in the middle of its wall
             along = wall.length / 2 + room.rng.normal(0.0, 0.12)
         across, _ = room.floor.opposite(wall, along)
-        if across > LOW_ROOM and attempt < 10 and room.chance(0.5):  # beds stand across the room rather than along it
+        shy = 0.85 if room.wanted.get("tv_stand") else 0.5
+        if across > LOW_ROOM and attempt < 10 and room.chance(shy):  # beds stand across the room rather than along it
             continue
         if sides == 1:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
@@ -40,14 +45,30 @@ def bed_group(room: Builder, category: str) -> Item | None:
             break
     if bed is None:
         return None
+    if vanity:
+        _vanity(room, bed, style)
     _nightstands(room, bed, stand, count, style)
     for foot, share in (("bench", 1.0), ("ottoman", 0.75)):
         if room.wanted.get(foot) and room.chance(share):  # at the foot
             piece = room.size(foot)
             forward = size[2] / 2 + piece[2] / 2 + room.uniform(0.0, 0.15)
-            if room.beside(bed, foot, piece, room.rng.normal(0, 0.05), forward, 0.0, style):
+            turn = 0.0 if foot == "bench" else room.pick([0.0, HALF_PI, math.pi], [0.5, 0.15, 0.35])
+            if room.beside(bed, foot, piece, room.rng.normal(0, 0.05), forward, turn, style):
                 room.take(foot)
     return bed
+
+
+def _vanity(room: Builder, bed: Item, style: int) -> None:
+    """A dressing table beside the bed's head."""
+    size = room.size("dressing_table")
+    for side in (1, -1) if room.chance(0.5) else (-1, 1):
+        lateral = side * (bed.size[0] / 2 + size[0] / 2 + room.uniform(0.0, 0.5))
+        forward = -bed.size[2] / 2 + size[2] / 2 + room.uniform(-0.05, 0.05)
+        table = room.beside(bed, "dressing_table", size, lateral, forward, 0.0, style)
+        if table:
+            room.take("dressing_table")
+            seat_at(room, table, VANITY_SEATS, style)
+            return
 
 
 def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -> None:
@@ -103,14 +124,18 @@ def sofa_group(room: Builder, category: str) -> Item | None:
     wants_tv = room.wanted.get("tv_stand", 0) > 0
     sofa = None
     sides = 0.4 if any(room.wanted.get(table) for table in ("side_table", "round_end_table", "floor_lamp")) else 0.15
-    pulled = room.chance(0.1)
+    pulled = room.chance(0.45)
     for attempt in range(30):
         spot = room.wall_spot(size[0], 0.3 if category == "l_shaped_sofa" else 0.02, sides if attempt < 20 else 0.0)
         if spot is None:
             break
         wall, along = spot
+        spare = wall.length - size[0]
+        if spare > 2.5 and attempt < 20 and room.chance(0.6):  # towards one end of a long wall, with room for a seat
+            end = 0.3 + abs(room.rng.normal(0.0, 0.9))
+            along = size[0] / 2 + (min(end, spare) if room.chance(0.5) else max(spare - end, 0.0))
         distance, _ = room.floor.opposite(wall, along)
-        gap = abs(room.rng.normal(0.03, 0.06))
+        gap = abs(room.rng.normal(0.03, 0.05)) if room.chance(0.8) else room.uniform(0.1, 0.8)
         low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
         if attempt < 14 and not (low < distance < high):
             continue
@@ -158,7 +183,7 @@ def _coffee_table(room: Builder, sofa: Item, style: int) -> Item | None:
             if count > 1:
                 second = (size[0] * 0.75, size[1] * 0.85, size[2] * 0.75)
                 room.beside(placed, "coffee_table", second, placed.size[0] * 0.6, room.uniform(-0.3, 0.3), 0.0, style,
-                            play=0.2, ignore=(placed,))  # fmt: skip
+                            ignore=(placed,))  # fmt: skip
             return placed
     return None
 
@@ -195,7 +220,7 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
         if not count or not room.chance(0.85):
             continue
         size = room.size(category)
-        askew = category in ("armchair", "lounge_chair") and room.chance(0.55)
+        askew = room.chance({"armchair": 0.55, "lounge_chair": 0.75}.get(category, 0.0))
         stray = category in ("ottoman", "stool")
         chair_style = style if room.chance(0.6) else room.style()
         side = 1 if room.chance(0.5) else -1
@@ -205,14 +230,14 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
                     lateral = side * max(
                         reach + size[2] / 2 + room.uniform(0.2, 0.7), sofa.size[0] / 2 + room.uniform(-0.1, 0.7)
                     )
-                    forward = forward_table + room.rng.normal(0.0, 0.22)
+                    forward = forward_table + room.rng.normal(0.0, 0.3)
                     turn = -side * HALF_PI
                 else:
                     lateral = room.rng.normal(0.0, 0.5)
                     forward = forward_table + reach * 0.6 + size[2] / 2 + room.uniform(0.3, 0.7)
                     turn = math.pi
-                if askew:
-                    turn += room.pick([-side, side], [0.6, 0.4]) * room.uniform(0.12, 0.85)
+                if askew:  # towards the middle of the group
+                    turn = math.atan2(-lateral, forward_table - forward) + room.rng.normal(0.0, 0.3)
                 if stray:
                     turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.45, 0.28, 0.13, 0.14])
                 if room.beside(sofa, category, size, lateral, forward, turn, chair_style):
@@ -228,7 +253,7 @@ def _side_tables(room: Builder, sofa: Item, style: int) -> None:
     sides = [1, -1] if room.chance(0.5) else [-1, 1]
     for category in ("side_table", "corner_side_table", "round_end_table", "floor_lamp"):
         count = room.wanted.get(category, 0)
-        if not count or not room.chance(0.9 if category != "floor_lamp" else 0.65):
+        if not count or not room.chance(0.9):
             continue
         size = room.size(category)
         for side in list(sides)[: min(count, 2)]:
@@ -237,6 +262,8 @@ def _side_tables(room: Builder, sofa: Item, style: int) -> None:
                 lateral = side * (sofa.size[0] / 2 + size[0] / 2 + gap)
                 forward = room.rng.normal(-0.02, 0.1) if attempt < 3 else -sofa.size[2] / 2 + size[2] / 2
                 turn = room.pick([0.0, -HALF_PI, HALF_PI, math.pi], [0.42, 0.25, 0.19, 0.14])
+                if category == "floor_lamp" and room.chance(0.45):
+                    turn += room.uniform(0.12, 0.8)
                 if room.beside(sofa, category, size, lateral, forward, turn, style):
                     room.wanted[category] -= 1
                     break
@@ -251,8 +278,9 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
     count = room.wanted.get(chair_kind, 0) if chair_kind else 0
     chair = room.size(chair_kind) if chair_kind else (0.5, 0.8, 0.5)
     margin = chair[2] * 0.6 if count else 0.0
+    sofa = next((item for item in room.items if item.category in SOFAS), None)
     table = None
-    for attempt in range(30):
+    for attempt in range(36):
         if attempt % 2 == 0 and not (central and attempt < 6) and room.chance(0.8):
             spot = room.wall_spot(size[2] + 2 * margin, 0.1)
             if spot is None:
@@ -266,8 +294,12 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
             x = room.uniform(-room.floor.half_x, room.floor.half_x) * spread
             z = room.uniform(-room.floor.half_z, room.floor.half_z) * spread
             yaw = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [1, 1, 1, 1])
+        if sofa is not None and attempt < 16:  # seats and table stand side by side along the room
+            forward = math.sin(sofa.yaw) * (x - sofa.x) + math.cos(sofa.yaw) * (z - sofa.z)
+            if not -0.6 < forward < 2.6 and room.chance(0.8):
+                continue
         # The chairs' places must be free too; later tries are content with less.
-        slack = margin if attempt < 20 else 0.1
+        slack = margin if attempt < 26 else 0.1
         around = Item("dining_table", (size[0], size[1], size[2] + 2 * slack + 0.1), x, 0.0, z, yaw)
         if room.free(around):
             table = room.put("dining_table", size, x, z, yaw, style)
@@ -322,12 +354,17 @@ def desk_group(
     desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=12)
     if desk is None:
         return None
+    seat_at(room, desk, seats, style)
+    return desk
+
+
+def seat_at(room: Builder, desk: Item, seats: tuple[str, ...], style: int) -> None:
+    """The first of the wanted seats before a desk or dressing table."""
     seat = next((s for s in seats if room.wanted.get(s)), None)
     if seat:
         chair = room.size(seat)
-        forward = size[2] / 2 + chair[2] / 2 - room.rng.normal(0.08, 0.1)
+        forward = desk.size[2] / 2 + chair[2] / 2 - room.rng.normal(0.08, 0.1)
         lateral = room.rng.normal(0.0, 0.12)
         turn = math.pi if room.chance(0.85) else math.pi + room.rng.normal(0.0, 0.5)
         if room.beside(desk, seat, chair, lateral, forward, turn, style, ignore=(desk,), doors=False):
             room.wanted[seat] -= 1
-    return desk

@@ -7,7 +7,16 @@ import math
 import numpy as np
 
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item
-from echomodel.data.rooms.groups import BEDS, SOFAS, bed_group, desk_group, dining_group, sofa_group, television
+from echomodel.data.rooms.groups import (
+    BEDS,
+    SOFAS,
+    VANITY_SEATS,
+    bed_group,
+    desk_group,
+    dining_group,
+    sofa_group,
+    television,
+)
 from echomodel.data.rooms.lamps import ceiling_lamps, on_top
 from echomodel.data.rooms.statistics import RoomTypeStatistics
 
@@ -44,7 +53,6 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
     lean = math.exp(0.45 * min(max((math.log(area) - middle) / spread, -2.0), 2.0))
     want: dict[str, int] = {}
     for category, (share, counts, cumulative) in statistics.presence.items():
-        share = min(share * ABUNDANCE.get((statistics.name, category), 1.05), 0.995)
         if share < 0.75:
             odds = share / (1 - share) * lean
             share = odds / (1 + odds)
@@ -71,10 +79,6 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
     return want
 
 
-# Corrections for what does not always find a place (shares asked for / shares wished).
-ABUNDANCE: dict[tuple[str, str], float] = {}
-
-
 def furnish(room: Builder, name: str) -> None:
     """Furnish an empty room of one type of the vocabulary."""
     {
@@ -92,8 +96,8 @@ def _bedroom(room: Builder) -> None:
         television(room, beds[0])
     _wardrobe(room, beds[0] if beds else None)
     if room.take("dressing_table"):
-        yaw = beds[0].yaw + room.pick([0.0, math.pi], [1, 1]) if beds and room.chance(0.9) else None
-        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair", "dining_chair", "ottoman"), yaw=yaw)
+        yaw = beds[0].yaw + math.pi if beds and room.chance(0.9) else None
+        desk_group(room, "dressing_table", VANITY_SEATS, yaw=yaw)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, list(beds))
@@ -191,8 +195,12 @@ def _desks(room: Builder) -> None:
 
 def _rest(room: Builder) -> None:
     """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
+    sofa = next((item for item in room.items if item.category in (*SOFAS, *BEDS)), None)
     for _ in range(room.take("tv_stand")):
-        room.against_wall("tv_stand", corner=0.05, margin=0.2)
+        if sofa is None or room.chance(0.4):
+            yaw = None if sofa is None else sofa.yaw + room.pick([HALF_PI, -HALF_PI], [1, 1])
+            room.against_wall("tv_stand", corner=0.05, margin=0.2, yaw=yaw, near=sofa)
+    table = next((item for item in room.items if item.category == "dining_table"), None)
     for category in STORAGE:
         count = room.take(category)
         if count:
@@ -200,13 +208,15 @@ def _rest(room: Builder) -> None:
             for k in range(count):
                 if k and room.chance(0.5):
                     size = room.size(category)
-                room.against_wall(category, size=size, style=style, corner=0.4, tries=14)
+                near = table if category == "sideboard" and room.chance(0.7) else None
+                room.against_wall(category, size=size, style=style, corner=0.4, tries=14, near=near)
     for category in ("plant", "floor_lamp"):
         for _ in range(room.take(category)):
             _by_the_wall(room, category)
     for category in [c for c in room.wanted if c in SMALL_TABLES]:
         for _ in range(room.take(category)):
-            room.against_wall(category, corner=0.4, gap=abs(room.rng.normal(0.05, 0.1)))
+            if category == "nightstand" or room.chance(0.5):
+                room.against_wall(category, corner=0.3, gap=abs(room.rng.normal(0.05, 0.2)), near=sofa)
     on_top(room)
     for category in [c for c in room.wanted if c not in ("pendant_lamp", "ceiling_lamp")]:
         count = room.take(category)
@@ -220,10 +230,11 @@ def _by_the_wall(room: Builder, category: str) -> None:
     size, style = room.size(category), room.style()
     stands = [item for item in room.items if item.category == "tv_stand"]
     turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2])
-    if category == "floor_lamp" and room.chance(0.4):
+    if category == "floor_lamp" and room.chance(0.5):
         turn += room.uniform(0.12, 0.75)
-    if stands and category == "plant" and room.chance(0.5):
-        stand = stands[0]
+    sofas = [item for item in room.items if item.category in SOFAS]
+    if (stands or sofas) and category == "plant" and room.chance(0.8):
+        stand = (stands or sofas)[0] if room.chance(0.75) else (sofas or stands)[0]
         for side in (1, -1) if room.chance(0.5) else (-1, 1):
             lateral = side * (stand.size[0] / 2 + size[0] / 2 + room.uniform(-0.03, 0.3))
             forward = size[2] / 2 - stand.size[2] / 2 + room.uniform(0.0, 0.15)

@@ -41,17 +41,24 @@ def room_statistics() -> dict:
 
 
 @cache
-def room_type_statistics(name: str) -> RoomTypeStatistics:
-    """The part of one room type of the vocabulary; raises ValueError for another word."""
+def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatistics:
+    """The part of one room type of the vocabulary; raises ValueError for another word.
+
+    Arguments:
+        name: room type.
+        requests: give as `presence` the shares to ask for (see `calibration`) instead of those of real rooms.
+    """
     rooms = room_statistics()["rooms"]
     if name not in rooms:
         raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
     raw = rooms[name]
+    asked = _room_requests().get(name, {}) if requests else {}
     presence = {}
     for category, entry in raw["presence"].items():
         counts = tuple(int(count) for count in entry["counts"])
         weights = np.array(list(entry["counts"].values()), float)
-        presence[category] = (entry["share"], counts, tuple(np.cumsum(weights / weights.sum()).tolist()))
+        share = asked.get(category, entry["share"])
+        presence[category] = (share, counts, tuple(np.cumsum(weights / weights.sum()).tolist()))
     return RoomTypeStatistics(
         name=name,
         area=tuple(raw["area"]),
@@ -63,6 +70,10 @@ def room_type_statistics(name: str) -> RoomTypeStatistics:
         cuts=CUTS.get(name, MANY_CUTS),
         presence=presence,
     )
+
+
+def _room_requests() -> dict[str, dict[str, float]]:
+    return json.loads(resources.files("echomodel.data").joinpath("room_requests.json").read_text("utf-8"))
 
 
 def quantile(percentiles: tuple[float, ...], z: float) -> float:
