@@ -20,7 +20,8 @@ import torch
 from safetensors import safe_open
 from torch import Tensor, nn
 
-FOLDER = Path(os.environ.get("ECHOUSD_PARITY_DIR") or Path(__file__).parent / "fixtures")
+LISTINGS = Path(__file__).parent / "fixtures"
+FOLDER = Path(os.environ.get("ECHOUSD_PARITY_DIR") or LISTINGS)
 DEFAULT_GAIN = 0.7
 
 

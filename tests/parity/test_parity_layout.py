@@ -7,6 +7,7 @@ import torch
 from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
+from echomodel.released.frozen_layout import FrozenLayout
 from echomodel.released.layout import LayoutNet
 from echomodel.released.sampling import ancestral, layout_loss
 from echomodel.released.tables import LayoutTables
@@ -32,6 +33,7 @@ def test_step(name: str) -> None:
     x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
     close(net.echo(x, objects, triples, embedding, None), numbers["echo"], 1e-4)
     close(net(x, objects, triples, numbers["t"]), numbers["eps"], 2e-4)
+    close(FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 2e-4)
 
 
 @torch.inference_mode()
@@ -39,7 +41,9 @@ def test_step(name: str) -> None:
 def test_step_at_full_size(name: str) -> None:
     numbers = Numbers(name)
     net = _net(numbers)
-    close(net(numbers["x"], numbers["obj_embed"], numbers["triples"], numbers["t"]), numbers["eps"], 1e-4)
+    x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
+    close(net(x, objects, triples, numbers["t"]), numbers["eps"], 1e-4)
+    close(FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 1e-4)
 
 
 def test_tables() -> None:
@@ -54,12 +58,10 @@ def test_thousand_step_sampling() -> None:
     numbers = Numbers("layout_sampling")
     net = _net(numbers)
     tables = _tables(numbers.meta["diffusion"])
-    objects, triples, noise = numbers["obj_embed"], numbers["triples"], numbers["noise"]
-    top = len(tables.betas) - 1
+    bound = FrozenLayout(net).bind(numbers["obj_embed"], numbers["triples"])
+    noise, top = numbers["noise"], len(tables.betas) - 1
     checked = 0
-    for step, x in ancestral(
-        lambda x, t: net(x, objects, triples, t), numbers["x_T"], tables, noise=lambda step: noise[top - step]
-    ):
+    for step, x in ancestral(bound, numbers["x_T"], tables, noise=lambda step: noise[top - step]):
         if f"x_after_t{step}" in numbers:
             close(x, numbers[f"x_after_t{step}"], 1e-4 if step >= 900 else 0.02)
             checked += 1

@@ -26,8 +26,10 @@ def chamfer_matrix(first: Tensor, second: Tensor, chunk: int = 16) -> Tensor:
         parts = []
         for others in second.split(chunk):
             # |a-b|^2 by differences: exact zeros for equal points, which the expanded square does not give.
-            squares = (one[None, :, None] - others[:, None]).square().sum(-1) if _small(one, others) else (
-                torch.cdist(one[None], others).square()
+            squares = (
+                (one[None, :, None] - others[:, None]).square().sum(-1)
+                if _small(one, others)
+                else (torch.cdist(one[None], others).square())
             )
             parts.append(squares.amin(2).mean(1) + squares.amin(1).mean(1))
         rows.append(torch.cat(parts))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+from typing import Any
+
 import torch
 from torch import Tensor, nn
 
@@ -9,7 +12,7 @@ from torch import Tensor, nn
 def _mlp(*widths: int) -> nn.Sequential:
     """Linear, BatchNorm1d and ReLU for each consecutive pair of widths."""
     parts: list[nn.Module] = []
-    for width, following in zip(widths[:-1], widths[1:], strict=True):
+    for width, following in pairwise(widths):
         linear = nn.Linear(width, following)
         nn.init.kaiming_normal_(linear.weight)
         parts += [linear, nn.BatchNorm1d(following), nn.ReLU()]
@@ -94,12 +97,13 @@ class TripletGCN(nn.Module):
         return x, e
 
     def _check(self, x: Tensor, e: Tensor, ends: Tensor) -> None:
-        first = self.gconvs[0]
+        first: Any = self.gconvs[0]
         width = (first.net1[0].in_features - first.edges) // 2
         if x.ndim != 2 or x.shape[1] != width:
             raise ValueError(f"graph convolution: node features are {tuple(x.shape)}, expected (N, {width})")
         if tuple(e.shape) != (len(ends), first.edges):
-            raise ValueError(f"graph convolution: edge features are {tuple(e.shape)}, expected {len(ends), first.edges}")
+            expected = (len(ends), first.edges)
+            raise ValueError(f"graph convolution: edge features are {tuple(e.shape)}, expected {expected}")
         check_ends(ends, len(x))
         if self.training and (len(x) == 1 or len(e) == 1):
             what = "node" if len(x) == 1 else "edge"

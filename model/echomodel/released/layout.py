@@ -28,9 +28,7 @@ class LayoutNet(UNet):
                 self.box_time_emb = nn.Linear(4 * config.width, config.code)
             nodes = config.objects + config.code * (2 if config.time_in_echo else 1)
             edges = config.predicate + config.edge_features
-            self.box_graph_cov = TripletGCN(
-                nodes, edges, config.hidden, config.layers, config.context, config.residual
-            )
+            self.box_graph_cov = TripletGCN(nodes, edges, config.hidden, config.layers, config.context, config.residual)
 
     def echo(self, x: Tensor, objects: Tensor, triples: Tensor, embedding: Tensor, edges: Tensor | None) -> Tensor:
         """Exchange of the noisy boxes along the relations, the context of the denoiser: (N, context).
@@ -50,9 +48,7 @@ class LayoutNet(UNet):
         edge = edge_input(self.pred_embeddings, triples, edges, self.config)
         return self.box_graph_cov(torch.cat(node, dim=1), edge, triples[:, [0, 2]])[0]
 
-    def forward(
-        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None
-    ) -> Tensor:
+    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
         """Predict the noise in boxes.
 
         Arguments:

@@ -73,12 +73,12 @@ def ddim(denoise: Denoiser, x: Tensor, grid: DDIMGrid) -> Iterator[tuple[int, Te
 
 def last(states: Iterator[tuple[int, Tensor]]) -> Tensor:
     """The final state of a sampler."""
-    x = None
-    for _, x in states:
-        pass
-    if x is None:
+    final = None
+    for _, state in states:
+        final = state
+    if final is None:
         raise ValueError("sampler made no step")
-    return x
+    return final
 
 
 def noised(clean: Tensor, t: Tensor, noise: Tensor, tables: LayoutTables | ShapeTables) -> Tensor:

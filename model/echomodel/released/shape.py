@@ -54,9 +54,7 @@ class ShapeUNet(UNet):
         edge = edge_input(self.pred_embeddings, triples, edges, self.config)
         return self.shape_code_graph_cov(torch.cat(node, dim=1), edge, triples[:, [0, 2]])[0]
 
-    def forward(
-        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None
-    ) -> Tensor:
+    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
         """Predict the noise in shape latents.
 
         Arguments:
@@ -90,8 +88,6 @@ class ShapeNet(nn.Module):
         super().__init__()
         self.diffusion_net = ShapeUNet(config)
 
-    def forward(
-        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None
-    ) -> Tensor:
+    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
         """As `ShapeUNet.forward`."""
         return self.diffusion_net(x, objects, triples, t, edges)

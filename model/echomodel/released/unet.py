@@ -192,7 +192,8 @@ class UNet(nn.Module):
             return [ResBlock(dims, cin, cout, embedding), *attends]
 
         levels = [width * m for m in config.mult]
-        inputs, skips, current, factor = [nn.ModuleList([_conv(dims, config.channels + extra, width, 3)])], [width], width, 1
+        inputs = [nn.ModuleList([_conv(dims, config.channels + extra, width, 3)])]
+        skips, current, factor = [width], width, 1
         for level, cout in enumerate(levels):
             for _ in range(config.blocks):
                 inputs.append(nn.ModuleList(parts(current, cout, factor)))

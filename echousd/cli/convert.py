@@ -1,0 +1,55 @@
+"""`echousd convert`: a published checkpoint as one safetensors file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
+OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
+BOUNDS = typer.Option(
+    None, "--bounds", metavar="TXT", help="centered_bounds_*_trainval.txt of the data set: box statistics to store."
+)
+CLASSES = typer.Option(None, "--classes", metavar="TXT", help="Class names in the order of their ids, one a line.")
+FORCE = typer.Option(False, "--force", help="Replace OUT.safetensors if it exists.")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the `echousd` application."""
+    app.command("convert")(convert)
+
+
+def convert(
+    source: Path = SOURCE,
+    output: Path = OUTPUT,
+    bounds: Path | None = BOUNDS,
+    classes: Path | None = CLASSES,
+    force: bool = FORCE,
+) -> None:
+    """Convert a published EchoScene, EchoLayout or VQ-VAE checkpoint.
+
+    Sizes and switches are read off the parameter names. Nothing in the file is executed: it is refused if it holds
+    anything but tensors and numbers. The result carries config, vocabulary and box statistics.
+
+    Example: echousd convert model2050.pth -o echoscene.safetensors --bounds centered_bounds_all_trainval.txt
+    """
+    if output.suffix != ".safetensors":
+        raise ValueError(f"{output}: the output's name must end by .safetensors")
+    if output.exists() and not force:
+        raise ValueError(f"{output}: exists already (--force replaces it)")
+    from echomodel import checkpoint
+    from echomodel.released.bounds import read_bounds
+
+    statistics = read_bounds(bounds) if bounds else None
+    names = classes.read_text("utf-8").split("\n") if classes else None
+    names = [name.strip() for name in names if name.strip()] if names else None
+    config = checkpoint.convert(source, output, classes=names, statistics=statistics)
+    parts = [name for name in ("encoder", "layout", "shape", "vqvae") if getattr(config, name) is not None]
+    echo = config.layout or config.shape
+    typer.echo(f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB")
+    if config.encoder:
+        timed = "with" if echo and echo.time_in_echo else "without"
+        typer.echo(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
+    if config.layout and statistics is None:
+        typer.echo("no box statistics: sampling boxes needs a conversion with --bounds")

@@ -1,0 +1,241 @@
+"""The published model as one module: encoder, both denoisers and the autoencoder, sampling and joint training."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.released.config import ReleasedConfig
+from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
+from echomodel.released.frozen_layout import FrozenLayout
+from echomodel.released.layout import LayoutNet
+from echomodel.released.sampling import ancestral, ddim, last, layout_loss, node_budget, shape_loss
+from echomodel.released.shape import ShapeNet
+from echomodel.released.tables import DDIMGrid, LayoutTables, ShapeTables
+from echomodel.released.vqvae import VQVAE
+
+STRUCTURE = ("floor", "_scene_")  # nodes that take part in both diffusions and have no shape
+
+
+@dataclass(frozen=True, eq=False)
+class GraphChange:
+    """The graph before an edit, and what it did (EchoScene, section 3.2); see `GraphEncoder.manipulate`."""
+
+    before: SceneGraphTensors
+    added: tuple[int, ...] = ()
+    touched: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """What the denoisers see of a graph: (N, .) float32 per node for each branch, (E, .) per edge or None."""
+
+    layout: Tensor
+    shape: Tensor | None
+    edges: Tensor | None
+
+
+class ReleasedModel(GraphEncoder):
+    """The parts of the published model that `config` names, under the published parameter names.
+
+    Arguments:
+        config: sizes and preset; `config.encoder` must be there.
+        classes: class names in the order of their ids; None = unknown.
+        statistics: normalisation of boxes; None = unknown, boxes cannot be sampled then.
+    """
+
+    def __init__(
+        self,
+        config: ReleasedConfig,
+        classes: tuple[str, ...] | None = None,
+        statistics: BoxStatistics | None = None,
+    ) -> None:
+        encoder = config.encoder
+        if encoder is None:
+            raise ValueError("released model: config.encoder is None, its object embedding conditions both branches")
+        super().__init__(encoder, branches=("s", "l") if config.shape else ("l",))
+        self.config, self.classes, self.statistics = config, classes, statistics
+        latent = 2 * encoder.node if config.preset == "paper" else encoder.node
+        if config.layout is not None:
+            if config.layout.objects != latent:
+                raise ValueError(f"layout branch: objects is {config.layout.objects}, the encoder gives {latent}")
+            self.LayoutDiff = nn.ModuleDict({"df": nn.ModuleDict({"model": LayoutNet(config.layout)})})
+        if config.shape is not None:
+            out = config.shape.objects
+            inner = (latent + out) // 2
+            parts: list[nn.Module] = [nn.Linear(latent, inner), nn.BatchNorm1d(inner), nn.ReLU(), nn.Linear(inner, out)]
+            self.rel_s_mlp = nn.Sequential(*parts)
+            self.shape_df = ShapeNet(config.shape)
+        if config.vqvae is not None:
+            self.vqvae = VQVAE(config.vqvae)
+
+    @cached_property
+    def layout_tables(self) -> LayoutTables:
+        """The published schedule of the layout branch."""
+        return LayoutTables.linear()
+
+    @cached_property
+    def shape_tables(self) -> ShapeTables:
+        """The published schedule of the shape branch."""
+        return ShapeTables.scaled_linear()
+
+    @property
+    def layout_net(self) -> LayoutNet:
+        """The layout denoiser; raises ValueError if the model has none."""
+        if self.config.layout is None:
+            raise ValueError("this model has no layout branch")
+        return self.LayoutDiff["df"]["model"]  # type: ignore[index, return-value]
+
+    def conditions(
+        self,
+        graph: SceneGraphTensors,
+        change: GraphChange | None = None,
+        generator: torch.Generator | None = None,
+    ) -> Conditions:
+        """What the denoisers are conditioned on.
+
+        `released`: the object embedding alone. The published code also runs encoder and manipulator and then
+        overwrites their result, so an edit there is a fresh sample of the edited graph; `change` has no effect.
+        `paper`: object embedding and manipulated latent, and text features on the edges.
+
+        Arguments:
+            graph: the graph to generate. change: the graph that it came from; None = no edit.
+            generator: source of the change flags.
+
+        Raises:
+            ValueError: a graph that cannot be used, or one without edge texts for the `paper` preset.
+        """
+        graph.check(self.encoder_config)
+        nodes, _ = self.embed(graph)
+        edges = None
+        if self.config.preset == "paper":
+            if graph.edge_text is None:
+                raise ValueError("the paper preset needs text features on edges, edge_text is None")
+            edges = graph.edge_text
+            latent, _ = self.encode(change.before if change else graph)
+            added, touched = (change.added, change.touched) if change else ((), ())
+            latent, _, _ = self.manipulate(latent, graph, added=added, touched=touched, generator=generator)
+            nodes = torch.cat([nodes, latent], dim=1)
+        return Conditions(nodes, self.rel_s_mlp(nodes) if self.config.shape is not None else None, edges)
+
+    @torch.no_grad()
+    def sample_layout(
+        self, graph: SceneGraphTensors, *, generator: torch.Generator, change: GraphChange | None = None
+    ) -> Boxes:
+        """Boxes of all nodes by 1,000 ancestral steps (EchoScene, section 3.3); sizes can come out negative.
+
+        Arguments:
+            graph: one or many scenes. generator: source of all randomness. change: as `conditions`.
+
+        Returns:
+            N boxes in the scene's own frame, metres and radians.
+
+        Raises:
+            ValueError: no layout branch, no box statistics, or a graph that cannot be used.
+        """
+        net, statistics = self.layout_net, self.statistics
+        if statistics is None:
+            raise ValueError("box statistics are missing: convert the checkpoint with --bounds FILE")
+        conditions = self.eval().conditions(graph, change, generator)
+        bound = FrozenLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
+        shape = (len(graph.classes), net.config.channels)
+        start = torch.randn(shape, generator=generator)
+        # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
+        variance = "beta" if self.config.preset == "paper" else "posterior"
+        states = ancestral(
+            bound,
+            start,
+            self.layout_tables,
+            noise=lambda step: torch.randn(shape, generator=generator),
+            variance=variance,
+        )
+        return Boxes.decode(last(states), statistics)
+
+    @torch.no_grad()
+    def sample_shapes(
+        self,
+        graph: SceneGraphTensors,
+        *,
+        generator: torch.Generator,
+        steps: int = 100,
+        shared_noise: bool = True,
+        change: GraphChange | None = None,
+    ) -> Tensor:
+        """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
+
+        Arguments:
+            graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
+            shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
+            change: as `conditions`.
+
+        Returns:
+            (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
+
+        Raises:
+            ValueError: no shape branch, or a graph that cannot be used.
+        """
+        if self.config.shape is None:
+            raise ValueError("this model has no shape branch")
+        conditions = self.eval().conditions(graph, change, generator)
+        count, grid = len(graph.classes), self.config.shape.grid
+        drawn = torch.randn(
+            1 if shared_noise else count, self.config.shape.channels, grid, grid, grid, generator=generator
+        )
+        start = drawn.expand(count, -1, -1, -1, -1).contiguous()
+
+        def denoise(x: Tensor, t: Tensor) -> Tensor:
+            return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edges)
+
+        return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)))
+
+    def training_losses(
+        self,
+        graph: SceneGraphTensors,
+        scene: Tensor,
+        boxes: Tensor,
+        latents: Tensor | None,
+        *,
+        generator: torch.Generator,
+        change: GraphChange | None = None,
+        budget: int = 64,
+    ) -> dict[str, Tensor]:
+        """Losses of one joint training step over both branches (EchoScene, section 3.5); `loss` is their sum.
+
+        Arguments:
+            graph: ground truth scenes, N nodes; `change.before` is the pseudo graph of the inverse strategy.
+            scene: (N,) int64, scene of each node.
+            boxes: (N, 8) float32, normalised. latents: (N, 3, 16, 16, 16) float32 encoder output, None = layout only.
+            generator: source of steps, noise and change flags. change: as `conditions`. budget: of `node_budget`.
+        """
+        conditions = self.conditions(graph, change, generator)
+        count = len(self.layout_tables.betas)
+        t = torch.randint(count, (int(scene.max()) + 1,), generator=generator)[scene]
+        noise = torch.randn(boxes.shape, generator=generator)
+        losses = layout_loss(
+            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables, conditions.edges
+        )
+        losses["layout"] = losses.pop("loss")
+        losses["loss"] = losses["layout"]
+        if latents is not None and conditions.shape is not None:
+            kept, triples = node_budget(graph.triples, scene, budget)
+            inside = (graph.triples[:, 0] < kept) & (graph.triples[:, 2] < kept)
+            edges = None if conditions.edges is None else conditions.edges[inside]
+            t = torch.randint(count, (kept,), generator=generator)
+            noise = torch.randn(latents[:kept].shape, generator=generator)
+            args: tuple[Any, ...] = (
+                latents[:kept],
+                conditions.shape[:kept],
+                triples,
+                t,
+                noise,
+                self.shape_tables,
+                edges,
+            )
+            losses["shape"] = shape_loss(self.shape_df, *args)
+            losses["loss"] = losses["layout"] + losses["shape"]
+        return losses

@@ -1,0 +1,65 @@
+"""Matrix products with weights that are laid out once for the processor (inference only)."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+
+class PackedLinear:
+    """x W^T + b for a fixed W.
+
+    On a CPU the weight goes into oneDNN's blocked layout, which reads it two to three times faster than a plain
+    product does for a handful of rows; elsewhere, or where torch lacks the operator, it is an ordinary linear map.
+
+    Arguments:
+        weight: (out, in) floating point, kept as float32.
+        bias: (out,) floating point or None.
+    """
+
+    def __init__(self, weight: Tensor, bias: Tensor | None = None) -> None:
+        self.weight = weight.detach().float().contiguous()
+        self.bias = None if bias is None else bias.detach().float().contiguous()
+        self.packed: Tensor | None = None
+        if self.weight.device.type == "cpu" and packing_available():
+            self.packed = torch.ops.mkldnn._reorder_linear_weight(self.weight, None)
+            self.weight = self.weight[:0]
+
+    def __call__(self, x: Tensor) -> Tensor:
+        """(..., in) float32 -> (..., out)."""
+        if self.packed is None:
+            return F.linear(x, self.weight, self.bias)
+        return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, "none", [], "")
+
+
+@cache
+def packing_available() -> bool:
+    """Whether this build of torch multiplies with oneDNN-packed weights, tried once on a small product."""
+    try:
+        with torch.inference_mode():
+            x, weight = torch.eye(8), torch.arange(64.0).reshape(8, 8)
+            packed = torch.ops.mkldnn._reorder_linear_weight(weight, None)
+            return torch.equal(torch.ops.mkldnn._linear_pointwise(x, packed, None, "none", [], ""), weight.t())
+    except (RuntimeError, AttributeError, NotImplementedError):
+        return False
+
+
+def folded_norm(weight: Tensor, bias: Tensor | None, norm: Any) -> tuple[Tensor, Tensor]:
+    """A linear map after the gains and shifts of a norm, as one map: float64 weight (out, in) and bias (out,)."""
+    gain, shift = norm.weight.double(), norm.bias.double()
+    matrix = weight.double()
+    offset = matrix @ shift
+    return matrix * gain, offset if bias is None else offset + bias.double()
+
+
+def folded_batch_norm(linear: Any, norm: Any) -> tuple[Tensor, Tensor]:
+    """A linear map before a batch norm with fixed statistics, as one map: float64 weight (out, in) and bias (out,)."""
+    if norm.running_mean is None or norm.running_var is None:
+        raise ValueError("batch norm without running statistics cannot be folded")
+    scale = norm.weight.double() / (norm.running_var.double() + norm.eps).sqrt()
+    bias = (linear.bias.double() - norm.running_mean.double()) * scale + norm.bias.double()
+    return linear.weight.double() * scale[:, None], bias
