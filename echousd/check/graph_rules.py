@@ -12,6 +12,8 @@ from echousd.stage.encoding import StageError
 from echousd.stage.read import find_rooms, node_names, relation_of, room_graph
 
 LABELS_PREFIX = "SemanticsLabelsAPI:"
+# Known to this package even in a process that opened a stage before it could register the schema plugin.
+OURS = frozenset((usd.GRAPH_TYPE, usd.RELATION_TYPE, usd.NODE_API))
 
 
 def edge_targets(stage: Usd.Stage) -> Iterator[Finding]:
@@ -57,11 +59,11 @@ def known_types(stage: Usd.Stage) -> Iterator[Finding]:
     registry = Usd.SchemaRegistry()
     for prim in prims(stage):
         name = prim.GetTypeName()
-        if name and not registry.FindConcretePrimDefinition(name) and not name.startswith("Echo"):
+        if name and not registry.FindConcretePrimDefinition(name) and name not in OURS:
             yield Finding(prim.GetPath(), f"unknown prim type {name!r}: no registered schema defines it")
         for schema in applied(prim):
             base = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)[0]
-            if not registry.FindAppliedAPIPrimDefinition(base) and not base.startswith("Echo"):
+            if not registry.FindAppliedAPIPrimDefinition(base) and base not in OURS:
                 yield Finding(prim.GetPath(), f"unknown API schema {schema!r}: no registered schema defines it")
 
 

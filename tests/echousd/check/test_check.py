@@ -1,0 +1,206 @@
+"""`echousd check`: each broken file of `bad/` is caught by its rule alone; rooms in other frames measure the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Gf, Usd, UsdGeom, UsdValidation
+
+from echousd.check import RULES, check_room, register
+from echousd.check.collisions import find_collisions, mesh_depth, winding_number
+from echousd.check.objects import RoomObject
+from echousd.cli.main import run
+from echousd.graph import Node
+
+BAD = Path(__file__).parent.parent / "bad"
+
+# file -> everything that the check may find in it
+FOUND = {
+    "good": set(),
+    "broken_relation": {"broken"},
+    "collision": {"collision"},
+    "outside": {"outside"},
+    "floating": {"floating"},
+    "sunk": {"sunk"},
+    "dangling_edge": {"echo:EdgeTargets"},
+    "contradiction": {"echo:ConsistentGraph"},
+    "missing_uvs": {"echo:TextureCoordinates"},
+    "short_uvs": {"echo:TextureCoordinates"},
+    "uv_index_out_of_range": {"echo:TextureCoordinates"},
+    "nested_bodies": {"echo:NestedBodies"},
+    "dynamic_triangle_mesh": {"echo:DynamicColliders"},
+    "zero_scale": {"echo:Scale"},
+    "uneven_scale": {"echo:Scale"},
+    "unknown_type": {"echo:KnownTypes"},
+    "unknown_api": {"echo:KnownTypes"},
+    "missing_semantics": {"echo:Semantics"},
+    "material_outside": {"echo:MaterialsInside"},
+    "absolute_path": {"echo:RelativePaths"},
+}
+
+
+def found_in(stage: Path | Usd.Stage) -> set[str]:
+    report = check_room(stage)
+    assert report.ok == (report.to_json()["ok"]) == (not found(report))
+    return found(report) | {fault.rule for fault in report.warnings}
+
+
+def found(report) -> set[str]:
+    names = {fault.rule for fault in report.errors} | {wrong.problem for wrong in report.placement}
+    return names | {"broken" for _ in report.broken} | {"collision" for _ in report.collisions}
+
+
+def test_there_is_a_file_for_every_rule() -> None:
+    assert {path.stem for path in BAD.glob("*.usda")} == set(FOUND)
+    assert {rule.name for rule in RULES} <= set().union(*FOUND.values())
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_each_broken_file_is_caught_by_its_rule_alone(name: str) -> None:
+    assert found_in(BAD / f"{name}.usda") == FOUND[name]
+
+
+def test_our_rules_are_validators_of_usd() -> None:
+    register()
+    register()
+    registry = UsdValidation.ValidationRegistry()
+    names = [metadata.name for metadata in registry.GetValidatorMetadataForKeyword("EchoUSD")]
+    assert sorted(names) == sorted(rule.name for rule in RULES)
+    validator = registry.GetOrLoadValidatorByName("echo:EdgeTargets")
+    stage = Usd.Stage.Open(str(BAD / "dangling_edge.usda"))
+    errors = UsdValidation.ValidationContext([validator]).Validate(stage)
+    assert [str(error.GetSites()[0].GetPrim().GetPath()) for error in errors] == [
+        "/Room/SceneGraph/wardrobe__taller_than__bed"
+    ]
+    assert "points to </Room/Objects/sofa>, where no prim is" in errors[0].GetMessage()
+
+
+def test_messages_name_what_was_found_and_what_is_allowed() -> None:
+    def message(name: str) -> str:
+        (fault,) = check_room(BAD / f"{name}.usda").errors
+        return f"{fault.prim} {fault.message}"
+
+    assert message("short_uvs").endswith("primvars:st has 20 texture coordinates, faceVarying interpolation needs 24")
+    assert message("zero_scale") == "/Room/Objects/wardrobe/handle scale is (0, 1, 1), allowed: above 0"
+    assert "'wardrobe in nightstand'" in message("contradiction")
+    assert "bound to </Looks/wood>" in message("material_outside")
+    assert "'/home/artist/rooms/room.usda' is absolute" in message("absolute_path")
+    assert "unknown prim type 'EchoSchmea'" in message("unknown_type")
+
+
+def wrapped(up: str, metres: float, turn: bool, tmp_path: Path) -> Usd.Stage:
+    """The good room as another program would hold it: below a world prim, in another unit, turned upright or not."""
+    path = tmp_path / "wrapped.usda"
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, metres)
+    world = UsdGeom.Xform.Define(stage, "/World").GetPrim()
+    stage.SetDefaultPrim(world)
+    room = UsdGeom.Xform.Define(stage, "/World/Room")
+    room.GetPrim().GetReferences().AddReference(str(BAD / "good.usda"))
+    room.AddTranslateOp().Set(Gf.Vec3d(3 / metres, 0, 0))
+    if turn:
+        room.AddRotateXOp().Set(90)
+    room.AddScaleOp().Set(Gf.Vec3f(1 / metres))
+    return stage
+
+
+@pytest.mark.parametrize(("up", "metres", "turn"), [("Y", 0.01, False), ("Z", 1.0, True), ("Z", 0.01, True)])
+def test_axes_units_and_place_do_not_matter(up: str, metres: float, turn: bool, tmp_path: Path) -> None:
+    report = check_room(wrapped(up, metres, turn, tmp_path))
+    assert {fault.rule for fault in report.errors} == {"echo:RelativePaths"}  # the test's own reference
+    assert not report.placement
+    assert not report.collisions
+    plain = check_room(BAD / "good.usda")
+    assert [j.margin for j in report.relations] == pytest.approx([j.margin for j in plain.relations], abs=1e-4)
+
+
+def thing(name: str, category: str, mesh: trimesh.Trimesh, position: tuple[float, float, float]) -> RoomObject:
+    points = np.array(mesh.vertices) + position
+    low, high = points.min(0), points.max(0)
+    middle = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    return RoomObject(Node(name, category), points, np.array(mesh.faces), high - low, middle, 0.0)
+
+
+def box(*extents: float) -> trimesh.Trimesh:
+    mesh = trimesh.creation.box(extents)
+    mesh.apply_translation((0, extents[1] / 2, 0))
+    return mesh
+
+
+def table(x: float, y: float, z: float) -> trimesh.Trimesh:
+    top = trimesh.creation.box((x, 0.04, z))
+    top.apply_translation((0, y - 0.02, 0))
+    legs = []
+    for a in (-1, 1):
+        for b in (-1, 1):
+            leg = box(0.05, y - 0.04, 0.05)
+            leg.apply_translation((a * (x / 2 - 0.03), 0, b * (z / 2 - 0.03)))
+            legs.append(leg)
+    return trimesh.util.concatenate([top, *legs])
+
+
+def test_what_fits_between_the_legs_does_not_collide() -> None:
+    desk, cabinet = thing("desk", "desk", table(1.6, 0.75, 0.8), (0, 0, 0)), box(0.5, 0.6, 0.5)
+    assert not find_collisions([desk, thing("box", "cabinet", cabinet, (0, 0, 0.1))])
+    (hit,) = find_collisions([desk, thing("box", "cabinet", cabinet, (0.6, 0, 0.1))])
+    assert (hit.first, hit.second) == ("desk", "box")
+    assert hit.depth > 0.02
+    assert hit.to_json() == {"objects": ["desk", "box"], "depth": round(hit.depth, 4)}
+
+
+def test_pairs_that_belong_together_may_overlap_as_far_as_allowed() -> None:
+    top = thing("table", "dining_table", box(1.6, 0.75, 0.9), (0, 0, 0))
+    chair = box(0.5, 0.9, 0.5)
+    assert not find_collisions([top, thing("chair", "dining_chair", chair, (0, 0, 0.45))])
+    assert find_collisions([top, thing("chair", "dining_chair", chair, (0, 0, 0.1))])
+    assert find_collisions([top, thing("plant", "plant", chair, (0, 0, 0.45))])
+
+
+def test_depth_of_two_boxes() -> None:
+    first = thing("a", "cabinet", box(1, 1, 1), (0, 0, 0))
+    second = thing("b", "cabinet", box(1, 1, 1), (0.8, 0, 0))
+    assert mesh_depth(first, second) == pytest.approx(0.2, abs=0.04)
+    assert mesh_depth(first, thing("c", "cabinet", box(1, 1, 1), (1.001, 0, 0))) == 0.0
+
+
+def test_winding_number_agrees_with_ray_casting() -> None:
+    mesh = trimesh.creation.annulus(0.2, 0.5, 0.4)
+    points = np.random.default_rng(0).uniform(-0.6, 0.6, (300, 3))
+    plain = np.hypot(points[:, 0], points[:, 1])
+    inside = (plain > 0.2) & (plain < 0.5) & (np.abs(points[:, 2]) < 0.2)
+    clear = np.abs(np.abs(points[:, 2]) - 0.2) > 0.02
+    clear &= (np.abs(plain - 0.2) > 0.02) & (np.abs(plain - 0.5) > 0.02)
+    number = winding_number(points, mesh.triangles, block=1000)
+    np.testing.assert_allclose(number[clear], inside[clear], atol=1e-3)
+
+
+def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", str(BAD / "good.usda")]) == 0
+    assert "4 of 4 kept" in capsys.readouterr().out
+    assert run(["check", str(BAD / "collision.usda")]) == 1
+    assert "bed and wardrobe" in capsys.readouterr().out
+    assert run(["check", str(BAD / "broken_relation.usda"), "--json"]) == 1
+    report = json.loads(capsys.readouterr().out)
+    assert set(report) == {"ok", "relations", "collisions", "placement", "usd"}
+    assert report["relations"]["kept"] == 3
+    assert report["relations"]["broken"][0]["predicate"] == "behind"
+    assert report["usd"] == {"errors": [], "warnings": []}
+
+
+def test_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["check", str(tmp_path / "none.usda")]) == 2
+    assert "none.usda" in capsys.readouterr().err
+    assert run(["check", str(BAD / "good.usda"), "--rules", "loose"]) == 2
+    assert "unknown rules 'loose': allowed are strict, sgfront" in capsys.readouterr().err
+    empty = Usd.Stage.CreateNew(str(tmp_path / "empty.usda"))
+    empty.SetDefaultPrim(UsdGeom.Xform.Define(empty, "/World").GetPrim())
+    UsdGeom.SetStageUpAxis(empty, "Y")
+    UsdGeom.SetStageMetersPerUnit(empty, 1)
+    empty.Save()
+    assert run(["check", str(tmp_path / "empty.usda")]) == 2
+    assert "no room (no EchoSceneGraph prim), nothing to check" in capsys.readouterr().err
