@@ -1,0 +1,96 @@
+"""Pictures of graphs: boxes do not overlap, sides are where the words say, files are pictures."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from echousd.graph import Node, Relation, SceneGraph, load_graph, starting_graph
+from echousd.graph.picture import arrows, draw_graph, to_dot
+from echousd.graph.placing import DIRECTIONS, HEIGHT, WIDTH, places
+
+
+def overlaps(place: np.ndarray) -> int:
+    gap = np.abs(place[:, None] - place[None])
+    return int(((gap < (WIDTH, HEIGHT)).all(-1).sum() - len(place)) / 2)
+
+
+@pytest.mark.parametrize("room", ["bedroom", "living_room", "dining_room", "living_dining_room", "study"])
+def test_boxes_keep_apart_and_directions_hold(room):
+    graph = starting_graph(room)
+    place = places(graph)
+    assert overlaps(place) == 0
+    where = dict(zip(graph.names, place, strict=True))
+    for relation in graph.relations:
+        if relation.predicate in DIRECTIONS:
+            along = (where[relation.subject] - where[relation.object]) @ DIRECTIONS[relation.predicate]
+            assert along > 0, relation
+
+
+def test_the_same_graph_gives_the_same_picture(tmp_path):
+    graph = starting_graph("bedroom")
+    for name in ("a.svg", "b.svg", "a.png", "b.png"):
+        draw_graph(graph, tmp_path / name)
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert (tmp_path / "a.svg").read_text() == (tmp_path / "b.svg").read_text()
+
+
+def test_objects_with_positions_are_drawn_as_a_plan():
+    places_in_room = {"a": (0, 0, 0), "b": (0, 0, 2), "c": (2, 0, 0)}
+    graph = SceneGraph("study", tuple(Node(name, "desk", position=p) for name, p in places_in_room.items()))
+    a, b, c = places(graph)
+    assert b[0] > a[0] + WIDTH
+    assert c[1] > a[1] + HEIGHT
+
+
+def test_a_picture_shows_boxes_and_arrows(tmp_path):
+    graph = SceneGraph("study", (Node("a", "double_bed"), Node("b", "wardrobe")), (Relation("a", "left", "b"),))
+    draw_graph(graph, tmp_path / "g.png")
+    with Image.open(tmp_path / "g.png") as image:
+        colours = {tuple(pixel) for pixel in np.asarray(image.convert("RGB")).reshape(-1, 3).tolist()}
+    assert {(0xDB, 0xE7, 0xF5), (0xE6, 0xD9, 0xEA), (0x3B, 0x6E, 0xA8)} <= colours  # bed, wardrobe, a direction
+
+
+def test_texts_are_drawn_as_they_are(tmp_path):
+    nodes = (Node("a", "desk", style="$\\frac{1}$ [red] <b>"), Node("b" * 90, "desk", style="ß" * 300, locked=True))
+    draw_graph(SceneGraph("study", nodes), tmp_path / "g.png")
+    assert (tmp_path / "g.png").stat().st_size > 1000
+
+
+def test_relations_of_one_kind_share_an_arrow():
+    nodes = tuple(Node(name, "chair") for name in "ab")
+    stated = ["a left b", "a front b", "a close_by b", "b close_by a", "a same_style_as b", "a bigger_than b"]
+    graph = SceneGraph("study", nodes, tuple(Relation(*words.split()) for words in stated))
+    found = {(arrow.subject, arrow.kind): arrow for arrow in arrows(graph)}
+    assert found["a", "direction"].words == ("left", "front")
+    assert not found["a", "direction"].both_ways
+    assert found["a", "closeness"].both_ways
+    assert len(found) == 5
+
+
+def test_a_large_graph_still_makes_a_picture(tmp_path):
+    nodes = tuple(Node(f"n{i}", "chair") for i in range(300))
+    relations = tuple(Relation(f"n{i}", "left", f"n{j}") for i in range(300) for j in (i + 1, i + 7) if j < 300)
+    started = time.perf_counter()
+    draw_graph(SceneGraph("study", nodes, relations), tmp_path / "g.png")
+    assert time.perf_counter() - started < 60
+    with Image.open(tmp_path / "g.png") as image:
+        assert max(image.size) <= 42 * 160
+
+
+def test_dot_quotes_what_it_must():
+    graph = SceneGraph("study", (Node("a", "desk"), Node("b", "chair")), (Relation("b", "near", "a"),))
+    assert to_dot(graph) == (
+        'digraph "study" {\n  node [shape=box, style="rounded,filled", fontname=Helvetica];\n'
+        '  "a" [label="a\\ndesk", fillcolor="#f3e9c9"];\n  "b" [label="b\\nchair", fillcolor="#e2efdc"];\n'
+        '  "b" -> "a" [label="close by", color="#7a7f87", style=solid, dir=none];\n}\n'
+    )
+
+
+def test_the_samples_are_drawn_without_overlap():
+    for path in sorted((Path(__file__).parents[3] / "samples").glob("*.yaml")):
+        assert overlaps(places(load_graph(path))) == 0, path

@@ -1,0 +1,118 @@
+"""Properties that hold for every valid graph: text forms are lossless, edits keep graphs valid, cycles are found."""
+
+from __future__ import annotations
+
+import itertools
+
+import networkx
+from graph_strategies import WORDS, graphs, names
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph.consistency import find_cycle, ordered_edges
+from echousd.graph.picture import to_dot
+
+categories = st.sampled_from([category.name for category in WORDS.categories])
+predicates = st.sampled_from([predicate.name for predicate in WORDS.predicates])
+
+
+def types(graph: SceneGraph) -> list[list[type]]:
+    return [[type(value) for value in node.attributes.values()] for node in graph.nodes]
+
+
+@settings(deadline=None, max_examples=100)
+@given(graphs())
+def test_text_forms_are_lossless(graph):
+    for read, text in (
+        (SceneGraph.from_json, graph.to_json()),
+        (SceneGraph.from_yaml, graph.to_yaml()),
+        (SceneGraph.model_validate_json, graph.model_dump_json()),
+    ):
+        again = read(text)
+        assert again == graph
+        assert types(again) == types(graph)
+    assert SceneGraph.from_json(graph.to_json()).to_json() == graph.to_json()
+    assert SceneGraph.from_yaml(graph.to_yaml()).to_yaml() == graph.to_yaml()
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.data())
+def test_edits_give_valid_graphs_or_raise(data):
+    graph = data.draw(graphs())
+    for _ in range(data.draw(st.integers(1, 6))):
+        name = data.draw(st.sampled_from([*graph.names, "nobody"]))
+        other = data.draw(st.sampled_from([*graph.names, "nobody"]))
+        predicate, word = data.draw(predicates), data.draw(categories)
+        edits = {
+            "add": lambda g, name=name, word=word: g.add_node(name + "_2", word),
+            "remove": lambda g, name=name: g.remove_node(name),
+            "rename": lambda g, name=name: g.rename_node(name, data.draw(names)),
+            "relabel": lambda g, name=name, word=word: g.relabel_node(name, word),
+            "lock": lambda g, name=name: g.lock(name),
+            "relate": lambda g, s=name, p=predicate, o=other: g.relate(s, p, o),
+            "unrelate": lambda g, s=name, p=predicate, o=other: g.unrelate(s, p, o),
+            "change": lambda g, s=name, p=predicate, o=other: g.change_relation(s, p, o, "close_by"),
+        }
+        before = graph.to_json()
+        try:
+            after = edits[data.draw(st.sampled_from(sorted(edits)))](graph)
+        except GraphError as error:
+            assert "\n" not in str(error)
+            after = graph
+        assert graph.to_json() == before
+        assert SceneGraph.from_json(after.to_json()) == after
+        diff = graph.diff(after)
+        assert bool(diff) == (after != graph)
+        assert diff.touched <= {*graph.names, *after.names}
+        graph = after
+
+
+@settings(deadline=None, max_examples=100)
+@given(graphs(min_nodes=2), st.data())
+def test_a_relation_is_refused_exactly_when_its_order_gets_a_cycle(graph, data):
+    subject, object_ = data.draw(st.permutations(graph.names))[:2]
+    predicate = data.draw(predicates)
+    stated = (subject, predicate, object_)
+    triples = [relation.triple for relation in graph.relations]
+    # the obvious twin of the check: networkx on each order
+    cyclic = any(
+        not networkx.is_directed_acyclic_graph(networkx.DiGraph(list(edges)))
+        for edges in ordered_edges([*triples, stated]).values()
+    )
+    try:
+        graph.relate(*stated)
+        refused = False
+    except GraphError as error:
+        refused = True
+        assert f"'{' '.join(stated)}'" in str(error)
+    assert refused == (cyclic or stated in triples)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(st.sampled_from("abcdef"), st.sampled_from("abcdef")).filter(lambda e: e[0] != e[1])))
+def test_the_cycle_found_is_one(edges):
+    graph = networkx.DiGraph(edges)
+    cycle = find_cycle(dict.fromkeys(edges))
+    assert bool(cycle) == (not networkx.is_directed_acyclic_graph(graph))
+    if cycle:
+        assert set(cycle) <= set(edges)
+        assert len({less for less, _ in cycle}) == len(cycle)
+        assert all(one[1] == two[0] for one, two in itertools.pairwise([*cycle, cycle[0]]))
+
+
+@settings(deadline=None, max_examples=30)
+@given(graphs())
+def test_dot_names_every_node(graph):
+    text = to_dot(graph)
+    assert text.count("fillcolor=") == len(graph.nodes)
+    assert text.endswith("}\n")
+
+
+@settings(deadline=None, max_examples=30)
+@given(graphs(), names)
+def test_differences_of_one_edit(graph, name):
+    if name not in graph.names:
+        node = Node(name, "desk")
+        assert graph.diff(graph.add_node(node)).added == (node,)
+        assert graph.add_node(node).diff(graph).removed == (node,)

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import pytest
+from graph_strategies import WORDS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from echousd.graph import GraphError, RoomSpec, starting_graph
+from echousd.graph.starting import HABITS, TYPICAL
+
+
+def test_a_bedroom_with_counts():
+    graph = starting_graph(RoomSpec("bedroom", size=(4, 3)), {"desk": 1, "bedside table": 1, "pendant_lamp": 0})
+    assert graph.names == ("double_bed", "nightstand", "wardrobe", "desk")
+    assert graph.room.size == (4.0, 3.0)
+    assert [str(relation) for relation in graph.relations] == [
+        "nightstand close_by double_bed",
+        "nightstand left double_bed",
+        "desk right double_bed",
+        "wardrobe taller_than double_bed",
+        "wardrobe right double_bed",
+    ]
+
+
+def test_several_of_a_kind_share_a_style_and_stand_on_both_sides():
+    graph = starting_graph("bedroom")
+    assert graph.node("nightstand_1").style == graph.node("nightstand_2").style == "nightstand"
+    assert graph.relation("nightstand_1", "left", "double_bed")
+    assert graph.relation("nightstand_2", "right", "double_bed")
+
+
+def test_each_lamp_has_a_nightstand_of_its_own():
+    graph = starting_graph("bedroom", {"table_lamp": 2})
+    assert graph.relation("table_lamp_1", "standing_on", "nightstand_1")
+    assert graph.relation("table_lamp_2", "standing_on", "nightstand_2")
+
+
+def test_words_of_the_tables_are_the_vocabularys():
+    categories = {category.name for category in WORDS.categories}
+    assert set(TYPICAL) == {kind.name for kind in WORDS.room_types}
+    for habit in HABITS:
+        assert {*habit.categories, *habit.anchors} <= categories
+        assert {*habit.predicates, *habit.sides} <= {predicate.name for predicate in WORDS.predicates}
+
+
+@settings(deadline=None, max_examples=100)
+@given(
+    st.sampled_from(sorted(TYPICAL)),
+    st.dictionaries(st.sampled_from([c.name for c in WORDS.categories]), st.integers(0, 5), max_size=20),
+)
+def test_any_counts_give_a_valid_graph(room, counts):
+    wanted = {**TYPICAL[room], **counts}
+    if not any(wanted.values()):
+        return
+    graph = starting_graph(room, counts)
+    for category, count in wanted.items():
+        assert sum(node.category == category for node in graph.nodes) == count
+
+
+@pytest.mark.parametrize(
+    ("counts", "text"),
+    [
+        ({"nightstnd": 2}, "unknown category 'nightstnd': did you mean nightstand?"),
+        ({"desk": -1}, "count of desk: found -1, allowed: an integer from 0 to 100"),
+        ({"desk": 101}, "count of desk: found 101, allowed"),
+        ({"desk": True}, "count of desk: found True, allowed"),
+        (dict.fromkeys(TYPICAL["bedroom"], 0), "the graph is empty, allowed: at least one object"),
+    ],
+)
+def test_faults(counts, text):
+    with pytest.raises(ValueError, match=".") as error:
+        starting_graph("bedroom", counts)
+    assert text in str(error.value)
+    assert isinstance(error.value, GraphError) or "unknown" in text
