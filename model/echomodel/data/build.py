@@ -1,0 +1,56 @@
+"""Data recipes: the rooms and shapes that training reads, made from a seed alone."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.data.shapeset import ShapeSet, build_shapes
+
+
+@dataclass(frozen=True)
+class DataRecipe:
+    """What a data set holds: `rooms` labelled rooms and all categories in `styles` styles."""
+
+    name: str
+    rooms: int
+    styles: int
+
+
+RECIPES = {
+    recipe.name: recipe
+    for recipe in (DataRecipe("smoke", 64, 2), DataRecipe("packed", 12_000, 160), DataRecipe("full", 30_000, 327))
+}
+Progress = Callable[[str, int, int], None]
+
+
+def build_data(
+    directory: str | os.PathLike[str], recipe: str, seed: int, progress: Progress | None = None
+) -> tuple[RoomSet, ShapeSet]:
+    """Make `directory/rooms` and `directory/shapes`; a build that was stopped continues, a finished one is kept.
+
+    Arguments:
+        directory: folder of the data set.
+        recipe: `smoke` (seconds, for tests), `packed` (at most 40 MB) or `full`.
+        seed: seed of the world: equal seeds give equal bytes.
+        progress: called with (part, done, in all).
+
+    Raises:
+        ValueError: an unknown recipe, or a folder that was begun with another recipe or seed.
+    """
+    if recipe not in RECIPES:
+        raise ValueError(f"unknown recipe {recipe!r}: allowed are {', '.join(RECIPES)}")
+    chosen, folder = RECIPES[recipe], Path(directory)
+
+    def report(part: str) -> Callable[[int, int], None] | None:
+        return None if progress is None else lambda done, total: progress(part, done, total)
+
+    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"))
+    shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
+    note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
+    (folder / "data.json").write_text(json.dumps(note, indent=1) + "\n", "utf-8")
+    return rooms, shapes

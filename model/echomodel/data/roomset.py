@@ -1,0 +1,295 @@
+"""Sets of labelled rooms on disk: sharded, memory-mapped, about half a kilobyte a room, read as rooms or as batches.
+
+A folder holds `rooms.json` (what the set is, written last) and shards `rooms-0000.bin`: a header, then four tables, one
+entry per room, object, floor corner and ordered pair of objects. A pair carries one bit per predicate and rule set.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echomodel.data.rooms import generate_rooms
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_rooms
+from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
+    from echomodel.graph import GraphBatch
+
+MAGIC = b"ECHOROM1"
+RULES = ("strict", "sgfront")
+ROOM = np.dtype(
+    [("objects", "<u4"), ("corners", "<u4"), ("pairs", "<u4"), ("type", "u1"), ("held_out", "u1"), ("height", "<f4")]
+)  # fmt: skip
+OBJECT = np.dtype(
+    [("category", "u1"), ("style", "<i2"), ("size", "<f4", 3), ("position", "<f4", 3), ("yaw", "<f4")]
+)  # fmt: skip
+CORNER = np.dtype(("<f4", 2))
+PAIR = np.dtype(("<u2", len(RULES)))
+TABLES = (("rooms", ROOM), ("objects", OBJECT), ("corners", CORNER), ("pairs", PAIR))
+ROOMS_PER_SHARD = 1000
+HELD_OUT_EVERY = 20  # every twentieth room is kept out of training
+DIGITS = 4  # a tenth of a millimetre
+
+
+def build_rooms(
+    directory: str | os.PathLike[str],
+    count: int,
+    seed: int,
+    styles: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> RoomSet:
+    """Generate and label a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
+
+    Arguments:
+        directory: folder of the set; shards that are complete there are kept.
+        count: number of rooms, at least 1. seed: seed of the world. styles: number of style groups of the shape set.
+        progress: called with (rooms done, rooms in all).
+
+    Raises:
+        ValueError: the folder holds a set that was begun with other arguments.
+    """
+    if count < 1:
+        raise ValueError(f"number of rooms is {count}, need at least 1")
+    folder = Path(directory)
+    folder.mkdir(parents=True, exist_ok=True)
+    words = [category.name for category in vocabulary().categories]
+    plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
+    _claim(folder, plan)
+    for number, first in enumerate(range(0, count, ROOMS_PER_SHARD)):
+        path = folder / f"rooms-{number:04d}.bin"
+        last = min(first + ROOMS_PER_SHARD, count)
+        if not path.exists():
+            rooms: list[RoomBoxes] = []
+            for start in range(first, last, 100):
+                rooms += generate_rooms(min(100, last - start), seed, styles=styles, start=start)
+                if progress:
+                    progress(start + min(100, last - start), count)
+            write_shard(path, rooms, first)
+        elif progress:
+            progress(last, count)
+    _write_json(folder / "rooms.json", plan)
+    return RoomSet(folder)
+
+
+def write_shard(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first: int = 0) -> None:
+    """Label rooms (by all rule sets) and write them as one shard, complete or not at all; `first` is the number of the
+    first room in its set. Raises `UnknownWord` for a category or room type that the vocabulary does not hold."""
+    words, path = vocabulary(), Path(path)
+    rooms = [_rounded(room) for room in rooms]
+    labels = {rules: label_rooms(rooms, rules=rules) for rules in RULES}
+    tables: dict[str, list[np.ndarray]] = {name: [] for name, _ in TABLES}
+    for k, room in enumerate(rooms):
+        n = len(room)
+        entry = (n, len(room.floor_polygon), n * n, words.room_type_id(room.room_type),
+                 (first + k) % HELD_OUT_EVERY == HELD_OUT_EVERY - 1, room.height)  # fmt: skip
+        objects = np.zeros(n, OBJECT)
+        objects["category"] = [words.category_id(category) for category in room.categories]
+        objects["style"] = room.styles or -1
+        objects["size"], objects["position"], objects["yaw"] = room.size, room.position, room.yaw
+        pairs = np.zeros((n * n, len(RULES)), "<u2")
+        for column, rules in enumerate(RULES):
+            subject, predicate, object_ = labels[rules][k].T
+            np.bitwise_or.at(pairs[:, column], subject * n + object_, (1 << predicate).astype("<u2"))
+        tables["rooms"].append(np.array([entry], ROOM))
+        tables["objects"].append(objects)
+        tables["corners"].append(np.asarray(room.floor_polygon, "<f4"))
+        tables["pairs"].append(pairs)
+    joined = [np.ascontiguousarray(np.concatenate(tables[name])).astype(dtype.base) for name, dtype in TABLES]
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        file.write(MAGIC + np.array([len(table) for table in joined], "<u8").tobytes())
+        for table in joined:
+            file.write(table.tobytes())
+    part.replace(path)
+
+
+@dataclass(frozen=True, eq=False)
+class RoomBatch:
+    """Some rooms of a set, packed.
+
+    Arguments:
+        graph: S scenes with their relations. boxes: N true boxes.
+        style: (N,) int64 tensor, style group of each node, -1 = unknown; shape number = style * C + category.
+        rooms: (S,) numbers of the rooms in their set.
+    """
+
+    graph: GraphBatch
+    boxes: Boxes
+    style: object
+    rooms: np.ndarray
+
+
+class RoomSet:
+    """A set of labelled rooms on disk, read through memory maps.
+
+    Arguments:
+        directory: folder with `rooms.json` and its shards.
+
+    Attributes: `held_out` (n,) bool, `counts` (n,) objects per room, `info`, the content of `rooms.json`. Raises
+    ValueError for a folder without a finished set or with a damaged shard.
+    """
+
+    def __init__(self, directory: str | os.PathLike[str]) -> None:
+        self.directory = Path(directory)
+        index = self.directory / "rooms.json"
+        if not index.exists():
+            hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no rooms.json"
+            raise ValueError(f"{self.directory}: not a room set ({hint})")
+        self.info: dict = json.loads(index.read_text("utf-8"))
+        self._shards = [_tables(path) for path in sorted(self.directory.glob("rooms-*.bin"))]
+        rooms = [shard["rooms"] for shard in self._shards]
+        count = sum(map(len, rooms))
+        if count != self.info["rooms"]:
+            raise ValueError(f"{self.directory}: shards hold {count} rooms, rooms.json says {self.info['rooms']}")
+        self._table = np.concatenate(rooms)
+        self._shard_of = np.repeat(np.arange(len(rooms)), [len(table) for table in rooms])
+        # Where each room's entries begin within its shard.
+        self._begin = {
+            name: np.concatenate([np.cumsum(table[name], dtype=np.int64) - table[name] for table in rooms])
+            for name in ("objects", "corners", "pairs")
+        }
+        self.held_out = self._table["held_out"].astype(bool)
+        self.counts = self._table["objects"].astype(np.int64)
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def _part(self, name: str, room: int) -> np.ndarray:
+        start = self._begin[name][room]
+        return self._shards[self._shard_of[room]][name][start : start + int(self._table[name][room])]
+
+    def room(self, number: int, *, rules: str = "strict") -> RoomBoxes:
+        """One room with all its relations by the given rules."""
+        words, entry, objects = vocabulary(), self._table[number], self._part("objects", number)
+        names = tuple(words.categories[k].name for k in objects["category"])
+        styles = tuple(int(style) for style in objects["style"])
+        return RoomBoxes(
+            id=f"room_{self.info['seed']}_{number:06d}",
+            room_type=words.room_types[entry["type"]].name,
+            floor_polygon=np.round(self._part("corners", number).astype(float), DIGITS),
+            height=round(float(entry["height"]), DIGITS),
+            categories=names,
+            size=np.round(objects["size"].astype(float), DIGITS),
+            position=np.round(objects["position"].astype(float), DIGITS),
+            yaw=objects["yaw"].astype(float),
+            models=tuple(f"s{style}_{name}" if style >= 0 else "" for style, name in zip(styles, names, strict=True)),
+            styles=styles,
+            relations=self.relations(number, rules=rules),
+        )
+
+    def relations(self, number: int, *, rules: str = "strict") -> np.ndarray:
+        """(E, 3) int64 [subject, predicate, object] of one room; raises ValueError for unknown rules."""
+        return _triplets(self._part("pairs", number)[:, _column(rules)], self.counts[number : number + 1], None)
+
+    def batch(
+        self,
+        rooms: Sequence[int] | np.ndarray,
+        *,
+        rules: str = "strict",
+        drop: float = 0.0,
+        rng: np.random.Generator | None = None,
+    ) -> RoomBatch:
+        """Rooms packed for the model, each relation left out with probability `drop`."""
+        import torch
+
+        from echomodel.boxes import Boxes
+        from echomodel.graph import GraphBatch
+
+        rooms = np.asarray(rooms, np.int64)
+        objects = np.concatenate([self._part("objects", k) for k in rooms])
+        bits = np.concatenate([self._part("pairs", k)[:, _column(rules)] for k in rooms])
+        corners = [self._part("corners", k) for k in rooms]
+        counts = self.counts[rooms]
+        triplets = _triplets(bits, counts, None if drop == 0.0 else (drop, rng or np.random.default_rng()))
+        extents = np.array([c.max(0) - c.min(0) for c in corners], np.float32)
+        graph = GraphBatch(
+            category=torch.from_numpy(objects["category"].astype(np.int64)),
+            triplets=torch.from_numpy(triplets),
+            scene=torch.from_numpy(np.repeat(np.arange(len(rooms)), counts)),
+            room_type=torch.from_numpy(self._table["type"][rooms].astype(np.int64)),
+            floor=torch.from_numpy(extents),
+        )
+        fields = (torch.from_numpy(np.ascontiguousarray(objects[name])) for name in ("size", "position", "yaw"))
+        return RoomBatch(graph, Boxes(*fields), torch.from_numpy(objects["style"].astype(np.int64)), rooms)
+
+    def batches(
+        self, scenes: int = 64, *, seed: int = 0, held_out: bool = False, rules: str = "strict", drop: float = 0.5
+    ) -> Iterator[RoomBatch]:
+        """One pass over the training (or held-out) rooms in a seeded order, `scenes` at a time."""
+        rng = np.random.default_rng(seed)
+        order = rng.permutation(np.flatnonzero(self.held_out == held_out))
+        for start in range(0, len(order), scenes):
+            yield self.batch(order[start : start + scenes], rules=rules, drop=drop, rng=rng)
+
+
+def _rounded(room: RoomBoxes) -> RoomBoxes:
+    """The room as it comes back from disk, so that its labels fit it."""
+    entry = room.to_json(DIGITS)
+    for k, item in enumerate(entry["objects"]):
+        item["yaw"] = float(np.float32(room.yaw[k]))
+    return RoomBoxes.from_json(entry)
+
+
+def _triplets(
+    bits: np.ndarray, counts: np.ndarray, thinned: tuple[float, np.random.Generator] | None
+) -> np.ndarray:
+    """(E, 3) triplets of the packed rooms from their pairs' bits (n * n per room, row = subject)."""
+    pair, predicate = np.nonzero((bits[:, None] >> np.arange(16, dtype=np.uint16)) & 1)
+    if thinned:
+        keep = thinned[1].random(len(pair)) >= thinned[0]
+        pair, predicate = pair[keep], predicate[keep]
+    squares = counts * counts
+    owner = np.repeat(np.arange(len(counts)), squares)[pair]
+    local = pair - (np.cumsum(squares) - squares)[owner]
+    first = (np.cumsum(counts) - counts)[owner]
+    return np.stack([first + local // counts[owner], predicate, first + local % counts[owner]], -1).astype(np.int64)
+
+
+def _column(rules: str) -> int:
+    if rules not in RULES:
+        raise ValueError(f"unknown rules {rules!r}: a room set is labelled by {', '.join(RULES)}")
+    return RULES.index(rules)
+
+
+def _tables(path: Path) -> dict[str, np.ndarray]:
+    raw = np.memmap(path, np.uint8, mode="r")
+    if bytes(raw[:8]) != MAGIC:
+        raise ValueError(f"{path}: not a shard of rooms (begins with {bytes(raw[:8])!r}, expected {MAGIC!r})")
+    counts = np.frombuffer(raw[8 : 8 + 8 * len(TABLES)].tobytes(), "<u8").astype(int)
+    need = 8 + 8 * len(TABLES) + sum(int(n) * dtype.itemsize for n, (_, dtype) in zip(counts, TABLES, strict=True))
+    if len(raw) != need:
+        raise ValueError(f"{path}: damaged shard, {len(raw)} bytes of {need}; remove it and build again")
+    out, start = {}, 8 + 8 * len(TABLES)
+    for number, (name, dtype) in zip(counts, TABLES, strict=True):
+        out[name] = np.frombuffer(raw, dtype.base, int(number) * int(np.prod(dtype.shape)), start)
+        out[name] = out[name].reshape(int(number), *dtype.shape)
+        start += int(number) * dtype.itemsize
+    return out
+
+
+def _claim(folder: Path, plan: dict) -> None:
+    """Remember what the folder is being filled with; refuse a folder that was begun with something else."""
+    note = folder / "plan.json"
+    if not note.exists():
+        _write_json(note, plan)
+        return
+    found = json.loads(note.read_text("utf-8"))
+    wrong = [key for key in plan if found.get(key) != plan[key]]
+    if wrong:
+        told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
+        raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
+
+
+def _write_json(path: Path, content: dict) -> None:
+    part = path.with_suffix(path.suffix + ".part")
+    part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+    part.replace(path)

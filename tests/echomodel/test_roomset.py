@@ -1,0 +1,96 @@
+"""Room sets on disk: equal bytes per seed, resumed builds, rooms and batches that equal what was written."""
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.data import roomset
+from echomodel.data.build import build_data
+from echomodel.data.rooms import generate_rooms
+from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.rules import label_relations, verdicts
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rooms")
+    build_rooms(path, 60, 3, 5)
+    return path
+
+
+def test_rooms_come_back(folder):
+    rooms = RoomSet(folder)
+    assert len(rooms) == 60
+    assert rooms.held_out.sum() == 3
+    for number, true in enumerate(generate_rooms(60, 3, styles=5)):
+        read = rooms.room(number)
+        assert read.categories == true.categories
+        assert read.models == true.models
+        assert read.room_type == true.room_type
+        assert np.allclose(read.size, true.size, atol=1e-4)
+        assert np.allclose(read.position, true.position, atol=1e-4)
+        assert np.allclose(read.floor_polygon, true.floor_polygon, atol=1e-4)
+        for rules in ("strict", "sgfront"):
+            assert np.array_equal(rooms.relations(number, rules=rules), label_relations(read, rules=rules))
+
+
+def test_batches_hold_the_rooms_and_their_relations(folder):
+    rooms = RoomSet(folder)
+    picked = [7, 0, 33]
+    batch = rooms.batch(picked)
+    for scene, number in zip(batch.graph.unpack(), picked, strict=True):
+        assert np.array_equal(scene.triplets.numpy(), rooms.relations(number))
+        assert scene.floor[0].tolist() == pytest.approx(np.ptp(rooms.room(number).floor_polygon, axis=0), abs=1e-3)
+    assert (verdicts(batch.boxes, batch.graph.triplets) != 0).all()
+    thinned = rooms.batch(picked, drop=0.5, rng=np.random.default_rng(0)).graph.triplets
+    assert 0.4 < len(thinned) / len(batch.graph.triplets) < 0.6
+    assert [int(k) for k in batch.style[:3]] == list(rooms.room(7).styles[:3])
+
+
+def test_passes_are_seeded_and_leave_out_what_is_held_out(folder):
+    rooms = RoomSet(folder)
+    seen = [batch.rooms for batch in rooms.batches(16, seed=4)]
+    assert sorted(np.concatenate(seen)) == np.flatnonzero(~rooms.held_out).tolist()
+    again = list(rooms.batches(16, seed=4))
+    assert all(np.array_equal(a, b.rooms) for a, b in zip(seen, again, strict=True))
+    first, second = next(rooms.batches(16, seed=4)), next(rooms.batches(16, seed=5))
+    assert torch.equal(first.graph.triplets, again[0].graph.triplets)
+    assert not np.array_equal(first.rooms, second.rooms)
+    assert sum(len(b.rooms) for b in rooms.batches(16, held_out=True)) == 3
+
+
+def test_equal_seeds_give_equal_bytes_also_after_an_interruption(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(roomset, "ROOMS_PER_SHARD", 20)
+
+    def stop(done, total):
+        if done > 20:
+            raise KeyboardInterrupt
+
+    build_rooms(tmp_path / "whole", 60, 3, 5)
+    with pytest.raises(KeyboardInterrupt):
+        build_rooms(tmp_path / "broken", 60, 3, 5, stop)
+    with pytest.raises(ValueError, match="not a room set \\(unfinished set, run the build again\\)"):
+        RoomSet(tmp_path / "broken")
+    assert [p.name for p in sorted((tmp_path / "broken").glob("*.bin"))] == ["rooms-0000.bin"]
+    build_rooms(tmp_path / "broken", 60, 3, 5)
+    for path in (tmp_path / "whole").iterdir():
+        assert path.read_bytes() == (tmp_path / "broken" / path.name).read_bytes()
+    build_rooms(tmp_path / "other", 60, 4, 5)
+    name = "rooms-0000.bin"
+    assert (tmp_path / "other" / name).read_bytes() != (tmp_path / "whole" / name).read_bytes()
+
+
+def test_bad_folders_are_told(folder, tmp_path):
+    with pytest.raises(ValueError, match=r"was begun with seed 3; choose another folder or remove it"):
+        build_rooms(folder, 60, 9, 5)
+    with pytest.raises(ValueError, match=r"no rooms\.json"):
+        RoomSet(tmp_path)
+    build_rooms(tmp_path, 5, 1, 2)
+    shard = tmp_path / "rooms-0000.bin"
+    shard.write_bytes(shard.read_bytes()[:-3])
+    with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, \d+ bytes of \d+; remove it and build again"):
+        RoomSet(tmp_path)
+    with pytest.raises(ValueError, match="unknown rules 'x': a room set is labelled by strict, sgfront"):
+        RoomSet(folder).relations(0, rules="x")
+    with pytest.raises(ValueError, match="unknown recipe 'huge': allowed are smoke, packed, full"):
+        build_data(tmp_path, "huge", 1)
