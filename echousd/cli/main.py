@@ -20,7 +20,7 @@ app = typer.Typer(
 )
 
 # Each topic's module defines `register(app)`; it must not import torch or pxr at module level (start-up time).
-TOPICS: tuple[str, ...] = ("graph", "generate", "render", "export", "check", "train", "convert", "doctor")
+TOPICS: tuple[str, ...] = ("graph", "generate", "render", "export", "check", "train", "convert", "doctor", "data")
 
 BAD_INPUT, INTERRUPTED, OWN_FAULT = 2, 130, 70
 

@@ -99,3 +99,12 @@ def _range(section: str, name: str, ours: Sequence[float], real: Sequence[float]
 
 def _share(section: str, name: str, ours: float, real: float) -> Row:
     return Row(section, name, (ours,), (real,), abs(ours - real))
+
+
+def section_means(rows: Sequence[Row]) -> dict[str, float]:
+    """Mean distance per kind of figure and over `all`."""
+    groups: dict[str, list[float]] = {}
+    for row in rows:
+        groups.setdefault(row.section.split()[0], []).append(row.distance)
+    means = {name: float(np.mean(values)) for name, values in groups.items()}
+    return {**means, "all": float(np.mean([row.distance for row in rows]))}

@@ -1,0 +1,162 @@
+"""`echousd data`: make data sets, look at rooms, compare them with real ones, convert them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from echomodel.data.report import Row
+    from echomodel.roomboxes import RoomBoxes
+
+data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
+
+Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equal bytes.")]
+Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the topic."""
+    app.add_typer(data_app, name="data")
+
+
+def load_rooms(path: Path, limit: int | None = None) -> list[RoomBoxes]:
+    """Rooms of a rooms file, or of the folder that `echousd data build` made; raises ValueError for anything else."""
+    from echomodel.roomboxes import read_rooms
+
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder")
+    if path.is_dir():
+        from echomodel.data.roomset import RoomSet
+
+        rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
+        return [rooms.room(k) for k in range(min(len(rooms), limit or len(rooms)))]
+    return read_rooms(path)[:limit]
+
+
+@data_app.command("build")
+def build(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the data set.")],
+    recipe: Annotated[str, typer.Option(help="smoke (seconds), packed (at most 40 MB) or full.")] = "smoke",
+    seed: Seed = 0,
+) -> None:
+    """Make rooms and shapes to train on; run again to continue a build that was stopped.
+
+    Example: echousd data build --recipe packed --seed 1 -o data/packed
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from echomodel.data.build import build_data
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn("{task.description:8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    told: dict[str, int] = {}
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        tasks: dict = {}
+
+        def report(part: str, done: int, total: int) -> None:
+            if part not in tasks:
+                tasks[part] = bar.add_task(part, total=total)
+            bar.update(tasks[part], completed=done, total=total)
+            if not console.is_terminal and done * 10 // total > told.get(part, 0):
+                told[part] = done * 10 // total
+                console.print(f"{part} {done}/{total}")
+
+        rooms, shapes = build_data(out, recipe, seed, report)
+    size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file()) / 1e6
+    console.print(f"{out}: {len(rooms)} rooms, {len(shapes)} shapes, {size:.1f} MB")
+
+
+@data_app.command("rooms")
+def rooms_command(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
+    count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
+    seed: Seed = 0,
+    room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
+) -> None:
+    """Generate rooms into a rooms file.
+
+    Example: echousd data rooms --count 50 --room bedroom -o bedrooms.json
+    """
+    from echomodel.data.rooms import generate_rooms
+    from echomodel.roomboxes import write_rooms
+    from echomodel.vocabulary import vocabulary
+
+    kind = None if room is None else vocabulary().room_type(room).name
+    write_rooms(out, generate_rooms(count, seed, room_type=kind))
+
+
+@data_app.command("plot")
+def plot(
+    rooms: Rooms,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture file.")],
+    limit: Annotated[int, typer.Option(help="Number of rooms.")] = 50,
+    columns: Annotated[int, typer.Option(help="Rooms in a row.")] = 10,
+    room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
+    labels: Annotated[bool, typer.Option(help="Write the categories.")] = True,
+) -> None:
+    """Draw rooms from above: rectangles coloured per class, a red line to each front.
+
+    Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
+    """
+    from echomodel.data.plot import plot_rooms
+
+    found = load_rooms(rooms)
+    if room is not None:
+        found = _of_type(found, room, rooms)
+    plot_rooms(found[:limit], out, columns=columns, labels=labels)
+
+
+def _of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBoxes]:
+    from echomodel.vocabulary import vocabulary
+
+    wanted = vocabulary().room_type(word).name
+    kept = [room for room in rooms if vocabulary().room_type(room.room_type).name == wanted]
+    if not kept:
+        raise ValueError(f"{path}: holds no room of type {wanted}")
+    return kept
+
+
+@data_app.command("report")
+def report(
+    rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder [newly generated rooms].")] = None,
+    real: Annotated[Path | None, typer.Option(help="Real rooms to compare with [statistics of 896 rooms].")] = None,
+    count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
+    seed: Seed = 0,
+    worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,
+    """Rooms beside real ones, figure by figure, with a distance: of shares the difference, else over the real range.
+    json_out: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Rooms beside real ones, figure by figure, with a distance (shares: difference; else mean difference over range).
+
+    Example: echousd data report --count 2000 --worst 20
+    """
+    from echomodel.data.report import compare, section_means
+    from echomodel.data.rooms import generate_rooms
+
+    drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
+    rows = compare(drawn, None if real is None else load_rooms(real))
+    chosen = sorted((r for r in rows if r.section.startswith(section or "")), key=lambda row: -row.distance)
+    _print_rows(rows, chosen[: worst or None], section_means(rows), json_out)
+
+
+def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], as_json: bool) -> None:
+    if as_json:
+        import json
+        from dataclasses import asdict
+
+        typer.echo(json.dumps({"mean_distance": means, "rows": [asdict(row) for row in rows]}))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, width=None if Console().is_terminal else 150)
+    table = Table("section", "figure", "here", "real", "distance", box=None)
+    for row in shown:
+        ours, theirs = (" ".join(f"{v:.2f}" for v in values) for values in (row.ours, row.real))
+        table.add_row(row.section, row.name, ours, theirs, f"{row.distance:.3f}")
+    console.print(table)
+    console.print("mean distance: " + ", ".join(f"{name} {value:.3f}" for name, value in means.items()))

@@ -1,0 +1,72 @@
+"""Top-down pictures of rooms: oriented rectangles coloured per coarse class, a tick at each front, labels."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from echomodel.metrics.room_figures import footprints
+from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import UnknownWord, vocabulary
+
+CELL = 2.8  # inches
+HANGING = 0.8  # metres; what hangs higher is drawn lightly
+
+
+def plot_rooms(
+    rooms: Sequence[RoomBoxes], path: str | os.PathLike[str], *, columns: int = 8, labels: bool = True, dpi: int = 80
+) -> None:
+    """Draw rooms beside one another, +X to the right and +Z down (an observer who faces +X has left above).
+
+    Arguments:
+        rooms: at least one.
+        path: picture file (.png, .pdf, .svg).
+        columns: rooms in a row. labels: write the categories. dpi: resolution.
+
+    Raises:
+        ValueError: no rooms.
+    """
+    if not rooms:
+        raise ValueError("no rooms to plot")
+    from matplotlib import colormaps
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = min(columns, len(rooms))
+    lines = -(-len(rooms) // columns)
+    figure = Figure(figsize=(columns * CELL, lines * CELL))
+    FigureCanvasAgg(figure)
+    palette, words = colormaps["tab20"], vocabulary().coarse_categories
+    for k, room in enumerate(rooms):
+        axes = figure.add_subplot(lines, columns, k + 1)
+        axes.set_axis_off()
+        axes.set_aspect("equal")
+        if len(room.floor_polygon):
+            axes.fill(*room.floor_polygon.T, facecolor="whitesmoke", edgecolor="black", linewidth=1.2)
+        corners = footprints(room)
+        for i in np.argsort(room.position[:, 1] if len(room) else []):
+            coarse = _coarse(room.categories[i])
+            colour = palette(words.index(coarse) % 20) if coarse else "grey"
+            high = room.position[i, 1] > HANGING
+            axes.fill(
+                *corners[i].T, facecolor=colour, alpha=0.3 if high else 0.7, edgecolor="black", linewidth=0.5,
+                linestyle=":" if high else "-",
+            )  # fmt: skip
+            x, z = room.position[i, [0, 2]]
+            reach = room.size[i, 2] / 2
+            axes.plot([x, x + np.sin(room.yaw[i]) * reach], [z, z + np.cos(room.yaw[i]) * reach], "r-", linewidth=0.7)
+            if labels:
+                axes.text(x, z, room.categories[i].replace("_", "\n"), fontsize=3.5, ha="center", va="center")
+        axes.invert_yaxis()
+        axes.set_title(f"{room.id} ({room.room_type})", fontsize=5, pad=1)
+    figure.subplots_adjust(0.005, 0.005, 0.995, 0.98, 0.03, 0.08)
+    figure.savefig(path, dpi=dpi)
+
+
+def _coarse(word: str) -> str | None:
+    try:
+        return vocabulary().category(word).coarse
+    except UnknownWord:
+        return None
