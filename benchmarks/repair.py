@@ -36,9 +36,7 @@ def centred(room: RoomBoxes) -> RoomBoxes:
     """The room with the middle of its floor at the origin and no side shorter than 2 cm."""
     middle = (room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2
     position = room.position - np.array([middle[0], 0.0, middle[1]])
-    return replace(
-        room, position=position, floor_polygon=room.floor_polygon - middle, size=np.maximum(room.size, 0.02)
-    )
+    return replace(room, position=position, floor_polygon=room.floor_polygon - middle, size=np.maximum(room.size, 0.02))
 
 
 def main() -> None:
@@ -95,6 +93,7 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
 
 def repair_collisions(room: RoomBoxes) -> int:
     """Pairs that collide in a room as it is, by the repair's own measure."""
+    from echousd.repair.belonging import allowed_overlap
     from echousd.repair.problem import pose
     from echousd.repair.report import TOUCH
 
@@ -103,7 +102,8 @@ def repair_collisions(room: RoomBoxes) -> int:
         room.categories, room.size, room.position, room.yaw, np.zeros((0, 3), int),
         floor_polygon=None, height=None, fixed=none, rigid=none, turned=none,
     )  # fmt: skip
-    return int((separation(room.size, room.position, room.yaw, problem.pairs) + problem.allowed < -TOUCH).sum())
+    allowed = allowed_overlap(problem.categories, room.size, problem.pairs)
+    return int((separation(room.size, room.position, room.yaw, problem.pairs) + allowed < -TOUCH).sum())
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ def find_collisions(objects: Sequence[RoomObject]) -> tuple[Collision, ...]:
     allowed = allowed_overlap([thing.node.category for thing in objects], size, pairs)
     found = []
     for (i, j), overlap, free in zip(pairs.tolist(), depth, allowed, strict=True):
-        if overlap > TOUCH and overlap > free:
+        if overlap > TOUCH + free:
             deep = mesh_depth(objects[i], objects[j]) if len(objects[i].faces) and len(objects[j].faces) else overlap
             if deep > DEEP:
                 found.append(Collision(objects[i].node.name, objects[j].node.name, float(deep)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
 
@@ -117,7 +118,8 @@ def linearise(
     add(margin - slack, gradient, RELATION)
 
     apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)
-    add(apart.value + problem.allowed - 0.002, apart.gradient, COLLISION)
+    allowed = allowed_overlap(problem.categories, size, problem.pairs)
+    add(apart.value + allowed - 0.002, apart.gradient, COLLISION)
 
     if problem.floor is not None:
         within, who = floor_rows(problem.floor, size, position, yaw)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair.belonging import CARRIERS, WALL_FURNITURE, allowed_overlap, support
+from echousd.repair.belonging import CARRIERS, WALL_FURNITURE, support
 from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, pair_gaps, pair_indices
 
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
@@ -29,7 +29,7 @@ class Problem:
         height: height of the ceiling in metres, or None.
         carrier: (n,) int, the object that each one stands on, or `ON_FLOOR`, `ON_CEILING`, `FREE`.
         wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
-        pairs: (p, 2) int, pairs that must not collide; allowed: (p,) float, depth that each pair may overlap, metres.
+        pairs: (p, 2) int, pairs that must not collide.
         order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
         lift: (p,) bool, pairs that may pass over one another.
     """
@@ -43,7 +43,6 @@ class Problem:
     carrier: np.ndarray
     wall: np.ndarray
     pairs: np.ndarray
-    allowed: np.ndarray
     order: np.ndarray
     lift: np.ndarray
 
@@ -93,7 +92,6 @@ def pose(
         carrier,
         wall,
         pairs,
-        allowed_overlap(words, size, pairs),
         required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
         np.zeros(len(pairs), bool),
     )

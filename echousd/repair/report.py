@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echousd.repair.belonging import allowed_overlap
 from echousd.repair.constraints import COLLISION, FLOOR, RELATION
 from echousd.repair.geometry import floor_rows, separation
 from echousd.repair.problem import Problem
@@ -37,7 +38,8 @@ def collisions(
     """Pairs of boxes that run into each other deeper than they may, deepest first, with the excess depth in metres."""
     if not len(problem.pairs):
         return ()
-    depth = -(separation(size, position, yaw, problem.pairs) + problem.allowed)
+    allowed = allowed_overlap(problem.categories, size, problem.pairs)
+    depth = -(separation(size, position, yaw, problem.pairs) + allowed)
     order = np.argsort(-depth)
     return tuple(
         ((int(problem.pairs[p, 0]), int(problem.pairs[p, 1])), float(depth[p])) for p in order if depth[p] > TOUCH
