@@ -8,6 +8,7 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
+from echomodel.vocabulary import vocabulary
 from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
@@ -88,19 +89,21 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     if len(rooms) < len(graphs):
         raise StageError(f"{source(stage)}: two EchoSceneGraph prims describe the same room, allowed: one per room")
     by_graph = {prims.graph.GetPath(): prims for prims in rooms.values()}
-    for prim in nodes:
-        owner = _closest(prim.GetPath(), rooms)
-        if owner:
-            owner.nodes.append(prim)
-    for prim in relations:
-        owner = _closest(prim.GetPath(), by_graph)
-        if owner:
-            owner.relations.append(prim)
+    for owners, found, member in ((rooms, nodes, "nodes"), (by_graph, relations, "relations")):
+        known: dict[Sdf.Path, RoomPrims | None] = {}  # by parent, as siblings are many
+        for prim in found:
+            parent = prim.GetPath().GetParentPath()
+            if parent not in known:
+                known[parent] = _closest(parent, owners)
+            owner = known[parent]
+            if owner:
+                getattr(owner, member).append(prim)
     return list(rooms.values())
 
 
 def _room_of(graph: Usd.Prim) -> RoomPrims:
-    targets = graph.GetRelationship(usd.ROOM).GetTargets() if graph.HasRelationship(usd.ROOM) else []
+    relationship = graph.GetRelationship(usd.ROOM)
+    targets = relationship.GetTargets() if relationship else []
     if len(targets) > 1:
         raise StageError(f"{place(graph)}: {usd.ROOM} has {len(targets)} targets, allowed: at most one")
     room = graph.GetStage().GetPrimAtPath(targets[0]) if targets else graph.GetParent()
@@ -152,9 +155,9 @@ def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
 
 def room_spec(graph: Usd.Prim) -> RoomSpec:
     """The `RoomSpec` that an EchoSceneGraph prim holds."""
-    vocabulary = value(graph, usd.VOCABULARY)
-    if vocabulary not in (None, usd.VOCABULARY_NAME):
-        raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {vocabulary!r}, allowed: {usd.VOCABULARY_NAME}")
+    words = value(graph, usd.VOCABULARY)
+    if words not in (None, usd.VOCABULARY_NAME):
+        raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
     corners, size, height = (value(graph, name) for name in (usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT))
     try:
         return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height)
@@ -164,39 +167,44 @@ def room_spec(graph: Usd.Prim) -> RoomSpec:
 
 def read_node(prim: Usd.Prim, name: str) -> Node:
     """The node that a prim states; raises StageError."""
-    fields: dict[str, Any] = {"attributes": {}}
-    for field_name, attribute in _FIELDS.items():
-        found = value(prim, attribute)
-        if found is not None:
-            fields[field_name] = found
-    for attribute in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1]):
-        found = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
-        if found is not None:
-            fields["attributes"][attribute.GetName().removeprefix(usd.FREE)] = found
+    fields: dict[str, Any] = {}
+    free: dict[str, Any] = {}
+    for attribute in prim.GetAuthoredPropertyNames():
+        if attribute in _FIELDS:
+            fields[_FIELDS[attribute]] = value(prim, attribute)
+        elif attribute.startswith(usd.FREE):
+            free[attribute.removeprefix(usd.FREE)] = value(prim, attribute)
+    fields = {key: found for key, found in fields.items() if found is not None}
+    free = {key: found for key, found in free.items() if found is not None}
     if "category" not in fields:
         labels = value(prim, usd.LABELS)
         if not labels:
             raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
         fields["category"] = labels[0]
     try:
-        return Node(name, **fields)
+        return Node(name, attributes=free, **fields)
     except GraphError as error:
         raise StageError(f"{place(prim)}: {error}") from None
 
 
 _FIELDS = {
-    "category": usd.CATEGORY,
-    "style": usd.STYLE,
-    "size": usd.SIZE,
-    "position": usd.POSITION,
-    "yaw": usd.YAW,
-    "locked": usd.LOCKED,
+    usd.CATEGORY: "category",
+    usd.STYLE: "style",
+    usd.SIZE: "size",
+    usd.POSITION: "position",
+    usd.YAW: "yaw",
+    usd.LOCKED: "locked",
 }
+_PREDICATES = frozenset(predicate.name for predicate in vocabulary().predicates)
 
 
 def value(prim: Usd.Prim, name: str) -> Any:
     """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
-    found = usd.plain(prim.GetAttribute(name).Get()) if prim.HasAttribute(name) else None
+    attribute = prim.GetAttribute(name)
+    found = attribute.Get() if attribute else None
+    if found is None or isinstance(found, float | bool):
+        return found
+    found = usd.plain(found)
     for text in found if isinstance(found, tuple) else (found,):
         if isinstance(text, str) and len(text) > MAX_TEXT:
             raise StageError(f"{place(prim)}: {name} is a text of {len(text)} characters, allowed: {MAX_TEXT}")
@@ -209,7 +217,10 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
     object_ = _end(prim, usd.OBJECT, names)
     if subject is None or object_ is None:
         return None
-    predicate, confidence = value(prim, usd.PREDICATE), value(prim, usd.CONFIDENCE)
+    predicate, confidence = prim.GetAttribute(usd.PREDICATE).Get(), value(prim, usd.CONFIDENCE)
+    if predicate in _PREDICATES and confidence in (None, 1.0):  # nothing left to check, as the nodes are valid
+        return Relation.model_construct(subject=subject, predicate=predicate, object=object_, confidence=1.0)
+    predicate = value(prim, usd.PREDICATE)
     if predicate is None:
         raise StageError(f"{place(prim)}: {usd.PREDICATE} has no value, allowed: one predicate")
     try:
@@ -219,7 +230,8 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
 
 
 def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
-    targets = prim.GetRelationship(name).GetTargets()
+    relationship = prim.GetRelationship(name)
+    targets = relationship.GetTargets() if relationship else []
     if len(targets) != 1:
         found = f"{len(targets)} targets" + (f" ({', '.join(map(str, targets))})" if targets else "")
         raise StageError(f"{place(prim)}: {name} has {found}, allowed: exactly one")
