@@ -127,10 +127,10 @@ def report(
     count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
     seed: Seed = 0,
     worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,
-    """Rooms beside real ones, figure by figure, with a distance: of shares the difference, else over the real range.
+    section: Annotated[str | None, typer.Option(help="Only sections that begin so, such as pair.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Rooms beside real ones, figure by figure, with a distance (shares: difference; else mean difference over range).
+    """Rooms beside real ones, figure by figure, with a distance: of shares the difference, else over the real range.
 
     Example: echousd data report --count 2000 --worst 20
     """

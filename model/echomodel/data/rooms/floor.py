@@ -11,6 +11,7 @@ from echomodel.data.rooms.statistics import RoomTypeStatistics, quantile
 
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
 DOOR_DEPTH = 0.6
+ARM = 0.3  # share of the larger rooms' outlines that have a corridor as an arm
 CORRIDOR = 1.0  # what a cut must leave of a side
 
 
@@ -116,6 +117,8 @@ CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 def _cuts(half_x: float, half_z: float, counts: tuple[float, ...], rng: np.random.Generator) -> list:
     """Width and depth of the piece cut from each corner, (0, 0) where none is."""
     sizes = [(0.0, 0.0)] * 4
+    if counts[0] < 0.5 and rng.random() < ARM:
+        return _arm(half_x, half_z, rng)
     number = 1 + int(np.searchsorted(np.cumsum(counts), rng.random()))
     for corner in rng.permutation(4)[:number]:
         sx, sz = CORNERS[corner]
@@ -131,6 +134,25 @@ def _cuts(half_x: float, half_z: float, counts: tuple[float, ...], rng: np.rando
         overlap = width + opposite[0] > 2 * half_x - CORRIDOR and depth + opposite[1] > 2 * half_z - CORRIDOR
         if width < room_x and depth < room_z and not overlap:
             sizes[corner] = (round(width, 2), round(depth, 2))
+    return sizes
+
+
+def _arm(half_x: float, half_z: float, rng: np.random.Generator) -> list:
+    """Cut both corners of one side, so that a corridor of it stays."""
+    along_x = rng.random() < 0.5
+    side, across = (2 * half_z, 2 * half_x) if along_x else (2 * half_x, 2 * half_z)
+    deep = round(across * rng.uniform(0.12, 0.4), 2)
+    corridor = rng.uniform(CORRIDOR, 1.7)
+    first = round((side - corridor) * rng.random(), 2)
+    second = round(side - corridor - first, 2)
+    pieces = {1: (first if first > 0.3 else 0.0), -1: (second if second > 0.3 else 0.0)}
+    sign = 1 if rng.random() < 0.5 else -1
+    sizes = [(0.0, 0.0)] * 4
+    for k, (sx, sz) in enumerate(CORNERS):
+        if along_x and sx == sign and pieces[sz]:
+            sizes[k] = (deep, pieces[sz])
+        elif not along_x and sz == sign and pieces[sx]:
+            sizes[k] = (pieces[sx], deep)
     return sizes
 
 
