@@ -37,6 +37,8 @@ def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
     extent = np.asarray(size, float)
     if extent.shape != (3,) or not (np.isfinite(extent).all() and (extent > 0).all()):
         raise ValueError(f"size is {extent.tolist()}, need three positive numbers of metres")
+    if np.ndim(grid) != 3:
+        raise ValueError(f"TSDF has shape {np.shape(grid)}, need a cube (n, n, n)")
     if faces < 100:
         raise ValueError(f"face budget is {faces}, need at least 100")
     mesh = mesh_from_tsdf(largest_solids(np.asarray(grid, np.float32)))

@@ -1,0 +1,236 @@
+import json
+
+import numpy as np
+import pytest
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+from small_room import OBJECTS, StandIn, small_graph
+
+import echousd
+from echousd.room import RoomOptions
+from echousd.stage import read_graph
+
+
+@pytest.fixture(scope="module")
+def room():
+    return echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, faces=800)
+
+
+@pytest.fixture(scope="module")
+def root(room, tmp_path_factory):
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+@pytest.fixture
+def stage(root):
+    return Usd.Stage.Open(str(root))
+
+
+def test_files_are_those_of_the_design(root):
+    found = {str(path.relative_to(root.parent)) for path in root.parent.rglob("*") if path.is_file()}
+    layers = {f"layers/{name}.usda" for name in ("materials", "physics", "layout", "graph", "geometry")}
+    assets = {f"assets/{n}/{n}{end}" for n in set(OBJECTS) - {"nightstand_right"} for end in (".usda", "_geo.usdc")}
+    assert found == {"bedroom.usda", "bedroom.json", "textures/floor.png"} | layers | assets
+
+
+def test_stage_opens_whole_and_carries_its_graph(stage, room):
+    assert stage.GetCompositionErrors() == []
+    assert stage.GetDefaultPrim().GetPath() == "/Room"
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    assert UsdPhysics.GetStageKilogramsPerUnit(stage) == 1.0
+    assert read_graph(stage) == room.graph
+
+
+def test_every_default_validator_is_content(stage):
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    assert [error.GetMessage() for error in errors] == []
+
+
+def test_objects_stand_where_their_boxes_are(stage, room):
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    for number, name in enumerate(room.names):
+        prim = stage.GetPrimAtPath(f"/Room/Objects/{name}")
+        matrix = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
+        np.testing.assert_allclose(matrix, room.pose(number), atol=1e-4)
+        box = cache.ComputeUntransformedBound(prim).GetRange()
+        x, y, z = room.boxes.size[number].tolist()
+        np.testing.assert_allclose([box.GetMin(), box.GetMax()], [[-x / 2, 0, -z / 2], [x / 2, y, z / 2]], atol=1e-4)
+
+
+def test_kinds_payloads_and_hints(stage):
+    kinds = {
+        str(prim.GetPath()): Usd.ModelAPI(prim).GetKind() for prim in stage.Traverse() if Usd.ModelAPI(prim).GetKind()
+    }
+    assert kinds.pop("/Room") == "assembly"
+    assert kinds.pop("/Room/Objects") == kinds.pop("/Room/Shell") == "group"
+    assert set(kinds.values()) == {"component"}
+    for path in kinds:
+        hint = UsdGeom.ModelAPI(stage.GetPrimAtPath(path)).GetExtentsHint()
+        assert len(hint) == 2
+    unloaded = Usd.Stage.Open(stage.GetRootLayer(), Usd.Stage.LoadNone)
+    assert not unloaded.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    unloaded.Load("/Room/Objects/bed")
+    assert unloaded.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+
+
+def test_style_group_shares_one_asset(stage, room):
+    assert room.assets["nightstand_right"] == "nightstand_left"
+    assert room.meshes["nightstand_right"] is room.meshes["nightstand_left"]
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_left_mesh")
+
+
+def test_layout_layer_holds_transforms_alone(root):
+    stage = Usd.Stage.Open(str(root.parent / "layers/layout.usda"))
+    for prim in stage.TraverseAll():
+        assert not prim.IsDefined()
+        assert all(p.GetName().startswith("xformOp") for p in prim.GetAuthoredProperties())
+
+
+def test_every_path_in_the_room_is_relative(root):
+    layers, _, unresolved = UsdUtils.ComputeAllDependencies(str(root))
+    assert unresolved == []
+    assert len(layers) == 6 + 2 * 5
+    for path in root.parent.rglob("*.usda"):
+        assert "@/" not in path.read_text()
+        assert str(root.parent) not in path.read_text()
+
+
+def test_meshes_have_normals_uvs_and_materials(stage):
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    shown = [mesh for mesh in meshes if mesh.ComputePurpose() == "default"]
+    assert len(shown) == len(OBJECTS) + 1
+    for mesh in meshes:
+        assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
+        count = sum(mesh.GetFaceVertexCountsAttr().Get())
+        for name in ("normals", "st"):
+            primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name)
+            assert primvar.IsIndexed()
+            assert primvar.GetInterpolation() == "faceVarying"
+            assert len(primvar.GetIndices()) == count
+    for mesh in shown:
+        subsets = UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets()
+        faces = sorted(i for s in subsets for i in s.GetIndicesAttr().Get())
+        assert not subsets or faces == list(range(len(mesh.GetFaceVertexCountsAttr().Get())))
+        for prim in [s.GetPrim() for s in subsets] or [mesh.GetPrim()]:
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            assert material
+            assert str(material.GetPath()).startswith("/Room/Looks/")
+            assert material.ComputeSurfaceSource()[0].GetIdAttr().Get() == "UsdPreviewSurface"
+
+
+def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
+    def bound(path):
+        return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
+
+    left = bound("/Room/Objects/nightstand_left/nightstand_left_mesh/wood")
+    assert left == bound("/Room/Objects/nightstand_right/nightstand_left_mesh/wood") == "style_1_wood"
+    assert bound("/Room/Objects/wardrobe/wardrobe_mesh/wood") == "room_wood"
+
+
+def test_semantics(stage):
+    labels = {}
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdSemantics.LabelsAPI):
+            labels[prim.GetName()] = {
+                n: UsdSemantics.LabelsAPI(prim, n).GetLabelsAttr().Get()[0] for n in ("category", "ade20k")
+            }
+    assert labels["nightstand_left"] == {"category": "nightstand", "ade20k": "chest of drawers"}
+    assert labels["Floor"] == {"category": "floor", "ade20k": "floor"}
+    assert set(labels) == set(OBJECTS) | {"Floor"}
+
+
+def test_physics(stage):
+    bodies = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    assert {prim.GetName() for prim in bodies} == set(OBJECTS) - {"pendant"}  # what hangs does not fall
+    for prim in bodies:
+        assert 0.2 <= UsdPhysics.MassAPI(prim).GetMassAttr().Get() <= 300
+        above = prim.GetParent()
+        while above:
+            assert not above.HasAPI(UsdPhysics.RigidBodyAPI)
+            above = above.GetParent()
+    colliders = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    approximation = {p.GetName(): UsdPhysics.MeshCollisionAPI(p).GetApproximationAttr().Get() for p in colliders}
+    assert approximation.pop("Floor_mesh") == "none"
+    assert set(approximation.values()) == {"convexHull", "convexDecomposition"}
+    assert len(colliders) == len(OBJECTS) + 1
+    assert len([p for p in stage.Traverse() if p.IsA(UsdPhysics.Scene)]) == 1
+
+
+def test_cameras_see_everything_and_light_is_there(stage, room):
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
+    to_view = camera.GetCamera(0).frustum.ComputeViewMatrix() * camera.GetCamera(0).frustum.ComputeProjectionMatrix()
+    for number, name in enumerate(room.names):
+        low, high = room.meshes[name].bounds
+        for corner in np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3):
+            seen = to_view.Transform(Gf.Vec3d(*(room.pose(number) @ [*corner, 1])[:3]))
+            assert max(abs(v) for v in seen) <= 1.0, name
+    top = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/top"))
+    assert top.GetProjectionAttr().Get() == "orthographic"
+    assert top.GetHorizontalApertureAttr().Get() / 10 >= 4.0
+    assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
+    assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
+
+
+def test_provenance_in_every_layer_and_in_the_manifest(root, room, stage):
+    for layer in stage.GetUsedLayers():
+        if not layer.anonymous:
+            data = layer.customLayerData
+            assert data["generator"].startswith("echousd ")
+            assert data["asset_license"] == "Apache-2.0"
+            assert data["asset_name"]
+    data = stage.GetRootLayer().customLayerData
+    assert (data["seed"], data["model"]) == (3, "standin")
+    manifest = json.loads((root.parent / "bedroom.json").read_text())
+    assert manifest["seed"] == 3
+    assert manifest["relations"] == {"kept": 4, "broken": 0, "unmeasured": 1}
+    assert [v["state"] for v in manifest["verdicts"]] == [v.state for v in room.verdicts]
+    assert manifest["meshes"]["bed"]["watertight"] is True
+
+
+def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
+    turned = echousd.generate(
+        small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions("Z")
+    )
+    stage = Usd.Stage.Open(str(turned.save(tmp_path / "bedroom", preview=False)))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    box = (
+        UsdGeom.BBoxCache(0, ["default"])
+        .ComputeWorldBound(stage.GetPrimAtPath("/Room/Objects/wardrobe"))
+        .ComputeAlignedRange()
+    )
+    assert box.GetMax()[2] - box.GetMin()[2] == pytest.approx(2.2, abs=1e-3)
+    place = (
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects/lamp"))
+        .ComputeLocalToWorldTransform(0)
+        .ExtractTranslation()
+    )
+    np.testing.assert_allclose(place, (-1.25, 1.4, 0.5), atol=1e-4)
+    gravity = UsdPhysics.Scene(stage.GetPrimAtPath("/Room/PhysicsScene")).GetGravityDirectionAttr().Get()
+    assert gravity == Gf.Vec3f(0, 0, -1)
+    assert read_graph(stage) == room.graph
+
+
+def test_walls_stand_around_the_floor(tmp_path):
+    graph = small_graph(size=None, floor_polygon=((-2, -2), (2, -2), (2, 2), (0, 2), (0, 1), (-2, 1)), height=3.0)
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True))
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    walls = [p for p in stage.GetPrimAtPath("/Room/Shell").GetChildren() if p.GetName().startswith("Wall_")]
+    assert len(walls) == 6
+    cache = UsdGeom.BBoxCache(0, ["default"])
+    for wall in walls:
+        box = cache.ComputeWorldBound(wall).ComputeAlignedRange()
+        assert box.GetMax()[1] == pytest.approx(3.0)
+        middle = (box.GetMin() + box.GetMax()) / 2
+        outside = abs(middle[0]) > 2 or middle[2] < -2 or middle[2] > 2 or (middle[0] < 0 and middle[2] > 1)
+        assert outside, wall.GetPath()
+
+
+def test_floor_without_a_word_about_it_lies_under_the_furniture():
+    graph = small_graph(size=None)
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes")
+    corners = np.array(
+        [room.pose(i) @ [x, 0, z, 1] for i, n in enumerate(room.names) for x, z in room.meshes[n].bounds[:, [0, 2]]]
+    )
+    assert (room.floor.min(0) < corners[:, [0, 2]].min(0)).all()
+    assert (room.floor.max(0) > corners[:, [0, 2]].max(0)).all()

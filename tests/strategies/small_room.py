@@ -1,0 +1,90 @@
+"""A small bedroom for tests: a graph, and a stand-in for the model that knows where everything goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.vocabulary import vocabulary
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+
+# category -> size, and places in the order of use (metres, radians)
+PLACES: dict[str, tuple[tuple[float, float, float], list[tuple[float, float, float, float]]]] = {
+    "double_bed": ((1.8, 1.0, 2.1), [(0.0, 0.0, -0.6, 0.0)]),
+    "nightstand": ((0.5, 0.5, 0.4), [(-1.25, 0.0, -1.4, 0.0), (1.25, 0.0, -1.4, 0.0)]),
+    "table_lamp": ((0.25, 0.45, 0.25), [(-1.25, 0.5, -1.4, 0.0)]),
+    "wardrobe": ((1.6, 2.2, 0.6), [(-1.6, 0.0, 0.9, np.pi / 2)]),
+    "pendant_lamp": ((0.5, 0.7, 0.5), [(0.0, 2.1, 0.9, 0.0)]),
+}
+OBJECTS = {
+    "bed": "double_bed",
+    "nightstand_left": "nightstand",
+    "nightstand_right": "nightstand",
+    "lamp": "table_lamp",
+    "wardrobe": "wardrobe",
+    "pendant": "pendant_lamp",
+}
+
+
+def small_graph(**room: object) -> SceneGraph:
+    """Six objects; the two nightstands are one style group."""
+    return SceneGraph(
+        room=RoomSpec("bedroom", **{"size": (4.0, 3.4), **room}),
+        nodes=tuple(Node(name, category) for name, category in OBJECTS.items()),
+        relations=(
+            Relation("nightstand_left", "close_by", "bed"),
+            Relation("nightstand_right", "close_by", "bed"),
+            Relation("nightstand_left", "same_style_as", "nightstand_right"),
+            Relation("lamp", "standing_on", "nightstand_left"),
+            Relation("wardrobe", "taller_than", "bed"),
+        ),
+    )
+
+
+class StandIn:
+    """Knows the two calls of the echo model; `shift` metres along x come from the generator it is given."""
+
+    hash = "standin"
+
+    def __init__(self, shift: float = 0.0) -> None:
+        self.shift = shift
+
+    def sample_layout(self, graph, *, generator, steps=None, known=None, known_mask=None, progress=None):
+        used: dict[str, int] = {}
+        size, position, yaw = [], [], []
+        for number in graph.category.tolist():
+            word = vocabulary().categories[number].name
+            extent, places = PLACES[word]
+            x, y, z, turn = places[used.setdefault(word, 0) % len(places)]
+            used[word] += 1
+            size.append(extent)
+            position.append((x, y, z))
+            yaw.append(turn)
+        moved = torch.tensor(position) + torch.rand(1, generator=generator) * torch.tensor([self.shift, 0.0, 0.0])
+        if progress is not None:
+            progress(1, 1)
+        return Boxes(torch.tensor(size), moved, torch.tensor(yaw, dtype=torch.float32))
+
+    def sample_shapes(self, graph, boxes, *, generator, steps=None, known=None, known_mask=None, progress=None):
+        return np.stack([ball_tsdf() if c % 2 else table_tsdf() for c in graph.category.tolist()])
+
+
+def ball_tsdf() -> np.ndarray:
+    """A sphere that fills its box."""
+    x, y, z = np.meshgrid(*[(np.arange(64) + 0.5) / 64 - 0.5] * 3, indexing="ij")
+    return np.clip((np.sqrt(x**2 + y**2 + z**2) - 30 / 64) * 16, -1, 1).astype(np.float32)
+
+
+def table_tsdf(leg: float = 2.0) -> np.ndarray:
+    """A plate on four legs; `leg` is half the thickness of a leg in voxels."""
+
+    def block(centre: tuple[float, float, float], half: tuple[float, float, float]) -> np.ndarray:
+        axes = np.meshgrid(*[np.arange(64) + 0.5] * 3, indexing="ij")
+        away = [np.abs(a - c) - h for a, c, h in zip(axes, centre, half, strict=True)]
+        outside = np.sqrt(sum(np.maximum(a, 0) ** 2 for a in away))
+        return outside + np.minimum(np.maximum(np.maximum(away[0], away[1]), away[2]), 0)
+
+    solids = [block((32, 58, 32), (30, 4, 30))]
+    solids += [block((x, 30, z), (leg, 28, leg)) for x in (2 + leg, 62 - leg) for z in (2 + leg, 62 - leg)]
+    return np.clip(np.minimum.reduce(solids) / 4, -1, 1).astype(np.float32)
