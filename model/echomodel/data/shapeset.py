@@ -1,7 +1,7 @@
 """Sets of shapes on disk: sharded, memory-mapped, 4-bit TSDFs under zstd, a few kilobytes a shape.
 
-A folder holds `shapes.json` (what the set is, written last) and shards `shapes-0000.bin`: a header, one fixed-size entry
-per shape, then the compressed grids. Shape number `style * C + category` of a parametric set is the piece of that
+A folder holds `shapes.json` (what the set is, written last) and shards `shapes-0000.bin`: a header, one fixed-size
+entry per shape, then the compressed grids. Shape number `style * C + category` of a parametric set is the piece of that
 category in that style, C being the number of categories; rooms name it `s{style}_{category}`.
 """
 
@@ -27,7 +27,14 @@ LEVELS = (np.concatenate([-MAGNITUDES[::-1], MAGNITUDES]) / TRUNCATION).astype(n
 EDGES = (LEVELS[1:] + LEVELS[:-1]) / 2
 MAGIC = b"ECHOSHP1"
 ENTRY = np.dtype(
-    [("offset", "<u8"), ("length", "<u4"), ("category", "<i4"), ("style", "<i4"), ("held_out", "<i4"), ("size", "<f4", 3)]
+    [
+        ("offset", "<u8"),
+        ("length", "<u4"),
+        ("category", "<i4"),
+        ("style", "<i4"),
+        ("held_out", "<i4"),
+        ("size", "<f4", 3),
+    ]
 )
 STYLES_PER_SHARD = 8
 COMPRESSION = 12
@@ -155,7 +162,9 @@ class ShapeSet:
         self.directory = Path(directory)
         index = self.directory / "shapes.json"
         if not index.exists():
-            hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no shapes.json"
+            hint = (
+                "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no shapes.json"
+            )
             raise ValueError(f"{self.directory}: not a shape set ({hint})")
         self.info: dict = json.loads(index.read_text("utf-8"))
         self.categories: tuple[str, ...] = tuple(self.info["categories"])

@@ -21,6 +21,8 @@ TRUNCATION = 4.0  # voxels
 SHELL = 0.87  # half the diagonal of a voxel: no smaller distance makes a sheet of voxels without holes
 SHEET = 0.55  # half the thickness, in voxels, that an open sheet is given
 SURFACE_POINTS = 200_000
+POINTS_PER_VOXEL = 8  # samples per voxel of area, at least; fewer leave holes in the shell
+MOST_POINTS = 1_500_000
 
 
 def voxels_from_points(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -37,7 +39,7 @@ def voxels_from_points(points: np.ndarray, lower: np.ndarray, upper: np.ndarray)
     return (np.asarray(points, float) - centre) / extent * FILLED + (RESOLUTION - 1) / 2
 
 
-def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS, seed: int = 0) -> np.ndarray:
+def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS) -> np.ndarray:
     """Signed distances of any triangle mesh, closed or not, by flood fill from outside.
 
     Voxels nearer to the surface than `SHELL` stop the flood; what it does not reach is inside. A sheet without an
@@ -45,8 +47,7 @@ def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS, seed:
 
     Arguments:
         mesh: triangles in the object frame, any unit; its axis-aligned box becomes the normalised box.
-        points: number of surface samples that stand for the surface.
-        seed: seed of the surface samples.
+        points: least number of surface samples; more are taken where the surface is large.
 
     Returns (64, 64, 64) float32. Raises ValueError for a mesh without area.
     """
@@ -57,7 +58,7 @@ def tsdf_from_mesh(mesh: trimesh.Trimesh, *, points: int = SURFACE_POINTS, seed:
     if (upper - lower).max() <= 0:
         raise ValueError("mesh is a single point, need triangles with an area")
     triangles = voxels_from_points(used, lower, upper).reshape(-1, 3, 3)
-    distance = _distance_to_triangles(triangles, points, np.random.default_rng(seed))
+    distance = _distance_to_triangles(triangles, points)
     return truncated(_signed_by_flood(distance))
 
 
@@ -95,7 +96,7 @@ def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
     return mesh
 
 
-def _distance_to_triangles(triangles: np.ndarray, points: int, rng: np.random.Generator) -> np.ndarray:
+def _distance_to_triangles(triangles: np.ndarray, points: int) -> np.ndarray:
     """Unsigned distance of every voxel centre to the triangles, exact near the surface, `inf` beyond the truncation."""
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(edges, axis=1) / 2
@@ -103,8 +104,11 @@ def _distance_to_triangles(triangles: np.ndarray, points: int, rng: np.random.Ge
         raise ValueError("mesh has no area")
     keep = area > 1e-9
     triangles, area = triangles[keep], area[keep]
-    face = np.searchsorted(np.cumsum(area) / area.sum(), rng.random(points)).clip(0, len(area) - 1)
-    u, v = rng.random((2, points))
+    points = min(max(points, int(POINTS_PER_VOXEL * area.sum())), MOST_POINTS)
+    # Evenly along the summed area and on a low-discrepancy sequence inside: random points leave holes to leak through.
+    step = np.arange(points)
+    face = np.searchsorted(np.cumsum(area) / area.sum(), (step + 0.5) / points).clip(0, len(area) - 1)
+    u, v = (step * 0.7548776662466927) % 1, (step * 0.5698402909980532) % 1
     flip = u + v > 1
     u[flip], v[flip] = 1 - u[flip], 1 - v[flip]
     a, b, c = triangles[face].transpose(1, 0, 2)

@@ -1,4 +1,4 @@
-"""Parametric furniture for every category of the vocabulary: solids that give a watertight mesh and a signed distance."""
+"""Parametric furniture for every category: solids that give a watertight mesh and a signed distance."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import trimesh
 
-from echomodel.data.furniture import beds, decor, lamps, seats, sofas, storage, tables
+from echomodel.data.furniture import armchairs, beds, chairs, decor, lamps, shelving, sofas, stools, storage, tables
 from echomodel.data.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.data.furniture.solids import Solid
@@ -17,7 +17,7 @@ from echomodel.vocabulary import vocabulary
 __all__ = ["MATERIALS", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 
 Builder = Callable[[np.ndarray, Style, np.random.Generator], list[Solid]]
-MODULES = (seats, sofas, tables, storage, beds, lamps, decor)
+MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, lamps, decor)
 SAME_AS = {"table": "dining_table"}
 
 
@@ -41,9 +41,7 @@ def solids(category: str, style: Style, rng: np.random.Generator, size: np.ndarr
     return _builder(name)(size, style, rng)
 
 
-def furniture(
-    category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None
-) -> trimesh.Trimesh:
+def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
     """One piece of furniture as a watertight mesh in the object frame (+Y up, +Z front, standing on y = 0), metres.
 
     Arguments as for `solids`; the mesh fills `size` exactly. Part numbers, materials and texture coordinates are face

@@ -1,4 +1,4 @@
-"""Solids put together: one mesh with materials and texture coordinates, one signed distance, a fit to the wanted size."""
+"""Solids put together: one mesh with materials and texture coordinates, and one signed distance."""
 
 from __future__ import annotations
 

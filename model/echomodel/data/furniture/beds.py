@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,43 +26,87 @@ def _headboard(style: Style, w: float, h: float, z: float, rng: np.random.Genera
     if kind == "channels":
         count = int(4 + 6 * style.tufting)
         edges = np.linspace(-w / 2, w / 2, count + 1)
-        return [Block(centre=np.array([(a + b) / 2, (0.1 + h) / 2, z + t * 0.75]), half=np.array([(b - a) / 2, (h - 0.1) / 2, t * 0.75]),
-                      radius=min((b - a) * 0.4, t * 0.7), material="fabric") for a, b in zip(edges[:-1], edges[1:], strict=True)]  # fmt: skip
+        return [
+            Block(
+                centre=np.array([(a + b) / 2, (0.1 + h) / 2, z + t * 0.75]),
+                half=np.array([(b - a) / 2, (h - 0.1) / 2, t * 0.75]),
+                radius=min((b - a) * 0.4, t * 0.7),
+                material="fabric",
+            )
+            for a, b in pairwise(edges)
+        ]
     if kind == "cushions":
         frame = box((-w / 2, 0.02, z), (w / 2, h * 0.85, z + t * 0.6))
         turn = rotation(x=-0.1)
-        pads = [cushion((s * w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4), (s * w * 0.25 + w * 0.23, h, z + t * 1.9), style, turn=turn) for s in (-1, 1)]
+        pads = [
+            cushion(
+                (s * w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4),
+                (s * w * 0.25 + w * 0.23, h, z + t * 1.9),
+                style,
+                turn=turn,
+            )
+            for s in (-1, 1)
+        ]
         return [frame, *pads]
     if kind == "slats":
         parts = [box((s * (w / 2 - 0.03) - 0.03, 0, z), (s * (w / 2 - 0.03) + 0.03, h, z + 0.06)) for s in (-1, 1)]
-        parts += [box((-w / 2, h - 0.1, z), (w / 2, h, z + 0.05)), box((-w / 2, h * 0.45, z), (w / 2, h * 0.45 + 0.06, z + 0.05))]
+        parts += [
+            box((-w / 2, h - 0.1, z), (w / 2, h, z + 0.05)),
+            box((-w / 2, h * 0.45, z), (w / 2, h * 0.45 + 0.06, z + 0.05)),
+        ]
         count = int(5 + 9 * style.tufting)
         xs = np.linspace(-w / 2, w / 2, count + 2)[1:-1]
         return parts + [box((x - 0.025, h * 0.45, z + 0.01), (x + 0.025, h, z + 0.04)) for x in xs]
     if kind == "posts":
         r = 0.045 * style.bulk
-        parts = [Turned(centre=np.array([s * (w / 2 - r), 0, z + r]), low=(r, r), high=(r * 0.8, r * 0.8), height=h - r) for s in (-1, 1)]
+        parts = [
+            Turned(centre=np.array([s * (w / 2 - r), 0, z + r]), low=(r, r), high=(r * 0.8, r * 0.8), height=h - r)
+            for s in (-1, 1)
+        ]
         parts += [Ball(centre=np.array([s * (w / 2 - r), h - r, z + r]), half=np.full(3, r * 1.2)) for s in (-1, 1)]
         return [*parts, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
-    arch = Turned(centre=np.array([0, h * 0.6, z + t * 0.5]), low=(w / 2, h * 0.4), high=(w / 2, h * 0.4), height=t,
-                  turn=rotation(x=np.pi / 2), power=2.4, material="fabric" if style.softness > 0.5 else "wood")  # fmt: skip
+    arch = Turned(
+        centre=np.array([0, h * 0.6, z + t * 0.5]),
+        low=(w / 2, h * 0.4),
+        high=(w / 2, h * 0.4),
+        height=t,
+        turn=rotation(x=np.pi / 2),
+        power=2.4,
+        material="fabric" if style.softness > 0.5 else "wood",
+    )
     arch = replace(arch, centre=np.array([0, h * 0.6, z]))
     return [arch, box((-w / 2, 0.02, z), (w / 2, h * 0.62, z + t), "fabric" if style.softness > 0.5 else "wood")]
 
 
-def _bedding(w: float, z0: float, z1: float, low: float, rng: np.random.Generator, style: Style, pillows: int) -> list[Solid]:
+def _bedding(
+    w: float, z0: float, z1: float, low: float, rng: np.random.Generator, style: Style, pillows: int
+) -> list[Solid]:
     """Mattress, pillows and a cover from z0 (head) to z1."""
     thick = 0.2
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "fabric", 0.05)]
     each = w / pillows
     for i in range(pillows):
         x = -w / 2 + each * (i + 0.5)
-        parts.append(Ball(centre=np.array([x, low + thick + 0.06, z0 + 0.26]), half=np.array([min(each * 0.44, 0.38), 0.09, 0.22]), power=2.8,
-                          turn=rotation(x=-0.25), material="shade"))  # fmt: skip
+        parts.append(
+            Ball(
+                centre=np.array([x, low + thick + 0.06, z0 + 0.26]),
+                half=np.array([min(each * 0.44, 0.38), 0.09, 0.22]),
+                power=2.8,
+                turn=rotation(x=-0.25),
+                material="shade",
+            )
+        )
     if rng.random() < 0.75:
         start = z0 + (z1 - z0) * rng.uniform(0.28, 0.55)
         over = 0.02 + 0.05 * style.softness
-        parts.append(box((-w / 2 - over, low + thick * 0.35, start), (w / 2 + over, low + thick + 0.045, z1 + over * 0.5), "accent", 0.035))
+        parts.append(
+            box(
+                (-w / 2 - over, low + thick * 0.35, start),
+                (w / 2 + over, low + thick + 0.045, z1 + over * 0.5),
+                "accent",
+                0.035,
+            )
+        )
     return parts
 
 
@@ -78,7 +123,14 @@ def _bed(size: Size, style: Style, rng: np.random.Generator, pillows: int) -> li
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "splayed") else "straight"
     parts: list[Solid] = base(style, frame * 0.96, (d - head) * 0.96, foot, 0.07 * style.bulk, kind)
     upholstered = style.softness > 0.5
-    parts.append(box((-frame / 2, foot, z0 + head * 0.5), (frame / 2, deck, z1), "fabric" if upholstered else "wood", 0.03 if upholstered else 0.0))
+    parts.append(
+        box(
+            (-frame / 2, foot, z0 + head * 0.5),
+            (frame / 2, deck, z1),
+            "fabric" if upholstered else "wood",
+            0.03 if upholstered else 0.0,
+        )
+    )
     parts += _headboard(style, w, h, z0, rng)
     parts += _bedding(frame * 0.95, z0 + head, z1 - 0.04, deck - 0.06, rng, style, pillows)
     if style.headboard in ("slats", "posts", "arched") and rng.random() < 0.6:
@@ -110,20 +162,28 @@ def kids_bed(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     side = -1 if rng.random() < 0.5 else 1
     for y in np.linspace(y0 + 0.12, y1, 2):
         parts.append(box((side * w / 2 - 0.02, y - 0.035, -d * 0.48), (side * w / 2 + 0.02, y + 0.035, d * 0.1)))
-    parts += [box((side * w / 2 - 0.025, y0 - 0.1, z - 0.03), (side * w / 2 + 0.025, y1 + 0.04, z + 0.03)) for z in (-d * 0.2, d * 0.08)]
+    parts += [
+        box((side * w / 2 - 0.025, y0 - 0.1, z - 0.03), (side * w / 2 + 0.025, y1 + 0.04, z + 0.03))
+        for z in (-d * 0.2, d * 0.08)
+    ]
     return parts
 
 
 def _house(w: float, h: float, d: float) -> list[Solid]:
     """Posts and rafters in the outline of a house."""
     t, eaves = 0.03, h * 0.72
-    parts: list[Solid] = [box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, eaves, sz * (d / 2 - t) + t))
-                          for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+    parts: list[Solid] = [
+        box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, eaves, sz * (d / 2 - t) + t))
+        for sx in (-1, 1)
+        for sz in (-1, 1)
+    ]
     slope, length = np.arctan2(h - eaves, w / 2), np.hypot(h - eaves, w / 2)
     for z in (-(d / 2 - t), d / 2 - t):
         for s in (-1, 1):
             rafter = box((-length / 2, -t, -t), (length / 2, t, t))
-            parts.append(replace(rafter, centre=np.array([s * w / 4, (eaves + h) / 2 - t, z]), turn=rotation(z=-s * slope)))
+            parts.append(
+                replace(rafter, centre=np.array([s * w / 4, (eaves + h) / 2 - t, z]), turn=rotation(z=-s * slope))
+            )
     parts.append(box((-t, h - 2 * t, -d / 2), (t, h, d / 2)))
     return parts
 
@@ -132,11 +192,18 @@ def _cot(size: Size, style: Style) -> list[Solid]:
     """Bars on four sides round a small mattress."""
     w, h, d = size
     t, y0 = 0.025, min(0.2, h * 0.3)
-    parts: list[Solid] = [box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, h, sz * (d / 2 - t) + t))
-                          for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+    parts: list[Solid] = [
+        box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, h, sz * (d / 2 - t) + t))
+        for sx in (-1, 1)
+        for sz in (-1, 1)
+    ]
     for y in (y0, h - 0.05):
-        parts += [box((s * (w / 2 - t) - t * 0.7, y, -d / 2), (s * (w / 2 - t) + t * 0.7, y + 0.045, d / 2)) for s in (-1, 1)]
-        parts += [box((-w / 2, y, s * (d / 2 - t) - t * 0.7), (w / 2, y + 0.045, s * (d / 2 - t) + t * 0.7)) for s in (-1, 1)]
+        parts += [
+            box((s * (w / 2 - t) - t * 0.7, y, -d / 2), (s * (w / 2 - t) + t * 0.7, y + 0.045, d / 2)) for s in (-1, 1)
+        ]
+        parts += [
+            box((-w / 2, y, s * (d / 2 - t) - t * 0.7), (w / 2, y + 0.045, s * (d / 2 - t) + t * 0.7)) for s in (-1, 1)
+        ]
     r = 0.011
     for z in np.linspace(-d / 2, d / 2, max(5, int(d / 0.13)))[1:-1]:
         parts += [box((s * (w / 2 - t) - r, y0, z - r), (s * (w / 2 - t) + r, h - 0.03, z + r)) for s in (-1, 1)]
@@ -159,11 +226,27 @@ def _bunk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         parts += [box((x - t, 0, s * (d / 2 - t) - t), (x + t, h - 0.08, s * (d / 2 - t) + t)) for s in (-1, 1)]
     for y in (0.22, upper):
         parts.append(box((x0, y, -d / 2), (x0 + bed, y + 0.12, d / 2)))
-        parts.append(box((x0 + 0.05, y + 0.1, -d / 2 + 0.06), (x0 + bed - 0.05, y + 0.24, d / 2 - 0.06), "fabric", 0.04))
-        parts.append(Ball(centre=np.array([x0 + bed / 2, y + 0.28, -d / 2 + 0.28]), half=np.array([0.3, 0.07, 0.18]), power=2.8, material="shade"))
+        parts.append(
+            box((x0 + 0.05, y + 0.1, -d / 2 + 0.06), (x0 + bed - 0.05, y + 0.24, d / 2 - 0.06), "fabric", 0.04)
+        )
+        parts.append(
+            Ball(
+                centre=np.array([x0 + bed / 2, y + 0.28, -d / 2 + 0.28]),
+                half=np.array([0.3, 0.07, 0.18]),
+                power=2.8,
+                material="shade",
+            )
+        )
     for x in (x0 + 0.015, x0 + bed - 0.015):
-        parts += [box((x - 0.015, y, -d / 2), (x + 0.015, y + 0.08, d / 2 * (1 if x < x0 + bed / 2 else 0.55))) for y in (upper + 0.22, h - 0.08)]
-    parts += [box((x0, y, s * (d / 2 - 0.015) - 0.015), (x0 + bed, y + 0.08, s * (d / 2 - 0.015) + 0.015)) for y in (upper + 0.22, h - 0.08) for s in (-1, 1)]
+        parts += [
+            box((x - 0.015, y, -d / 2), (x + 0.015, y + 0.08, d / 2 * (1 if x < x0 + bed / 2 else 0.55)))
+            for y in (upper + 0.22, h - 0.08)
+        ]
+    parts += [
+        box((x0, y, s * (d / 2 - 0.015) - 0.015), (x0 + bed, y + 0.08, s * (d / 2 - 0.015) + 0.015))
+        for y in (upper + 0.22, h - 0.08)
+        for s in (-1, 1)
+    ]
     if stairs:
         steps = 4
         for i in range(steps):
@@ -174,4 +257,6 @@ def _bunk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         return parts
     for z in (d * 0.2, d * 0.42):
         parts.append(box((w / 2 - 0.02, 0, z - 0.025), (w / 2 + 0.02, h - 0.05, z + 0.025)))
-    return parts + [box((w / 2 - 0.02, y, d * 0.2), (w / 2 + 0.02, y + 0.04, d * 0.42)) for y in np.linspace(0.3, upper, 5)]
+    return parts + [
+        box((w / 2 - 0.02, y, d * 0.2), (w / 2 + 0.02, y + 0.04, d * 0.42)) for y in np.linspace(0.3, upper, 5)
+    ]

@@ -10,7 +10,6 @@ from echomodel.data.furniture.solids import IDENTITY, Ball, Block, Solid, Tube, 
 from echomodel.data.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
-SLENDER = {"metal": 0.55}
 
 
 def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0) -> Block:
@@ -20,7 +19,7 @@ def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0) ->
 
 
 def cushion(low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY) -> Solid:
-    """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging when very soft."""
+    """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     centre, half = (a + b) / 2, np.maximum((b - a) / 2, 1e-3)
     if style.softness > 0.85 and half.min() / half.max() > 0.12:
@@ -29,10 +28,20 @@ def cushion(low: tuple, high: tuple, style: Style, material: str = "fabric", tur
     return Block(centre=centre, half=half, radius=radius, turn=turn, material=material)
 
 
-def top(shape: str, width: float, depth: float, y: float, thick: float, style: Style, material: str = "wood") -> Solid:
+def corner_power(style: Style) -> float:
+    """Exponent of a superellipse with corners as round as the style has them."""
+    return 5.0 + 6 * (1 - style.corner)
+
+
+def within(shape: str, style: Style) -> float:
+    """Share of a top's width and depth inside which legs at the four corners stay below it."""
+    return {"square": 0.97, "corners": 2 ** (-1 / corner_power(style)), "round": 0.71}[shape]
+
+
+def top(shape: str, width: float, depth: float, y: float, thick: float, style: Style, material: str = "wood") -> Turned:
     """A table top whose upper face lies at `y`: `square`, `corners` (rounded) or `round` (circle or oval)."""
     half = (width / 2, depth / 2)
-    power = {"square": np.inf, "corners": 5.0 + 6 * (1 - style.corner), "round": 2.0}[shape]
+    power = {"square": np.inf, "corners": corner_power(style), "round": 2.0}[shape]
     rounding = 0.0 if shape == "square" else thick * 0.3 * style.softness
     return Turned(
         centre=np.array([0.0, y - thick, 0.0]),
@@ -75,7 +84,9 @@ def turned_leg(x: float, z: float, height: float, thick: float, material: str = 
             material=material,
         )
 
-    ring = Ball(centre=np.array([x, 0.68 * height, z]), half=np.array([1.25 * r, 0.45 * r, 1.25 * r]), material=material)
+    ring = Ball(
+        centre=np.array([x, 0.68 * height, z]), half=np.array([1.25 * r, 0.45 * r, 1.25 * r]), material=material
+    )
     return [section(0, 0.08, 0.9, 0.55), section(0.08, 0.7, 0.55, 1.0), ring, section(0.7, 1, 1.05, 1.05, np.inf)]
 
 
@@ -108,11 +119,14 @@ def base(
     if kind == "hairpin":
         r = max(0.006, thick * 0.16)
         return [
-            Tube(points=np.array([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]]), radius=r,
-                 material="metal")
+            Tube(
+                points=np.array([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]]),
+                radius=r,
+                material="metal",
+            )
             for cx, cz in corners
             for d in (min(0.12, width * 0.12),)
-        ]  # fmt: skip
+        ]
     spread = np.tan(style.splay) * h if kind == "splayed" else 0.0
     spread = min(spread, 0.3 * min(width, depth))
     taper = style.taper if kind in ("tapered", "splayed") else 1.0
@@ -147,10 +161,16 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
         parts.append(box((side - t, 0, -z), (side + t, thick, z)))
         parts.append(box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)))
         parts += [
-            Turned(centre=np.array([side, thick * 0.5, s * z * 0.25]), low=(t, t), high=(t, t), height=h - thick,
-                   power=np.inf, turn=rotation(x=-s * 0.12))
+            Turned(
+                centre=np.array([side, thick * 0.5, s * z * 0.25]),
+                low=(t, t),
+                high=(t, t),
+                height=h - thick,
+                power=np.inf,
+                turn=rotation(x=-s * 0.12),
+            )
             for s in (-1, 1)
-        ]  # fmt: skip
+        ]
     parts.append(box((-x * 0.82, h * 0.45, -t), (x * 0.82, h * 0.45 + thick, t)))
     return parts
 
@@ -163,18 +183,27 @@ def pedestal(width: float, depth: float, height: float, style: Style) -> list[So
     column = Turned(low=(r, r), high=(r * 0.8, r * 0.8), height=height, material=material)
     if style.family in ("classic", "rustic"):
         feet: list[Solid] = [
-            Tube(points=np.array([[0, height * 0.3, 0], [s * spread * c, height * 0.14, s * spread * d * 0.9],
-                                  [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d]]), radius=r * 0.6)
+            Tube(
+                points=np.array(
+                    [
+                        [0, height * 0.3, 0],
+                        [s * spread * c, height * 0.14, s * spread * d * 0.9],
+                        [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d],
+                    ]
+                ),
+                radius=r * 0.6,
+            )
             for s in (-1, 1)
             for c, d in ((0.7, 0.7), (0.7, -0.7))
-        ]  # fmt: skip
+        ]
         bulb = Ball(centre=np.array([0, height * 0.55, 0]), half=np.array([r * 1.5, height * 0.12, r * 1.5]))
         return [column, bulb, *feet]
     if style.contrast > 0.6:
         cone = Turned(low=(spread * 0.95, spread * 0.95), high=(r, r), height=height * 0.95, material=material)
         return [cone, replace(column, height=height)]
-    disc = Turned(low=(spread, spread), high=(spread * 0.9, spread * 0.9), height=max(0.015, height * 0.04),
-                  material=material)  # fmt: skip
+    disc = Turned(
+        low=(spread, spread), high=(spread * 0.9, spread * 0.9), height=max(0.015, height * 0.04), material=material
+    )
     return [disc, column]
 
 
@@ -192,10 +221,7 @@ def front(
     for i in range(columns):
         for j in range(rows):
             x0, x1, y0, y1 = xs[i] + gap, xs[i + 1] - gap, ys[j] + gap, ys[j + 1] - gap
-            if style.fronts == "recessed":
-                parts.append(box((x0, y0, z - 0.022), (x1, y1, z - 0.004), "accent"))
-            else:
-                parts.append(box((x0, y0, z - 0.005), (x1, y1, z + thick), "accent"))
+            parts.append(box((x0, y0, z - 0.005), (x1, y1, z + thick), "accent"))
             if style.fronts == "framed":
                 parts += _frame(x0, x1, y0, y1, z + thick, 0.15 * min(x1 - x0, y1 - y0))
             parts += _handle(x0, x1, y0, y1, z + thick, kind, hinge_left=i % 2 == 0, style=style)
@@ -220,8 +246,9 @@ def _handle(
     if style.handles == "knob":
         r = 0.016
         count = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
-        return [Ball(centre=np.array([x + dx, y, z + r]), half=np.array([r, r, r * 1.2]), material="metal")
-                for dx in count]  # fmt: skip
+        return [
+            Ball(centre=np.array([x + dx, y, z + r]), half=np.array([r, r, r * 1.2]), material="metal") for dx in count
+        ]
     if style.handles == "edge":
         if door:
             return [box((x - 0.008, y0 + 0.1 * h, z), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal")]

@@ -24,8 +24,26 @@ def plant(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
             x, z = pot_r * 1.05 * np.cos(a), pot_r * 1.05 * np.sin(a)
             parts.append(Tube(points=np.array([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]]), radius=0.014))
     waist = 0.6 + 0.35 * style.taper
-    parts.append(Turned(centre=np.array([0, foot, 0]), low=(pot_r * waist, pot_r * waist), high=(pot_r, pot_r), height=pot_h, power=power, material="ceramic"))
-    parts.append(Turned(centre=np.array([0, foot + pot_h * 0.98, 0]), low=(pot_r * 0.9, pot_r * 0.9), high=(pot_r * 0.9, pot_r * 0.9), height=pot_h * 0.04, power=power, material="soil"))
+    parts.append(
+        Turned(
+            centre=np.array([0, foot, 0]),
+            low=(pot_r * waist, pot_r * waist),
+            high=(pot_r, pot_r),
+            height=pot_h,
+            power=power,
+            material="ceramic",
+        )
+    )
+    parts.append(
+        Turned(
+            centre=np.array([0, foot + pot_h * 0.98, 0]),
+            low=(pot_r * 0.9, pot_r * 0.9),
+            high=(pot_r * 0.9, pot_r * 0.9),
+            height=pot_h * 0.04,
+            power=power,
+            material="soil",
+        )
+    )
     y0 = foot + pot_h
     kind = rng.choice(["tree", "blades", "leaves", "cactus"], p=[0.3, 0.28, 0.34, 0.08])
     grow = {"tree": _tree, "blades": _blades, "leaves": _leaves, "cactus": _cactus}[kind]
@@ -50,7 +68,12 @@ def _tree(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> 
 def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float) -> Ball:
     """A flat leaf that starts at `base`, points to `yaw` and rises by the angle `lift`."""
     turn = rotation(y=yaw) @ rotation(x=-lift)
-    return Ball(centre=base + turn @ np.array([0, 0, length / 2]), half=np.array([wide / 2, max(0.008, 0.05 * length), length / 2]), turn=turn, material="leaf")
+    return Ball(
+        centre=base + turn @ np.array([0, 0, length / 2]),
+        half=np.array([wide / 2, max(0.008, 0.05 * length), length / 2]),
+        turn=turn,
+        material="leaf",
+    )
 
 
 def _blades(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
@@ -80,38 +103,60 @@ def _leaves(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -
         tall = (h - y0) * (0.35 + 0.6 * i / count)
         spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.35, 0.6)
         end = np.array([0, y0 + tall, 0]) + spread
-        parts.append(Tube(points=np.array([[0, y0 - 0.02, 0], [spread[0] * 0.4, y0 + tall * 0.65, spread[2] * 0.4], end]), radius=0.01, material="leaf"))
+        parts.append(
+            Tube(
+                points=np.array([[0, y0 - 0.02, 0], [spread[0] * 0.4, y0 + tall * 0.65, spread[2] * 0.4], end]),
+                radius=0.01,
+                material="leaf",
+            )
+        )
         length = min(a, b) * rng.uniform(0.65, 0.95)
-        parts.append(_leaf(end - np.array([0, 0.02, 0]), yaw, rng.uniform(-0.5, 0.4), length, length * rng.uniform(0.55, 0.8)))
+        parts.append(
+            _leaf(end - np.array([0, 0.02, 0]), yaw, rng.uniform(-0.5, 0.4), length, length * rng.uniform(0.55, 0.8))
+        )
     return parts
 
 
 def _cactus(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
     """A column with bent arms."""
     r = min(a, b) * 0.26
-    parts: list[Solid] = [Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf"),
-                          Ball(centre=np.array([0, h - r, 0]), half=np.full(3, r), material="leaf")]  # fmt: skip
+    parts: list[Solid] = [
+        Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf"),
+        Ball(centre=np.array([0, h - r, 0]), half=np.full(3, r), material="leaf"),
+    ]
     for s in (-1, 1):
         y = y0 + (h - y0) * rng.uniform(0.3, 0.5)
         tip = y + (h - y0) * rng.uniform(0.2, 0.4)
         x = s * (a - r * 0.6)
-        parts.append(Tube(points=np.array([[0, y, 0], [x, y + r * 0.5, 0], [x, tip, 0]]), radius=r * 0.6, material="leaf"))
+        parts.append(
+            Tube(points=np.array([[0, y, 0], [x, y + r * 0.5, 0], [x, tip, 0]]), radius=r * 0.6, material="leaf")
+        )
     return parts
 
 
 def tv(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     """A flat screen with a bezel on two feet, a foot plate, or none."""
     w, h, d = size
-    kind = rng.choice(["feet", "plate", "wall"], p=[0.45, 0.35, 0.2])
+    kind = rng.choice(["feet", "plate", "wall"], p=[0.45, 0.35, 0.2]) if d < 0.1 else rng.choice(["feet", "plate"])
     low = 0.0 if kind == "wall" else h * 0.08
     t = min(d, 0.05) if kind != "wall" else d
-    parts: list[Solid] = [box((-w / 2, low, -t / 2), (w / 2, h, t / 2), "metal", min(0.008, t * 0.2)),
-                          box((-w / 2 + 0.015, low + 0.02, t * 0.3), (w / 2 - 0.015, h - 0.015, t / 2 + 0.002), "screen")]  # fmt: skip
+    parts: list[Solid] = [
+        box((-w / 2, low, -t / 2), (w / 2, h, t / 2), "metal", min(0.008, t * 0.2)),
+        box((-w / 2 + 0.015, low + 0.02, t * 0.3), (w / 2 - 0.015, h - 0.015, t / 2 + 0.002), "screen"),
+    ]
     if kind == "feet":
-        parts += [box((s * w * 0.36 - 0.015, 0, -d / 2), (s * w * 0.36 + 0.015, 0.015, d / 2), "metal") for s in (-1, 1)]
-        parts += [box((s * w * 0.36 - 0.012, 0, -t * 0.3), (s * w * 0.36 + 0.012, low + 0.02, t * 0.3), "metal") for s in (-1, 1)]
+        parts += [
+            box((s * w * 0.36 - 0.015, 0, -d / 2), (s * w * 0.36 + 0.015, 0.015, d / 2), "metal") for s in (-1, 1)
+        ]
+        parts += [
+            box((s * w * 0.36 - 0.012, 0, -t * 0.3), (s * w * 0.36 + 0.012, low + 0.02, t * 0.3), "metal")
+            for s in (-1, 1)
+        ]
     elif kind == "plate":
-        parts += [box((-w * 0.2, 0, -d / 2), (w * 0.2, 0.015, d / 2), "metal"), box((-w * 0.06, 0, -t * 0.4), (w * 0.06, low + 0.05, t * 0.4), "metal")]
+        parts += [
+            box((-w * 0.2, 0, -d / 2), (w * 0.2, 0.015, d / 2), "metal"),
+            box((-w * 0.06, 0, -t * 0.4), (w * 0.06, low + 0.05, t * 0.4), "metal"),
+        ]
     elif d > 0.07:
         parts.append(box((-w * 0.3, h * 0.25, -d / 2), (w * 0.3, h * 0.7, 0), "metal", 0.01))
     return parts

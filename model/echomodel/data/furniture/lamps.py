@@ -11,7 +11,9 @@ from echomodel.data.furniture.style import Style
 DOWN = rotation(x=np.pi)
 
 
-def _disc(x: float, y: float, z: float, a: float, b: float, h: float, material: str = "metal", high: float = 1.0) -> Turned:
+def _disc(
+    x: float, y: float, z: float, a: float, b: float, h: float, material: str = "metal", high: float = 1.0
+) -> Turned:
     """A disc or cone with its lower face at y: half widths a and b, `high` times that above."""
     return Turned(centre=np.array([x, y, z]), low=(a, b), high=(a * high, b * high), height=h, material=material)
 
@@ -21,10 +23,16 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     if kind == "sphere":
         return [Ball(centre=np.array([x, y + h / 2, z]), half=np.array([a, h / 2, b]), material="shade")]
     if kind == "dome":
-        steps = np.linspace(0, 1, 5)
-        width = np.sqrt(np.maximum(1 - steps**2, 0.02))
+        turn = np.linspace(0, np.pi / 2, 8)
+        steps, width = np.sin(turn), np.maximum(np.cos(turn), 0.04)
         return [
-            Turned(centre=np.array([x, y + h * s0, z]), low=(a * w0, b * w0), high=(a * w1, b * w1), height=h * (s1 - s0), material="shade")
+            Turned(
+                centre=np.array([x, y + h * s0, z]),
+                low=(a * w0, b * w0),
+                high=(a * w1, b * w1),
+                height=h * (s1 - s0),
+                material="shade",
+            )
             for s0, s1, w0, w1 in zip(steps[:-1], steps[1:], width[:-1], width[1:], strict=True)
         ]
     narrow = {"cone": 0.35 + 0.25 * style.taper, "drum": 0.85, "cylinder": 1.0}.get(kind, 0.9)
@@ -63,9 +71,16 @@ def _row(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     """Several shades under one bar."""
     w, h, d = size
     bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal")
-    if style.shade == "ring" or rng.random() < 0.3:
+    if d < 0.25 and (style.shade == "ring" or rng.random() < 0.3):
         beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01)
-        return [bar, beam, *[Tube(points=np.array([[s * w * 0.35, 0.05, 0], [s * w * 0.35, h, 0]]), radius=0.006, material="metal") for s in (-1, 1)]]
+        return [
+            bar,
+            beam,
+            *[
+                Tube(points=np.array([[s * w * 0.35, 0.05, 0], [s * w * 0.35, h, 0]]), radius=0.006, material="metal")
+                for s in (-1, 1)
+            ],
+        ]
     count = int(np.clip(round(w / max(d * 1.35, 0.16)), 2, 6))
     each = min(w / count * 0.46, d / 2)
     xs = np.linspace(-w / 2 + each, w / 2 - each, count)
@@ -86,16 +101,29 @@ def _chandelier(size: Size, style: Style, rng: np.random.Generator) -> list[Soli
     arms = int(rng.choice([5, 6, 8]))
     r = max(0.008, 0.012 * w)
     parts: list[Solid] = [Tube(points=np.array([[0, body * 0.1, 0], [0, h, 0]]), radius=r, material="metal")]
-    parts.append(Ball(centre=np.array([0, body * 0.22, 0]), half=np.array([w * 0.07, body * 0.14, d * 0.07]), material="metal"))
+    parts.append(
+        Ball(centre=np.array([0, body * 0.22, 0]), half=np.array([w * 0.07, body * 0.14, d * 0.07]), material="metal")
+    )
     cup = min(0.07, w * 0.11)
     for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
         c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
-        curve = np.array([[0, body * 0.3, 0], [c * 0.45, body * 0.06, s * 0.45], [c * 0.85, body * 0.14, s * 0.85], [c, body * 0.42, s]])
+        curve = np.array(
+            [
+                [0, body * 0.3, 0],
+                [c * 0.45, body * 0.06, s * 0.45],
+                [c * 0.85, body * 0.14, s * 0.85],
+                [c, body * 0.42, s],
+            ]
+        )
         parts.append(Tube(points=curve, radius=r * 0.9, material="metal"))
         if style.taper > 0.55:
             parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
         else:
-            parts.append(Ball(centre=np.array([c, body * 0.55, s]), half=np.array([cup * 0.85, cup, cup * 0.85]), material="shade"))
+            parts.append(
+                Ball(
+                    centre=np.array([c, body * 0.55, s]), half=np.array([cup * 0.85, cup, cup * 0.85]), material="shade"
+                )
+            )
     return parts
 
 
@@ -108,7 +136,9 @@ def _rings(size: Size, style: Style) -> list[Solid]:
     for i in range(count):
         share = 1 - 0.28 * i
         y = 0.02 + i * min(0.25, h * 0.22)
-        ring = np.stack([np.cos(angle) * (w / 2 - 0.02) * share, np.full(33, y), np.sin(angle) * (d / 2 - 0.02) * share], 1)
+        ring = np.stack(
+            [np.cos(angle) * (w / 2 - 0.02) * share, np.full(33, y), np.sin(angle) * (d / 2 - 0.02) * share], 1
+        )
         parts.append(Tube(points=ring, radius=0.02, material="shade"))
         for a in np.arange(3) * 2 * np.pi / 3:
             foot = [np.cos(a) * (w / 2 - 0.02) * share, y, np.sin(a) * (d / 2 - 0.02) * share]
@@ -132,14 +162,33 @@ def ceiling_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
                 parts.append(Tube(points=np.array([[0, h * 0.5, 0], [x, h * 0.45, z]]), radius=0.011, material="metal"))
                 parts += shade(_kind(style, "cylinder"), x, 0.0, z, r, r, h * 0.45, style)
             return parts
-        return [stem, _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03), *shade(_kind(style), 0, 0, 0, w / 2, d / 2, h * 0.55, style)]
-    if not alike or (style.profile == "square" and style.corner < 0.6):
-        rim = box((-w / 2, h * 0.35, -d / 2), (w / 2, h, d / 2), "metal", 0.0)
-        glow = box((-w * 0.46, 0, -d * 0.46), (w * 0.46, h * 0.6, d * 0.46), "shade", min(0.02, h * 0.15))
-        return [rim, glow]
-    if style.shade in ("sphere", "dome", "cone"):
-        bowl = Turned(centre=np.array([0, h * 0.8, 0]), low=(w / 2, d / 2), high=(w * 0.2, d * 0.2), height=h * 0.8, turn=DOWN, rounding=0.02,
-                      material="shade")  # fmt: skip
+        return [
+            stem,
+            _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03),
+            *shade(_kind(style), 0, 0, 0, w / 2, d / 2, h * 0.55, style),
+        ]
+    kind = str(rng.choice(["panel", "bowl", "drum", "ring"], p=[0.3, 0.3, 0.25, 0.15]))
+    if not alike or (style.profile == "square" and kind == "panel"):
+        glow = box((-w / 2, 0, -d / 2), (w / 2, h * 0.85, d / 2), "shade", min(0.03, h * 0.3) * style.softness)
+        return [glow, box((-w * 0.42, h * 0.6, -d * 0.42), (w * 0.42, h, d * 0.42), "metal")]
+    if kind == "ring":
+        angle, r = np.linspace(0, 2 * np.pi, 33), min(h * 0.3, w * 0.08)
+        circle = np.stack([np.cos(angle) * (w / 2 - r), np.full(33, r), np.sin(angle) * (d / 2 - r)], 1)
+        spokes = [
+            box((-w / 2 + r, r, -0.012), (w / 2 - r, r + 0.03, 0.012), "metal"),
+            box((-0.012, r, -d / 2 + r), (0.012, r + 0.03, d / 2 - r), "metal"),
+        ]
+        return [Tube(points=circle, radius=r, material="shade"), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
+    if kind == "bowl":
+        bowl = Turned(
+            centre=np.array([0, h * 0.8, 0]),
+            low=(w / 2, d / 2),
+            high=(w * 0.2, d * 0.2),
+            height=h * 0.8,
+            turn=DOWN,
+            rounding=0.02,
+            material="shade",
+        )
         return [bowl, _disc(0, h * 0.78, 0, w * 0.42, d * 0.42, h * 0.22)]
     drum = _disc(0, 0, 0, w / 2, d / 2, h * 0.85, "shade")
     if style.tufting > 0.5:
@@ -155,12 +204,23 @@ def floor_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
         head = min(d * 0.5, w * 0.2, 0.22)
         x0, x1 = -w / 2 + min(0.15, d * 0.45), w / 2 - head
         t = np.linspace(0, 1, 13)
-        sweep = np.stack([x0 + (x1 - x0) * t, 0.03 + (h - 0.03) * np.sin(np.pi * (0.5 * t**0.6 + 0.12 * t)) / np.sin(np.pi * 0.5), 0 * t], 1)
+        sweep = np.stack(
+            [
+                x0 + (x1 - x0) * t,
+                0.03 + (h - 0.03) * np.sin(np.pi * (0.5 * t**0.6 + 0.12 * t)) / np.sin(np.pi * 0.5),
+                0 * t,
+            ],
+            1,
+        )
         sweep[:, 1] = np.minimum(sweep[:, 1], h)
         end = sweep[-1, 1]
         tall = min(0.3, head * 1.3)
         foot = _disc(x0, 0, 0, min(0.15, d * 0.45), min(0.15, d / 2), 0.03)
-        return [foot, Tube(points=sweep, radius=r, material="metal"), *shade(_kind(style, "cylinder"), x1, end - tall, 0, head, min(head, d / 2), tall, style)]
+        return [
+            foot,
+            Tube(points=sweep, radius=r, material="metal"),
+            *shade(_kind(style, "cylinder"), x1, end - tall, 0, head, min(head, d / 2), tall, style),
+        ]
     tall = h * (0.16 + 0.12 * style.taper)
     a, b = w / 2, d / 2
     kind = _kind(style)
@@ -168,8 +228,8 @@ def floor_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     if style.legs in ("splayed", "trestle", "tapered") and rng.random() < 0.6:
         hub = (h - tall) * 0.93
         for angle in np.arange(3) * 2 * np.pi / 3 + np.pi / 2:
-            foot = [a * 0.95 * np.cos(angle), r, b * 0.95 * np.sin(angle)]
-            parts.append(Tube(points=np.array([foot, [0, hub, 0]]), radius=r * 1.3))
+            toe = [a * 0.95 * np.cos(angle), r, b * 0.95 * np.sin(angle)]
+            parts.append(Tube(points=np.array([toe, [0, hub, 0]]), radius=r * 1.3))
         return [*parts, Tube(points=np.array([[0, hub, 0], [0, h - tall * 0.5, 0]]), radius=r, material="metal")]
     parts.append(_disc(0, 0, 0, min(0.15, a * 0.8), min(0.15, b * 0.8), 0.025))
     pole = Tube(points=np.array([[0, 0, 0], [0, h - tall * 0.5, 0]]), radius=r, material="metal")
@@ -185,22 +245,39 @@ def table_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     if style.family == "industrial" and rng.random() < 0.6:
         r = 0.008
         arm = np.array([[0, 0.02, -b * 0.6], [0, h * 0.6, -b * 0.8], [0, h * 0.95, b * 0.3]])
-        return [_disc(0, 0, -b * 0.5, a * 0.7, b * 0.5, 0.02), Tube(points=arm, radius=r, material="metal"), *shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style)]
+        return [
+            _disc(0, 0, -b * 0.5, a * 0.7, b * 0.5, 0.02),
+            Tube(points=arm, radius=r, material="metal"),
+            *shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style),
+        ]
     tall = h * (0.36 + 0.12 * style.taper)
     kind = _kind(style)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
     stem = h - tall
     body = rng.choice(["vase", "column", "balls", "cone"])
     if body == "vase":
-        parts += [Ball(centre=np.array([0, stem * 0.42, 0]), half=np.array([a * 0.5, stem * 0.42, b * 0.5]), power=2.3, material="ceramic"),
-                  _disc(0, 0, 0, a * 0.3, b * 0.3, stem * 0.1, "ceramic")]  # fmt: skip
+        parts += [
+            Ball(
+                centre=np.array([0, stem * 0.42, 0]),
+                half=np.array([a * 0.5, stem * 0.42, b * 0.5]),
+                power=2.3,
+                material="ceramic",
+            ),
+            _disc(0, 0, 0, a * 0.3, b * 0.3, stem * 0.1, "ceramic"),
+        ]
     elif body == "balls":
-        parts += [Ball(centre=np.array([0, stem * y, 0]), half=np.array([a * s, stem * 0.2, b * s]), material="ceramic") for y, s in ((0.22, 0.42), (0.55, 0.32), (0.82, 0.22))]
+        parts += [
+            Ball(centre=np.array([0, stem * y, 0]), half=np.array([a * s, stem * 0.2, b * s]), material="ceramic")
+            for y, s in ((0.22, 0.42), (0.55, 0.32), (0.82, 0.22))
+        ]
         parts.append(_disc(0, 0, 0, a * 0.4, b * 0.4, stem * 0.08))
     elif body == "cone":
         parts.append(_disc(0, 0, 0, a * 0.5, b * 0.5, stem, "ceramic", 0.2))
     else:
-        parts += [_disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)), _disc(0, 0, 0, a * 0.12, b * 0.12, stem, "metal")]
+        parts += [
+            _disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)),
+            _disc(0, 0, 0, a * 0.12, b * 0.12, stem, "metal"),
+        ]
     parts.append(Tube(points=np.array([[0, stem * 0.7, 0], [0, stem + tall * 0.4, 0]]), radius=0.012, material="metal"))
     return parts
 
@@ -211,12 +288,33 @@ def wall_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]
     plate = box((-min(w, h) * 0.18, h * 0.3, -d / 2), (min(w, h) * 0.18, h * 0.7, -d / 2 + 0.02), "metal")
     if w > h * 1.1:
         r = min(w * 0.22, d * 0.4)
-        bar = Tube(points=np.array([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]]), radius=0.01, material="metal")
-        arm = Tube(points=np.array([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]]), radius=0.01, material="metal")
-        return [plate, bar, arm, *[p for s in (-1, 1) for p in shade(_kind(style), s * (w / 2 - r), h * 0.3, d / 2 - r, r, r, h * 0.7, style)]]
+        bar = Tube(
+            points=np.array([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]]),
+            radius=0.01,
+            material="metal",
+        )
+        arm = Tube(
+            points=np.array([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]]), radius=0.01, material="metal"
+        )
+        return [
+            plate,
+            bar,
+            arm,
+            *[
+                p
+                for s in (-1, 1)
+                for p in shade(_kind(style), s * (w / 2 - r), h * 0.3, d / 2 - r, r, r, h * 0.7, style)
+            ],
+        ]
     if rng.random() < 0.3:
-        body = Turned(centre=np.array([0, 0, d * 0.1]), low=(w / 2, d * 0.4), high=(w / 2, d * 0.4), height=h, material="shade")
+        body = Turned(
+            centre=np.array([0, 0, d * 0.1]), low=(w / 2, d * 0.4), high=(w / 2, d * 0.4), height=h, material="shade"
+        )
         return [body, box((-w * 0.2, h * 0.2, -d / 2), (w * 0.2, h * 0.8, d * 0.1), "metal")]
     b = d * 0.36
-    arm = np.array([[0, h * 0.45, -d / 2 + 0.01], [0, h * 0.3, 0], [0, h * 0.4, d / 2 - b], [0, h * 0.6, d / 2 - b]])
-    return [plate, Tube(points=arm, radius=0.009, material="metal"), *shade(_kind(style), 0, h * 0.45, d / 2 - b, w / 2, b, h * 0.55, style)]
+    bend = np.array([[0, h * 0.45, -d / 2 + 0.01], [0, h * 0.3, 0], [0, h * 0.4, d / 2 - b], [0, h * 0.6, d / 2 - b]])
+    return [
+        plate,
+        Tube(points=bend, radius=0.009, material="metal"),
+        *shade(_kind(style), 0, h * 0.45, d / 2 - b, w / 2, b, h * 0.55, style),
+    ]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
+from echomodel.data.furniture.armchairs import upholstered_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
-from echomodel.data.furniture.seats import upholstered_arms
 from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
@@ -23,11 +24,13 @@ def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
     return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
 
 
-def _cushions(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style) -> list[Solid]:
+def _cushions(
+    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style
+) -> list[Solid]:
     """A row of cushions from x0 to x1."""
     edges = np.linspace(x0, x1, count + 1)
     gap = 0.004
-    return [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
 
 
 def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, style: Style) -> list[Solid]:
@@ -36,7 +39,7 @@ def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, st
     thick = 0.12 + 0.08 * style.softness
     turn = rotation(x=-0.12 - 0.3 * style.rake)
     parts = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         low = (a + 0.004, y0, z0 - thick * 0.2)
         parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn))
     return parts
@@ -57,10 +60,17 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
-    parts.append(box((-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015), "fabric", 0.015))
+    parts.append(
+        box((-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015), "fabric", 0.015)
+    )
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     lean = rotation(x=-0.5 * style.rake)
-    backrest = box((-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame), "fabric", 0.02 + 0.05 * style.softness)
+    backrest = box(
+        (-w / 2 + arm * 0.4, foot + 0.02, z0),
+        (w / 2 - arm * 0.4, tall, z0 + frame),
+        "fabric",
+        0.02 + 0.05 * style.softness,
+    )
     pivot = np.array([0, seat, z0 + frame / 2])
     parts.append(replace(backrest, centre=lean @ (backrest.centre - pivot) + pivot, turn=lean))
     if style.arms == "slim":
@@ -81,18 +91,26 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
         parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015))
         parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
         t = 0.05 * style.bulk
-        parts += [box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t)) for x in (x0 + 0.08, x1 - 0.08)]
+        parts += [
+            box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t)) for x in (x0 + 0.08, x1 - 0.08)
+        ]
     if style.tufting > 0.75:
         parts += _throw_pillows(inner, seat, h, z0 + frame + 0.14, style)
     return parts
 
 
 def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) -> list[Solid]:
-    a = min(0.22, (h - seat) * 0.55)
+    a = min(0.22, (h - seat) * 0.5, inner * 0.32)
     turn = rotation(x=-0.35)
     sides = (-1, 1) if style.contrast > 0.4 else (1,)
     return [
-        Ball(centre=np.array([s * (inner - a * 1.05), seat + a * 0.85, z + 0.06]), half=np.array([a, a, 0.07]), power=2.8, turn=turn, material="accent")
+        Ball(
+            centre=np.array([s * (inner - a * 1.05), seat + a * 0.85, z + 0.06]),
+            half=np.array([a, a, 0.07]),
+            power=2.8,
+            turn=turn,
+            material="accent",
+        )
         for s in sides
     ]
 
@@ -123,13 +141,31 @@ def _curved(size: Size, style: Style) -> list[Solid]:
     foot, wall = _foot(style), 0.13
     seat = min(0.43, h * 0.58)
     parts: list[Solid] = _legs(style, w * 0.8, d * 0.9, foot)
-    parts.append(Shell(centre=np.array([0, foot, d * 0.4]), half=(w / 2, d * 0.9), thickness=wall, back=h - foot,
-                       front=(h - foot) * (0.55 + 0.3 * style.arm_height), power=2.6 + 2 * style.corner, ease=3, material="fabric"))  # fmt: skip
-    body = {"centre": np.array([0, foot, 0.02]), "material": "fabric"}
-    parts.append(Turned(low=(w / 2 - wall * 0.6, d * 0.46), high=(w / 2 - wall * 0.6, d * 0.46), height=(seat - foot) * 0.6, power=3.5, **body))
+    parts.append(
+        Shell(
+            centre=np.array([0, foot, d * 0.4]),
+            half=(w / 2, d * 0.9),
+            thickness=wall,
+            back=h - foot,
+            front=(h - foot) * (0.55 + 0.3 * style.arm_height),
+            power=2.6 + 2 * style.corner,
+            ease=3,
+            material="fabric",
+        )
+    )
+    parts.append(
+        Turned(
+            low=(w / 2 - wall * 0.6, d * 0.46),
+            high=(w / 2 - wall * 0.6, d * 0.46),
+            height=(seat - foot) * 0.6,
+            power=3.5,
+            centre=np.array([0, foot, 0.02]),
+            material="fabric",
+        )
+    )
     pads = 2 if style.tufting > 0.4 else 1
     edges = np.linspace(-w / 2 + wall, w / 2 - wall, pads + 1)
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         parts.append(cushion((a, foot + (seat - foot) * 0.55, -d * 0.38), (b, seat, d / 2), style))
     return parts
 
@@ -149,8 +185,15 @@ def l_shaped_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[So
         inner = side * (w / 2 - frame - 0.07)
         z0, z1 = d * 0.05, -d / 2 + depth - 0.12
         tilt = rotation(z=-side * 0.15)
-        parts.append(Block(centre=np.array([inner, (seat + y1) / 2, (z0 + z1) / 2]), half=np.array([0.075, (y1 - seat) / 2, (z1 - z0) / 2]),
-                           radius=0.05, turn=tilt, material="fabric"))  # fmt: skip
+        parts.append(
+            Block(
+                centre=np.array([inner, (seat + y1) / 2, (z0 + z1) / 2]),
+                half=np.array([0.075, (y1 - seat) / 2, (z1 - z0) / 2]),
+                radius=0.05,
+                turn=tilt,
+                material="fabric",
+            )
+        )
     return parts
 
 
@@ -172,8 +215,17 @@ def chaise_longue_sofa(size: Size, style: Style, rng: np.random.Generator) -> li
         reach = -d / 2 + d * rng.uniform(0.35, 0.6)
         parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style))
     if style.arms == "rolled":
-        parts.append(Turned(centre=np.array([-w * 0.46, seat + 0.09, -d / 2 + 0.28]), low=(0.09, 0.09), high=(0.09, 0.09), height=w * 0.92,
-                            turn=rotation(z=-np.pi / 2), rounding=0.02, material="accent"))  # fmt: skip
+        parts.append(
+            Turned(
+                centre=np.array([-w * 0.46, seat + 0.09, -d / 2 + 0.28]),
+                low=(0.09, 0.09),
+                high=(0.09, 0.09),
+                height=w * 0.92,
+                turn=rotation(z=-np.pi / 2),
+                rounding=0.02,
+                material="accent",
+            )
+        )
     return parts
 
 
@@ -183,13 +235,33 @@ def lazy_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]
     kind = rng.choice(["pear", "lounger", "folded"])
     if kind == "pear":
         return [
-            Ball(centre=np.array([0, h * 0.3, 0.02]), half=np.array([w / 2, h * 0.3, d / 2]), power=2.5, material="fabric"),
-            Ball(centre=np.array([0, h * 0.58, -d * 0.1]), half=np.array([w * 0.36, h * 0.4, d * 0.33]), material="fabric"),
+            Ball(
+                centre=np.array([0, h * 0.3, 0.02]),
+                half=np.array([w / 2, h * 0.3, d / 2]),
+                power=2.5,
+                material="fabric",
+            ),
+            Ball(
+                centre=np.array([0, h * 0.58, -d * 0.1]),
+                half=np.array([w * 0.36, h * 0.4, d * 0.33]),
+                material="fabric",
+            ),
         ]
     if kind == "lounger":
         return [
-            Ball(centre=np.array([0, h * 0.27, d * 0.05]), half=np.array([w / 2, h * 0.27, d * 0.46]), power=2.8, material="fabric"),
-            Ball(centre=np.array([0, h * 0.55, -d * 0.27]), half=np.array([w * 0.46, h * 0.46, d * 0.2]), power=2.6, turn=rotation(x=-0.25), material="fabric"),
+            Ball(
+                centre=np.array([0, h * 0.27, d * 0.05]),
+                half=np.array([w / 2, h * 0.27, d * 0.46]),
+                power=2.8,
+                material="fabric",
+            ),
+            Ball(
+                centre=np.array([0, h * 0.55, -d * 0.27]),
+                half=np.array([w * 0.46, h * 0.46, d * 0.2]),
+                power=2.6,
+                turn=rotation(x=-0.25),
+                material="fabric",
+            ),
         ]
     turn = rotation(x=-0.2 - style.rake)
     return [

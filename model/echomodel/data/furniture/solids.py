@@ -36,7 +36,7 @@ def upright(bottom: Array, top: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A closed solid placed by `centre` (3,) and `turn` (3, 3) in the object's frame, metres; `material` names its look."""
+    """A closed solid placed by `centre` (3,) and `turn` (3, 3) in the object's frame; `material` names its look."""
 
     centre: Array = field(default_factory=lambda: np.zeros(3))
     turn: Array = field(default_factory=lambda: IDENTITY)
@@ -211,14 +211,21 @@ class Tube(Solid):
     radius: float = 0.01
 
     def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
-        nearest = None
-        for a, b in zip(self.points[:-1], self.points[1:], strict=True):
-            d = b - a
-            t = np.clip(((x - a[0]) * d[0] + (y - a[1]) * d[1] + (z - a[2]) * d[2]) / max(d @ d, 1e-12), 0, 1)
+        nearest: Array = np.array(np.inf)
+        last = len(self.points) - 2
+        for i in range(last + 1):
+            a, d = self.points[i], self.points[i + 1] - self.points[i]
+            projected = (x - a[0]) * d[0] + (y - a[1]) * d[1] + (z - a[2]) * d[2]
+            t = np.clip(projected / max(d @ d, 1e-12), 0, 1)
             off = x - a[0] - t * d[0], y - a[1] - t * d[1], z - a[2] - t * d[2]
             length = np.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2 + 1e-12)
             found = (length - self.radius) * length / gradient_length(metric, *off)
-            nearest = found if nearest is None else np.minimum(nearest, found)
+            voxels = gradient_length(metric, *d)  # of the step d; the ends are flat, not round
+            if i == 0:
+                found = np.maximum(found, -projected / voxels)
+            if i == last:
+                found = np.maximum(found, (projected - d @ d) / voxels)
+            nearest = np.minimum(nearest, found)
         return nearest
 
     def local_mesh(self) -> tuple[Array, Array]:
@@ -240,9 +247,9 @@ class Tube(Solid):
 
 @dataclass(frozen=True, eq=False)
 class Shell(Solid):
-    """A standing wall bent round the back: half a superellipse of half width `half[0]` and depth `half[1]` behind z = 0.
+    """A standing wall bent round the back: half a superellipse, `half` = half width and depth behind z = 0, metres.
 
-    It is `thickness` thick, rises from y = 0 to `back` in the middle and falls to `front` at its two ends; `ease` above 1
+    It is `thickness` thick, rises from y = 0 to `back` in the middle and falls to `front` at its ends; `ease` above 1
     keeps the back high for longer.
     """
 
@@ -251,7 +258,7 @@ class Shell(Solid):
     back: float = 0.8
     front: float = 0.6
     power: float = 2.5
-    ease: float = 2.0
+    ease: float = 3.0
 
     def _top(self, angle: Array) -> Array:
         return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
@@ -277,8 +284,14 @@ class Shell(Solid):
         top, rings = self._top(angle), []
         for i in range(len(angle)):
             outer = np.array([s[i] * self.half[0], -c[i] * self.half[1]]) / norm[i]
-            inner = np.array([s[i] * (self.half[0] - self.thickness), -c[i] * (self.half[1] - self.thickness)]) / norm[i]
-            rings.append(np.array([[p[0], h, p[1]] for p, h in zip((inner, outer, outer, inner), (0, 0, top[i], top[i]))]))
+            inner = (
+                np.array([s[i] * (self.half[0] - self.thickness), -c[i] * (self.half[1] - self.thickness)]) / norm[i]
+            )
+            rings.append(
+                np.array(
+                    [[p[0], h, p[1]] for p, h in zip((inner, outer, outer, inner), (0, 0, top[i], top[i]), strict=True)]
+                )
+            )
         return loft(rings)
 
     def inradius(self, scale: Array) -> float:
@@ -318,7 +331,8 @@ def _cube_surface(cells: int) -> tuple[Array, Array]:
         index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
         a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
         quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-        points, faces = [], []
+        points: list[Array] = []
+        faces: list[Array] = []
         for axis in range(3):
             for side in (-1.0, 1.0):
                 face = np.empty((len(u), 3))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, front, pedestal, top
+from echomodel.data.furniture.carpentry import Size, base, box, front, pedestal, top, within
 from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
@@ -27,7 +27,7 @@ def dining_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     shape, thick = _outline(style, size, rng), max(style.top * 1.1, 0.022)
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if shape == "round":
-        inner = 0.7 if style.legs not in ("splayed", "hairpin") else 0.86
+        inner = 0.71 if style.legs not in ("splayed", "hairpin") else 0.86
         if w / d < 1.3 and rng.random() < 0.65:
             return parts + pedestal(w, d, h - thick, style)
         kind = None if style.legs not in ("plinth", "bun", "trestle", "sled") else "straight"
@@ -37,12 +37,13 @@ def dining_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
         x, z = w / 2 * 0.72, d / 2 * 0.75
         return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z)) for s in (-1, 1)]
     kind = "straight" if style.legs in ("plinth", "bun") else None
-    over = 2 * style.overhang
     leg = _leg(style, w, h)
-    parts += base(style, w - over, d - over, h - thick, leg, kind)
+    share = within(shape, style)
+    fw, fd = w * share - 1.5 * style.overhang, d * share - 1.5 * style.overhang
+    parts += base(style, fw, fd, h - thick, leg, kind)
     if style.legs in ("straight", "tapered", "turned", "bun") and style.contrast < 0.7:
         a = 0.04 + 0.05 * style.contrast
-        x, z = w / 2 - style.overhang - leg * 0.6, d / 2 - style.overhang - leg * 0.6
+        x, z = fw / 2 - leg * 0.6, fd / 2 - leg * 0.6
         parts += [box((-x, h - thick - a, s * z - 0.01), (x, h - thick, s * z + 0.01)) for s in (-1, 1)]
         parts += [box((s * x - 0.01, h - thick - a, -z), (s * x + 0.01, h - thick, z)) for s in (-1, 1)]
     return parts
@@ -54,26 +55,47 @@ def coffee_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     shape, thick = _outline(style, size, rng), max(style.top, 0.025)
     kind = rng.choice(["legs", "shelf", "block", "drum", "nested"], p=[0.36, 0.24, 0.2, 0.12, 0.08])
     if kind == "drum" and shape == "round":
-        body = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
-        return [top(shape, w, d, h, thick, style), body]
+        drum = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
+        return [top(shape, w, d, h, thick, style), drum]
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
         body = box((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
-        drawers = front((-w / 2 * 0.9, foot + 0.02), (w / 2 * 0.9, h - thick - 0.02), d / 2 * 0.95, 1,
-                        int(rng.integers(1, 3)), "drawer", style)  # fmt: skip
-        return [top(shape, w, d, h, thick, style), body, *drawers, *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth")]
+        drawers = front(
+            (-w / 2 * 0.9, foot + 0.02),
+            (w / 2 * 0.9, h - thick - 0.02),
+            d / 2 * 0.95,
+            1,
+            int(rng.integers(1, 3)),
+            "drawer",
+            style,
+        )
+        return [
+            top(shape, w, d, h, thick, style),
+            body,
+            *drawers,
+            *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
+        ]
     if kind == "nested" and w > 0.7:
-        low_top = Turned(centre=np.array([w * 0.28, h * 0.62, d * 0.1]), low=(w * 0.22, w * 0.22),
-                         high=(w * 0.22, w * 0.22), height=thick, material="accent")  # fmt: skip
-        post = Turned(centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62)
-        main = Turned(centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2),
-                      height=thick)  # fmt: skip
-        stem = Turned(centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08),
-                      height=h - thick)  # fmt: skip
+        low_top = Turned(
+            centre=np.array([w * 0.28, h * 0.62, d * 0.1]),
+            low=(w * 0.22, w * 0.22),
+            high=(w * 0.22, w * 0.22),
+            height=thick,
+            material="accent",
+        )
+        post = Turned(
+            centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62
+        )
+        main = Turned(
+            centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2), height=thick
+        )
+        stem = Turned(
+            centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08), height=h - thick
+        )
         return [main, stem, low_top, post]
     parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
-    inner = 0.72 if shape == "round" else 0.94
+    inner = within(shape, style)
     parts += base(style, w * inner, d * inner, h - thick, _leg(style, w * 0.7, h), legs)
     if kind == "shelf":
         parts.append(top(shape, w * inner * 0.92, d * inner * 0.92, h * 0.4, thick * 0.7, style, "accent"))
@@ -91,8 +113,13 @@ def side_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     if kind == "drum" and shape == "round":
         waist = 0.3 + 0.16 * style.taper
         lower = Turned(low=(w * 0.42, d * 0.42), high=(w * waist, d * waist), height=h / 2, material="accent")
-        upper = Turned(centre=np.array([0, h / 2, 0]), low=(w * waist, d * waist), high=(w * 0.45, d * 0.45),
-                       height=h / 2 - thick, material="accent")  # fmt: skip
+        upper = Turned(
+            centre=np.array([0, h / 2, 0]),
+            low=(w * waist, d * waist),
+            high=(w * 0.45, d * 0.45),
+            height=h / 2 - thick,
+            material="accent",
+        )
         return [*parts, lower, upper]
     if kind == "cube" and shape != "round":
         t = 0.02
@@ -106,11 +133,16 @@ def side_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
         ]
     if kind == "c" and shape != "round":
         t = 0.014
-        bars = [box((-w / 2 * 0.9, 0, s * d * 0.4 - t), (w / 2 * 0.9, 2 * t, s * d * 0.4 + t), "metal") for s in (-1, 1)]
-        posts = [box((-w / 2 * 0.9 - t, 0, s * d * 0.4 - t), (-w / 2 * 0.9 + t, h, s * d * 0.4 + t), "metal") for s in (-1, 1)]
+        bars = [
+            box((-w / 2 * 0.9, 0, s * d * 0.4 - t), (w / 2 * 0.9, 2 * t, s * d * 0.4 + t), "metal") for s in (-1, 1)
+        ]
+        posts = [
+            box((-w / 2 * 0.9 - t, 0, s * d * 0.4 - t), (-w / 2 * 0.9 + t, h, s * d * 0.4 + t), "metal")
+            for s in (-1, 1)
+        ]
         return [*parts, *bars, *posts]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
-    inner = 0.72 if shape == "round" else 0.94
+    inner = within(shape, style)
     parts += base(style, w * inner, d * inner, h - thick, _leg(style, w * 0.6, h) * 0.8, legs)
     if rng.random() < 0.4:
         parts.append(top(shape, w * inner * 0.9, d * inner * 0.9, h * 0.35, thick, style, "accent"))
@@ -126,7 +158,10 @@ def round_end_table(size: Size, style: Style, rng: np.random.Generator) -> list[
     if kind == "pedestal":
         return parts + pedestal(w, d, h - thick, style)
     if kind == "drum":
-        return [*parts, Turned(low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent")]
+        return [
+            *parts,
+            Turned(low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent"),
+        ]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
     parts += base(style, w * 0.74, d * 0.74, h - thick, 0.035 * style.bulk, legs)
     if rng.random() < 0.5:
@@ -141,12 +176,14 @@ def corner_side_table(size: Size, style: Style, rng: np.random.Generator) -> lis
     shape = "corners" if style.corner > 0.5 else "square"
     parts: list[Solid] = [top(shape, w, d, h, t, style)]
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
-    parts += base(style, w * 0.95, d * 0.95, h - t, 0.035 * style.bulk, legs)
-    parts.append(top("square", w * 0.88, d * 0.88, h * 0.28, t, style, "accent"))
+    share = within(shape, style)
+    parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
+    parts.append(top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent"))
     if rng.random() < 0.6:
-        drawer = (-w * 0.43, h * 0.68), (w * 0.43, h - t)
-        parts.append(box((*drawer[0], -d * 0.43), (*drawer[1], d * 0.43)))
-        parts += front(*drawer, d * 0.43, 1, 1, "drawer", style)
+        edge, rear = w * share * 0.47, d * share * 0.47
+        drawer = (-edge, h * 0.68), (edge, h - t)
+        parts.append(box((*drawer[0], -rear), (*drawer[1], rear)))
+        parts += front(*drawer, rear, 1, 1, "drawer", style)
     return parts
 
 
@@ -154,7 +191,9 @@ def console_table(size: Size, style: Style, rng: np.random.Generator) -> list[So
     """Narrow against a wall: legs with or without drawers below the top, perhaps a shelf near the floor."""
     w, h, d = size
     t = max(style.top, 0.02)
-    parts: list[Solid] = [top("corners" if style.corner > 0.7 else "square", w, d, h, t, style)]
+    shape = "corners" if style.corner > 0.7 else "square"
+    parts: list[Solid] = [top(shape, w, d, h, t, style)]
+    w, d = w * within(shape, style), d * within(shape, style)
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
     if rng.random() < 0.55:
@@ -172,7 +211,10 @@ def desk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     hutch = h > 1.05
     desk_height = 0.75 if hutch else h
     t = max(style.top, 0.022)
-    parts: list[Solid] = [top("square" if hutch or style.corner < 0.6 else "corners", w, d, desk_height, t, style)]
+    shape = "square" if hutch or style.corner < 0.6 else "corners"
+    parts: list[Solid] = [top(shape, w, d, desk_height, t, style)]
+    if shape == "corners":
+        w, d = w * within(shape, style), d * within(shape, style)
     kind = rng.choice(["legs", "left", "both", "shallow"], p=[0.25, 0.35, 0.2, 0.2])
     unit = min(0.42, w * 0.3)
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
@@ -185,8 +227,11 @@ def desk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
             parts.append(box((x0, foot, -d * 0.46), (x1, y1, d * 0.46)))
             parts += front((x0, foot), (x1, y1), d * 0.46, int(rng.integers(2, 4)), 1, "drawer", style)
             if foot > 0.05:
-                parts += [box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
-                          for x in (x0 + 0.04, x1 - 0.04) for z in (-d * 0.42, d * 0.42)]  # fmt: skip
+                parts += [
+                    box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
+                    for x in (x0 + 0.04, x1 - 0.04)
+                    for z in (-d * 0.42, d * 0.42)
+                ]
         if kind == "left":
             x = -sides[0] * w * 0.47
             parts += [box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025)) for s in (-1, 1)]
@@ -218,7 +263,9 @@ def dressing_table(size: Size, style: Style, rng: np.random.Generator) -> list[S
     mirror = h > 0.95
     table = min(0.76, h * 0.6) if mirror else h
     t = max(style.top * 0.9, 0.02)
-    parts: list[Solid] = [top("corners" if style.corner > 0.5 else "square", w, d, table, t, style)]
+    shape = "corners" if style.corner > 0.5 else "square"
+    parts: list[Solid] = [top(shape, w, d, table, t, style)]
+    w, d = w * within(shape, style), d * within(shape, style)
     legs = "tapered" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1, low = table - t, table - t - 0.14
     if rng.random() < 0.5:
@@ -244,20 +291,35 @@ def _mirror(w: float, low: float, high: float, d: float, style: Style, rng: np.r
     foot = box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02))
     if kind == "round":
         half = min(w * 0.4, tall * 0.46)
-        face = {"height": 0.03, "turn": rotation(x=np.pi / 2), "centre": np.array([0, high - tall * 0.46, z - 0.015])}
-        return [foot, Turned(low=(half, tall * 0.46), high=(half, tall * 0.46), material="glass", **face)]
+        face = Turned(
+            centre=np.array([0, high - tall * 0.46, z - 0.015]),
+            low=(half, tall * 0.46),
+            high=(half, tall * 0.46),
+            height=0.03,
+            turn=rotation(x=np.pi / 2),
+            material="glass",
+        )
+        return [foot, face]
     half = w * rng.uniform(0.28, 0.42)
     radius = 0.012
-    panel = Block(centre=np.array([0, (low + high) / 2, z]), half=np.array([half, tall / 2, 0.015]), radius=radius,
-                  material="glass")  # fmt: skip
+    panel = Block(
+        centre=np.array([0, (low + high) / 2, z]),
+        half=np.array([half, tall / 2, 0.015]),
+        radius=radius,
+        material="glass",
+    )
     if kind == "panel":
         return [foot, panel]
     wing = min(0.22, w / 2 - half * 0.6)
     half *= 0.6
     wings = [
-        Block(centre=np.array([s * (half + wing * 0.47), low + tall * 0.46, z + wing * 0.16]),
-              half=np.array([wing / 2, tall * 0.46, 0.012]), turn=rotation(y=-s * 0.35), material="glass")
+        Block(
+            centre=np.array([s * (half + wing * 0.47), low + tall * 0.46, z + wing * 0.16]),
+            half=np.array([wing / 2, tall * 0.46, 0.012]),
+            turn=rotation(y=-s * 0.35),
+            material="glass",
+        )
         for s in (-1, 1)
-    ]  # fmt: skip
+    ]
     knob = Ball(centre=np.array([0, high - 0.02, z]), half=np.full(3, 0.02))
     return [box((-half, low, z - 0.012), (half, high - 0.02, z + 0.012), "glass"), *wings, knob]

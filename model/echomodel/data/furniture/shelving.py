@@ -1,0 +1,137 @@
+"""Open storage: bookshelves, shelves and wine cabinets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from echomodel.data.furniture.carpentry import Size, base, box, front
+from echomodel.data.furniture.cases import BOARD, carcass, foot_height, shelves
+from echomodel.data.furniture.solids import Solid, rotation
+from echomodel.data.furniture.style import Style
+
+
+def bookshelf(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+    """Open rows and columns with a back or without, some cells closed, some books; or a ladder of boards."""
+    w, h, d = size
+    rows, columns = max(1, round(h / rng.uniform(0.3, 0.42))), max(1, round(w / rng.uniform(0.4, 0.8)))
+    if style.family == "industrial" and rng.random() < 0.6:
+        return _rack(size, rows, columns)
+    foot = min(0.08, style.leg_height) if rng.random() < 0.5 else 0.02
+    parts, rect = carcass(
+        size, style, foot, kind="plinth" if foot < 0.04 else None, solid=False, back=rng.random() < 0.8
+    )
+    parts += shelves(rect, d, -d / 2, rows, columns, style)
+    x0, y0, x1, y1, z = rect
+    xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+    if rows > 2 and rng.random() < 0.4:
+        parts.append(box((x0, y0, -d / 2), (x1, float(ys[1]), z)))
+        parts += front((x0, y0), (x1, float(ys[1])), z, 1, max(1, columns), "door", style)
+    for i in range(columns):
+        for j in range(1, rows):
+            if rng.random() < 0.4:
+                parts += _books(
+                    float(xs[i]) + 0.02, float(xs[i + 1]) - 0.02, float(ys[j]) + 0.01, float(ys[j + 1]), d, rng
+                )
+    return parts
+
+
+def _books(x0: float, x1: float, y0: float, y1: float, d: float, rng: np.random.Generator) -> list[Solid]:
+    room = x1 - x0
+    count = int(np.clip(room / 0.12, 1, 4))
+    x = x0
+    parts: list[Solid] = []
+    for _ in range(count):
+        wide = room / count * rng.uniform(0.55, 0.95)
+        tall = (y1 - y0) * rng.uniform(0.55, 0.85)
+        parts.append(box((x, y0, -d / 2 + 0.02), (x + wide, y0 + tall, d / 2 * rng.uniform(0.2, 0.7)), "fabric"))
+        x += wide
+        if rng.random() < 0.3:
+            break
+    return parts
+
+
+def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
+    """Metal uprights and wooden boards without a back."""
+    w, h, d = size
+    t = 0.014
+    xs = np.linspace(-w / 2 + t, w / 2 - t, min(columns, 3) + 1)
+    parts: list[Solid] = [
+        box((x - t, 0, s * (d / 2 - t) - t), (x + t, h, s * (d / 2 - t) + t), "metal") for x in xs for s in (-1, 1)
+    ]
+    ys = np.linspace(0.12, h - 0.02, rows + 1)
+    return parts + [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
+
+
+def shelf(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+    """Lighter than a bookshelf: boards on uprights, a ladder, or boards round one post."""
+    w, h, d = size
+    rows = max(1, round(h / rng.uniform(0.3, 0.45)))
+    kind = rng.choice(["rack", "boards", "ladder", "steps"])
+    if kind == "rack" or style.family == "industrial":
+        return _rack(size, rows, max(1, round(w / 0.9)))
+    t = BOARD * (0.8 + 0.5 * style.bulk)
+    ys = np.linspace(0.08 * min(1, h), h - t, rows + 1)
+    if kind == "boards":
+        parts: list[Solid] = [
+            box((s * w / 2 - (t if s > 0 else 0), 0, -d / 2), (s * w / 2 + (t if s < 0 else 0), h, d / 2))
+            for s in (-1, 1)
+        ]
+        return parts + [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2)) for y in ys]
+    if kind == "ladder":
+        lean = np.arctan2(d * 0.6, h)
+        rails: list[Solid] = [
+            replace(
+                box((-t, -h / 2 / np.cos(lean), -t), (t, h / 2 / np.cos(lean), t)),
+                centre=np.array([s * (w / 2 - t), h / 2, -d * 0.1]),
+                turn=rotation(x=-lean),
+            )
+            for s in (-1, 1)
+        ]
+        boards: list[Solid] = []
+        for y in ys:
+            z1 = d / 2 - (d * 0.6) * y / h
+            boards.append(box((-w / 2, y, -d / 2), (w / 2, y + t, max(z1, -d / 2 + 0.12))))
+        return rails + boards
+    xs = np.linspace(-w / 2, w / 2, rows + 2)
+    parts = [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2)) for y in ys]
+    for i in range(rows):
+        x = float(xs[1 + (i * 2) % rows]) if rows > 1 else 0.0
+        parts.append(box((x - t / 2, ys[i], -d / 2), (x + t / 2, ys[i + 1], d / 2)))
+        parts += [
+            box((s * (w / 2 - t) - t / 2, ys[i], -d / 2), (s * (w / 2 - t) + t / 2, ys[i + 1], d / 2))
+            for s in (-1, 1)
+            if (i + (s > 0)) % 2
+        ]
+    return [*parts, *base(style, w * 0.9, d * 0.9, float(ys[0]), 0.035, "straight")]
+
+
+def wine_cabinet(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+    """Closed below; above a lattice for bottles, glass doors or shelves."""
+    _w, h, d = size
+    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot_height(style, h, 0.12), solid=False)
+    split = y0 + (y1 - y0) * rng.uniform(0.3, 0.45)
+    columns = max(1, round((x1 - x0) / 0.45))
+    parts.append(box((x0, y0, -d / 2), (x1, split, z)))
+    parts += front((x0, y0), (x1, split), z, 1, columns, "door", style)
+    bays = np.linspace(x0, x1, columns + 1)
+    lattice = int(rng.integers(0, columns))
+    for i in range(columns):
+        a, b = float(bays[i]), float(bays[i + 1])
+        if i:
+            parts.append(box((a - 0.01, split, -d / 2), (a + 0.01, y1, z)))
+        if i == lattice or rng.random() < 0.3:
+            top_y = min(y1, split + 1.2 * (b - a))
+            cx, cy = (a + b) / 2, (split + top_y) / 2
+            reach = np.hypot(b - a, top_y - split) / 2
+            tilt = np.arctan2(top_y - split, b - a)
+            bar = box((-reach, -0.012, -d / 2), (reach, 0.012, d / 2 - 0.03))
+            parts += [replace(bar, centre=np.array([cx, cy, -0.015]), turn=rotation(z=s * tilt)) for s in (-1, 1)]
+            parts.append(box((a, top_y - 0.01, -d / 2), (b, top_y + 0.01, z - 0.01)))
+            rest = top_y
+        else:
+            rest = split
+        cells = max(1, round((y1 - rest) / 0.34))
+        parts += [box((a, y - 0.01, -d / 2), (b, y + 0.01, z - 0.01)) for y in np.linspace(rest, y1, cells + 1)[1:-1]]
+    return parts
