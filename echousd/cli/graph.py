@@ -77,7 +77,7 @@ def new(
 ) -> None:
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
-    from echousd.graph.text import graph_from_plain, plain
+    from echousd.graph.text import relation_from_text
 
     if (source is None) == (room is None):
         raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
@@ -86,15 +86,13 @@ def new(
     if out.exists() and not force:
         raise GraphError(f"{out} exists, allowed: a new path, or --force to overwrite it")
     given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
+    stated = tuple(map(relation_from_text, relate or ()))
     if source is not None:
         made = load_graph(source)
-        made = made.replaced(room=made.room.replaced(**given)) if given else made
+        made = made.replaced(room=made.room.replaced(**given), relations=(*made.relations, *stated))
     else:
         assert room is not None
-        made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())))
-    if relate:
-        form = plain(made)
-        made = graph_from_plain({**form, "relations": [*form["relations"], *relate]})
+        made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())), stated)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ app = typer.Typer(
 # Each topic's module defines `register(app)`; it must not import torch or pxr at module level (start-up time).
 TOPICS: tuple[str, ...] = ("graph", "generate", "render", "export", "check", "train", "convert", "doctor", "data")
 
-BAD_INPUT, INTERRUPTED, OWN_FAULT = 2, 130, 70
+BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
 
 
 def _version(wanted: bool) -> None:
@@ -55,10 +56,14 @@ def run(arguments: Sequence[str]) -> int:
     try:
         result = command().main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
         sys.stdout.flush()
+        if result == INTERRUPTED:  # typer's way to pass on Ctrl-C
+            return _complain("interrupted", INTERRUPTED, debug)
         return result if isinstance(result, int) else 0
     except BrokenPipeError:  # `echousd graph room.usda | head`: nobody reads on
-        sys.stdout = None  # type: ignore[assignment]  # the interpreter would flush it once more
-        return 0
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  # the interpreter flushes it once more
+        return CLOSED_PIPE
+    except SystemExit as ended:  # rich and typer end the program themselves in that case
+        return CLOSED_PIPE if isinstance(ended.__context__, BrokenPipeError) else int(ended.code or 0)
     except (typer.Abort, KeyboardInterrupt):
         return _complain("interrupted", INTERRUPTED, debug)
     except Exception as error:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from echomodel.vocabulary import vocabulary
-from echousd.graph.consistency import GraphError
+from echousd.graph.consistency import GraphError, check_triples
 from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
 
 BEDS = ("double_bed", "single_bed", "kids_bed")
@@ -73,12 +73,15 @@ TYPICAL = {
 MAX_COUNT = 100
 
 
-def starting_graph(room: RoomSpec | str, counts: Mapping[str, int] | None = None) -> SceneGraph:
+def starting_graph(
+    room: RoomSpec | str, counts: Mapping[str, int] | None = None, relations: Iterable[Relation] = ()
+) -> SceneGraph:
     """A graph to begin with: what such a room usually holds, changed by `counts`, related as such objects usually are.
 
     Arguments:
         room: the room, or its type.
         counts: objects per category (or alias); 0 leaves out what the room would hold otherwise.
+        relations: what has to hold; a usual relation that contradicts them is left out.
 
     Raises `GraphError` for unknown words, counts that are none and a room that is left empty.
     """
@@ -91,13 +94,24 @@ def starting_graph(room: RoomSpec | str, counts: Mapping[str, int] | None = None
     nodes: dict[str, list[Node]] = {
         category: [_node(category, i, count) for i in range(count)] for category, count in wanted.items() if count
     }
-    relations: list[Relation] = []
+    usual: list[Relation] = []
     for habit in HABITS:
         for category in habit.categories:
             anchors = [anchor for word in habit.anchors for anchor in nodes.get(word, ())]
             if anchors:
-                relations += _related(habit, nodes.get(category, []), anchors)
-    return SceneGraph(room, tuple(node for group in nodes.values() for node in group), tuple(relations))
+                usual += _related(habit, nodes.get(category, []), anchors)
+    graph = SceneGraph(room, tuple(node for group in nodes.values() for node in group), tuple(relations))
+    if not graph.relations:
+        return graph.replaced(relations=tuple(usual))
+    kept = list(graph.relations)
+    for relation in usual:
+        try:
+            check_triples([other.triple for other in (*kept, relation)], graph.names)
+        except GraphError:
+            continue
+        kept.append(relation)
+    stated = len(graph.relations)
+    return graph.replaced(relations=(*kept[stated:], *kept[:stated]))
 
 
 def _node(category: str, position: int, count: int) -> Node:

@@ -149,6 +149,11 @@ def _own_name(category: str) -> str:
     return name if IDENTIFIER.fullmatch(name) else vocabulary().category(category).name
 
 
+def relation_from_text(text: str) -> Relation:
+    """The relation that `text` states, such as bed left of wardrobe; raises `GraphError`."""
+    return _built(Relation, _relation(text, ()), ())
+
+
 def _relation(entry: Any, about: Path) -> dict[str, Any]:
     """The fields of a relation from `bed left of wardrobe`, [bed, left, wardrobe] or a mapping."""
     if isinstance(entry, Mapping):

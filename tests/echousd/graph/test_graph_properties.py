@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import networkx
+import pytest
 from graph_strategies import WORDS, graphs, names
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,7 +22,7 @@ def types(graph: SceneGraph) -> list[list[type]]:
     return [[type(value) for value in node.attributes.values()] for node in graph.nodes]
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=60)
 @given(graphs())
 def test_text_forms_are_lossless(graph):
     for read, text in (
@@ -57,8 +58,7 @@ def test_edits_give_valid_graphs_or_raise(data):
         before = graph.to_json()
         try:
             after = edits[data.draw(st.sampled_from(sorted(edits)))](graph)
-        except GraphError as error:
-            assert "\n" not in str(error)
+        except GraphError:
             after = graph
         assert graph.to_json() == before
         assert SceneGraph.from_json(after.to_json()) == after
@@ -68,7 +68,7 @@ def test_edits_give_valid_graphs_or_raise(data):
         graph = after
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=60)
 @given(graphs(min_nodes=2), st.data())
 def test_a_relation_is_refused_exactly_when_its_order_gets_a_cycle(graph, data):
     subject, object_ = data.draw(st.permutations(graph.names))[:2]
@@ -80,13 +80,11 @@ def test_a_relation_is_refused_exactly_when_its_order_gets_a_cycle(graph, data):
         not networkx.is_directed_acyclic_graph(networkx.DiGraph(list(edges)))
         for edges in ordered_edges([*triples, stated]).values()
     )
-    try:
-        graph.relate(*stated)
-        refused = False
-    except GraphError as error:
-        refused = True
-        assert f"'{' '.join(stated)}'" in str(error)
-    assert refused == (cyclic or stated in triples)
+    if cyclic or stated in triples:
+        with pytest.raises(GraphError, match=f"'{' '.join(stated)}'"):
+            graph.relate(*stated)
+    else:
+        assert graph.relate(*stated).relations[-1].triple == stated
 
 
 @settings(deadline=None, max_examples=200)
