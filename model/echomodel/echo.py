@@ -13,13 +13,14 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel, load_weights
-from echomodel.compact.pairs import Pairs, pairs_of
+from echomodel.compact.pairs import pairs_of
+from echomodel.compact.predictors import layout_predictor, shape_predictor
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.objectives import clean_from
 from echomodel.samplers import Predict, guided, sample
 
 Progress = Callable[[int, int], None]
+SAME_STYLE, SAME_MATERIAL = 13, 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,18 +140,65 @@ class EchoModel:
             graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
         )
 
+    @torch.no_grad()
+    def sample_shapes(
+        self,
+        graph: GraphBatch,
+        boxes: Boxes,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        sampler: Sampler | None = None,
+        known: Tensor | None = None,
+        known_mask: Tensor | None = None,
+        edit: GraphEdit | None = None,
+        noise: Tensor | None = None,
+        progress: Progress | None = None,
+    ) -> Tensor:
+        """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style start from equal noise.
+
+        Arguments:
+            graph: S scenes, N nodes.
+            boxes: N boxes, whose sizes the shapes will fill.
+            known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
+                back unchanged.
+            noise: (N, C, G, G, G) starting noise in place of the generator's.
+            generator, steps, sampler, edit, progress: as for `sample_layout`.
+
+        Returns:
+            (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
+
+        Raises:
+            ValueError: a graph, box, shape or argument that the model cannot work with; the message names it.
+        """
+        settings, coder = self.config.shape, self.model.autoencoder
+        graph = self._checked(graph)
+        if len(boxes) != graph.num_nodes:
+            raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
+        boxes = boxes.to(self.device)
+        boxes.check()
+        known, known_mask = self._known(graph, known, known_mask)
+        given = None if known is None else coder.encode(known)
+        pairs, latent = pairs_of(graph, self.config.predicates), self.graph_latent(graph, edit)
+        predict = shape_predictor(self.model, graph, boxes.size, pairs, latent)
+        x = self._noise((graph.num_nodes, coder.channels, *[coder.cells] * 3), generator, noise)
+        if noise is None:
+            x = x[equal_furniture(graph)]
+        codes = sample(
+            sampler or settings.sampler, predict, x, steps or settings.steps, settings.objective,
+            known=given, known_mask=known_mask, generator=generator, progress=progress,
+        )  # fmt: skip
+        grids = torch.cat([coder.decode(part) for part in codes.split(4)])
+        if known is None or known_mask is None:
+            return grids
+        return torch.where(known_mask[:, None, None, None], known, grids)
+
     def _layout_predictor(self, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
-        config, layout = self.config, self.model.layout
+        config = self.config
         if rules not in config.rules:
             raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
         chosen = torch.full_like(graph.room_type, config.rules.index(rules))
-        pairs: Pairs = pairs_of(graph, config.predicates)
-        context = layout.context(graph, pairs, latent, chosen)
-
-        def predict(x: Tensor, level: Tensor) -> Tensor:
-            return clean_from(layout(x, level, context), x, level, config.layout.objective)
-
-        return predict
+        return layout_predictor(self.model, graph, pairs_of(graph, config.predicates), latent, chosen)
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
         config = self.config
@@ -189,6 +237,22 @@ class EchoModel:
         if tuple(noise.shape) != shape:
             raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
         return noise.to(self.device)
+
+
+def equal_furniture(graph: GraphBatch) -> Tensor:
+    """(N,) int64: for every node the first node of its class that relations of style or material join it to."""
+    triplets = graph.triplets
+    joins = torch.isin(triplets[:, 1], triplets.new_tensor([SAME_STYLE, SAME_MATERIAL]))
+    joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
+    ends = triplets[joins][:, [0, 2]]
+    first = torch.arange(graph.num_nodes, device=triplets.device)
+    while len(ends):
+        lowest = first[ends].amin(1)
+        lower = first.scatter_reduce(0, ends.flatten(), lowest.repeat_interleave(2), "amin")
+        if torch.equal(lower, first):
+            break
+        first = lower
+    return first
 
 
 def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
+from echomodel.compact.predictors import layout_predictor
 from echomodel.objectives import add_noise, clean_from, draw_levels, target
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import sample
@@ -131,11 +132,7 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     """Sample all boxes of a batch with the config's sampler and steps."""
     layout = model.config.layout
     latent = model.latent(batch.graph.category, batch.pairs)
-    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules)
-
-    def predict(x: Tensor, level: Tensor) -> Tensor:
-        return clean_from(model.layout(x, level, context), x, level, layout.objective)
-
+    predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
     noise = torch.randn(batch.graph.num_nodes, 8, generator=generator)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
     return Boxes.decode(vectors, model.statistics)

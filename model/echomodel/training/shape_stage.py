@@ -11,8 +11,7 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, clean_from, draw_levels, expand, output_from, target
-from echomodel.samplers import Predict
+from echomodel.objectives import add_noise, draw_levels, expand, output_from, target
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
 from echomodel.training.shapes import EncodedShapes
@@ -159,15 +158,3 @@ def room_shapes(room: LayoutBatch, shapes: EncodedShapes) -> ShapeBatch:
     """The shapes of a batch of rooms; rooms that know more styles than the set share the set's."""
     style = room.style % shapes.styles
     return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category, room)
-
-
-def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
-    """What samplers call: the clean latent seen in a noisy one."""
-    context = model.shape.context(graph, size, pairs, latent)
-    settings = model.config.shape
-
-    def predict(x: Tensor, level: Tensor) -> Tensor:
-        output = model.shape(x, level, context)
-        return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
-
-    return predict
