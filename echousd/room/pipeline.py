@@ -265,7 +265,7 @@ def _settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tup
 
     with watch.stage("repair"):
         found = repaired(graph, boxes)
-        same = _alike(graph, found.boxes)
+        same = _alike(graph, found.boxes, boxes)
         if not torch.equal(
             same.size, found.boxes.size
         ):  # chairs of one set that had to shrink: all of them, if it fits
@@ -276,10 +276,17 @@ def _settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tup
     return found.boxes, found.conflicts + collisions
 
 
-def _alike(graph: SceneGraph, boxes: Boxes) -> Boxes:
+def _alike(graph: SceneGraph, boxes: Boxes, judged_by: Boxes | None = None) -> Boxes:
     names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
     free = np.array([node.size is None and not node.locked for node in graph.nodes])
-    size = equal_sizes(names, categories, style_groups(graph), np.asarray(boxes.size, float), free)
+    size = equal_sizes(
+        names,
+        categories,
+        style_groups(graph),
+        np.asarray(boxes.size, float),
+        free,
+        None if judged_by is None else np.asarray(judged_by.size, float),
+    )
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
 
 

@@ -121,8 +121,10 @@ class Room:
         """All objects in their places, in the room frame."""
         scene = trimesh.Scene()
         for number, name in enumerate(self.names):
-            asset = self.assets[name]
-            scene.add_geometry(self.meshes[name], node_name=name, geom_name=asset, transform=self.pose(number))
+            asset, pose = self.assets[name], self.pose(number)
+            if asset not in scene.geometry:
+                scene.geometry[asset] = self.meshes[name]
+            scene.graph.update(frame_to=name, matrix=pose, geometry=asset)
         return scene
 
     def save(self, folder: str | Path, *, force: bool = False, preview: bool = True) -> Path:
@@ -163,7 +165,7 @@ class Room:
         import io
 
         try:
-            picture = self.image()
+            picture = self.image(size=360)
         except ValueError:  # without embreex a notebook shows the table alone
             return None
         out = io.BytesIO()

@@ -50,7 +50,9 @@ def save_layers(room: Room, folder: Path, *, force: bool = False) -> Path:
     stale += [f"{old['name']}.{end}" for end in ("json", "png") if old.get("name", room.name) != room.name]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [root, manifest]
-    folders.write_together(folder, files, last=last, remove=stale)
+    changed = folders.write_together(folder, files, last=last, remove=stale)
+    for layer in filter(None, (Sdf.Layer.Find(str(folder / path)) for path in changed)):
+        layer.Reload()  # this process holds it open, as it was before
     return folder / root
 
 

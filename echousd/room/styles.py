@@ -63,6 +63,7 @@ def equal_sizes(
     styles: Mapping[str, str],
     size: np.ndarray,
     free: np.ndarray,
+    judged_by: np.ndarray | None = None,
 ) -> np.ndarray:
     """(n, 3) sizes in which objects of one category and one style group that are nearly alike are exactly alike.
 
@@ -71,7 +72,9 @@ def equal_sizes(
         styles: object name -> style, see `style_groups`.
         size: (n, 3) float, metres.
         free: (n,) bool, sizes that may change.
+        judged_by: (n, 3) float, sizes that say who is alike, if not `size`.
     """
+    judged_by = size if judged_by is None else judged_by
     out = np.array(size, float)
     left = [i for i in range(len(names)) if free[i] and styles[names[i]] != ROOM_STYLE]
     while left:
@@ -81,7 +84,7 @@ def equal_sizes(
             for i in left
             if categories[i] == categories[first]
             and styles[names[i]] == styles[names[first]]
-            and np.abs(size[i] / size[first] - 1).max() <= ALIKE
+            and np.abs(judged_by[i] / judged_by[first] - 1).max() <= ALIKE
         ]
         out[group] = size[group].min(0)  # the smallest fits wherever one of them does
         left = [i for i in left if i not in group]

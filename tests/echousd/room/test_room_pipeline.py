@@ -1,0 +1,124 @@
+import numpy as np
+import pytest
+import torch
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.room.pipeline import graph_batch, judge
+from echousd.room.styles import equal_sizes, shared_assets, style_groups
+
+
+def chairs(*relations, styles=(None, None, None)):
+    nodes = tuple(Node(f"chair_{i}", "dining_chair", style=s) for i, s in enumerate(styles))
+    return SceneGraph(room=RoomSpec("dining_room"), nodes=nodes, relations=tuple(Relation(*r) for r in relations))
+
+
+def test_style_groups_join_relations_and_names():
+    graph = chairs(("chair_0", "same_style_as", "chair_1"), styles=(None, "ash", None))
+    assert style_groups(graph) == {"chair_0": "ash", "chair_1": "ash", "chair_2": "room"}
+    graph = chairs(("chair_2", "same_style_as", "chair_1"))
+    assert style_groups(graph) == {"chair_0": "room", "chair_1": "style_1", "chair_2": "style_1"}
+
+
+def test_assets_are_shared_by_equal_shapes_of_one_style_only():
+    names, kind = ["a", "b", "c"], ["stool"] * 3
+    size, style = np.ones((3, 3)), dict.fromkeys("abc", "ash")
+    shape = np.zeros((3, 8, 8, 8), bool)
+    shape[:2, :4], shape[2, 4:] = True, True
+    assert shared_assets(names, kind, style, size, shape) == {"a": "a", "b": "a", "c": "c"}
+    assert shared_assets(names, kind, style, size) == {"a": "a", "b": "a", "c": "a"}
+    assert shared_assets(names, ["stool", "chair", "stool"], style, size) == {"a": "a", "b": "b", "c": "a"}
+    assert shared_assets(names, kind, dict.fromkeys("abc", "room"), size) == {"a": "a", "b": "b", "c": "c"}
+    assert shared_assets(names, kind, style, size * [[1], [1.01], [1]]) == {"a": "a", "b": "b", "c": "a"}
+
+
+def test_nearly_equal_sizes_of_a_set_become_equal():
+    size = np.array([[1.0, 1, 1], [1.1, 1, 1], [2.0, 1, 1]])
+    args = ["a", "b", "c"], ["stool"] * 3, dict.fromkeys("abc", "ash")
+    out = equal_sizes(*args, size, np.ones(3, bool))
+    np.testing.assert_allclose(out, [[1, 1, 1], [1, 1, 1], [2, 1, 1]])
+    np.testing.assert_allclose(equal_sizes(*args, size, np.zeros(3, bool)), size)
+
+
+def test_what_the_graph_fixes_comes_back():
+    graph = small_graph().update_node("wardrobe", size=(1.0, 2.0, 0.5), yaw=0.3)
+    graph = graph.update_node("bed", size=(1.4, 0.9, 2.0), position=(0.2, 0.0, 0.1), yaw=0.5)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    at = room.names.index("wardrobe")
+    np.testing.assert_allclose(room.boxes.size[at], (1.0, 2.0, 0.5))
+    assert float(room.boxes.yaw[at]) == pytest.approx(0.3)
+    assert room.boxes.position[0].tolist() == pytest.approx([0.2, 0.0, 0.1])
+
+
+def test_floor_away_from_the_origin_takes_the_furniture_along():
+    corners = ((8.0, 3.0), (12.0, 3.0), (12.0, 7.0), (8.0, 7.0))
+    room = echousd.generate(
+        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False
+    )
+    np.testing.assert_allclose(room.boxes.position[0], (10.0, 0.0, 4.4), atol=1e-5)
+
+
+def test_repair_keeps_the_graph():
+    class Heap(StandIn):
+        def sample_layout(self, graph, **kwargs):
+            found = super().sample_layout(graph, **kwargs)
+            return Boxes(found.size, found.position * torch.tensor([0.3, 1.0, 0.3]), found.yaw)
+
+    graph = small_graph().relate("nightstand_left", "front", "bed")
+    heap = echousd.generate(graph, model=Heap(), shapes="boxes", repair=False)
+    assert any(v.state == "broken" for v in heap.verdicts)
+    room = echousd.generate(graph, model=Heap(), shapes="boxes")
+    assert [v.state for v in room.verdicts if v.state != "unmeasured"] == ["kept"] * 5
+    assert room.notes == ()
+    assert room.assets["nightstand_right"] == "nightstand_left"
+
+
+def test_verdicts_are_those_of_the_rules():
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    by = {(v.subject, v.predicate): v for v in room.verdicts}
+    assert by["lamp", "standing_on"].state == "kept"
+    assert by["nightstand_left", "same_style_as"].state == "unmeasured"
+    assert by["nightstand_left", "same_style_as"].margin is None
+    assert by["wardrobe", "taller_than"].margin > 0
+    flat = Boxes(room.boxes.size * torch.tensor([1, 0.1, 1]), room.boxes.position, room.boxes.yaw)
+    assert {v.predicate: v.state for v in judge(room.graph, flat)}["standing_on"] == "broken"
+    assert len(graph_batch(room.graph).triplets) == 5
+
+
+def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    told = []
+    room = echousd.generate(
+        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state)
+    )
+    assert room.graph == small_graph()
+    assert room.provenance.source == "graph.usda"
+    assert {stage for stage, *_ in told} == {"read", "load", "layout", "repair", "meshes"} == set(room.timings)
+    assert told[-1] == ("meshes", 6, 6)
+
+
+class NoShapes(StandIn):
+    sample_shapes = None
+
+
+class Empty(StandIn):
+    def sample_shapes(self, graph, boxes, **kwargs):
+        return np.ones((graph.num_nodes, 64, 64, 64), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: generate, boxes"),
+        ({"samples": 0}, "samples is 0, allowed: 1 to 1000"),
+        ({"seed": -1}, "seed is -1, allowed: 0 or more"),
+        ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),
+        ({"model": Empty()}, "shape of 'bed': TSDF holds no surface"),
+        ({"model": "/nowhere.safetensors"}, "/nowhere.safetensors"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, text):
+    with pytest.raises(ValueError, match=text):
+        echousd.generate(small_graph(), **{"model": StandIn(), **arguments})

@@ -1,0 +1,245 @@
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.room import RoomOptions
+from echousd.room.compose import room_files
+from echousd.room.folder import STAGING
+from echousd.room.save import identifier, save_flat
+
+
+def make(seed=0, shift=0.5, graph=None, **more):
+    more = {"repair": False, "shapes": "boxes", **more}
+    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(shift), **more)
+
+
+def opened(path):
+    """A stage as another process would find it."""
+    stage = Usd.Stage.Open(str(path))
+    stage.Reload()
+    return stage
+
+
+def hashes(folder):
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def changed(before, after):
+    return {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
+
+
+def test_same_room_gives_same_bytes():
+    rooms = [make(seed=4, shapes="generate", faces=600) for _ in range(2)]
+    first, second = (room_files(room) for room in rooms)
+    assert first == second
+
+
+def test_another_seed_keeps_the_assets_bytes(tmp_path):
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    before = hashes(folder)
+    make(seed=2).save(folder, preview=False)
+    after = hashes(folder)
+    assert {path for path in after if path.startswith("assets/")} <= after.keys() - changed(before, after)
+    make(seed=1).save(folder, preview=False)
+    assert hashes(folder) == before
+
+
+def test_layout_alone_rewrites_its_layer_and_what_frames_it(tmp_path):
+    folder = tmp_path / "bedroom"
+    room = make(seed=1)
+    room.save(folder, preview=False)
+    before = hashes(folder)
+    moved = replace(room.boxes, position=room.boxes.position + 0.1)
+    replace(room, boxes=moved, layouts=(moved,)).save(folder, preview=False)
+    assert changed(before, hashes(folder)) == {"layers/layout.usda", "bedroom.usda", "bedroom.json"}
+
+
+def test_artists_work_survives_byte_for_byte(tmp_path):
+    folder = tmp_path / "bedroom"
+    root = make(seed=1).save(folder, preview=False)
+    mine = folder / "set_dressing.usda"
+    stage = Usd.Stage.CreateNew(str(mine))
+    stage.GetRootLayer().subLayerPaths = ["./bedroom.usda"]
+    stage.GetPrimAtPath("/Room/Objects/bed").SetActive(False)
+    UsdGeom.Cube.Define(stage, "/Room/Toy")
+    stage.Save()
+    (folder / "notes").mkdir()
+    (folder / "notes/todo.txt").write_text("more plants")
+    before = hashes(folder)
+    make(seed=2).save(folder, preview=False)
+    after = hashes(folder)
+    assert after["set_dressing.usda"] == before["set_dressing.usda"]
+    assert after["notes/todo.txt"] == before["notes/todo.txt"]
+    fresh = Usd.Stage.Open(str(root))
+    assert fresh.GetRootLayer().customLayerData["seed"] == 2
+    composed = Usd.Stage.Open(str(mine))
+    assert composed.GetPrimAtPath("/Room/Toy")
+    assert not composed.GetPrimAtPath("/Room/Objects/bed").IsActive()
+
+
+def test_what_an_artist_adds_to_the_root_layer_stays(tmp_path):
+    folder = tmp_path / "bedroom"
+    root = make(seed=1).save(folder, preview=False)
+    text = root.read_text().replace("subLayers = [", "subLayers = [\n        @./mine.usda@,").rstrip()
+    assert text.endswith("}")
+    root.write_text(text[:-1] + '\n    def Cube "Toy"\n    {\n    }\n}\n')
+    (folder / "mine.usda").write_text('#usda 1.0\nover "Room" {}\n')
+    make(seed=2).save(folder, preview=False)
+    layer = Sdf.Layer.OpenAsAnonymous(str(root))
+    assert layer.subLayerPaths[0] == "./mine.usda"
+    assert len(layer.subLayerPaths) == 6
+    assert layer.GetPrimAtPath("/Room/Toy")
+    assert layer.customLayerData["seed"] == 2
+
+
+def test_edited_layer_of_ours_is_kept_beside_the_new_one(tmp_path):
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    layer = folder / "layers/layout.usda"
+    layer.write_text(layer.read_text() + "# moved the bed\n")
+    edited = layer.read_bytes()
+    make(seed=2).save(folder, preview=False)
+    assert (folder / "layers/layout.edited.usda").read_bytes() == edited
+    assert b"moved the bed" not in layer.read_bytes()
+
+
+def test_asset_of_an_object_that_is_gone_is_removed_unless_edited(tmp_path):
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    touched = folder / "assets/wardrobe/wardrobe.usda"
+    touched.write_text(touched.read_text() + "# mine\n")
+    smaller = small_graph().remove_node("pendant").remove_node("wardrobe")
+    root = make(seed=1, graph=smaller).save(folder, preview=False)
+    assert not (folder / "assets/pendant").exists()
+    assert touched.exists()
+    stage = Usd.Stage.Open(str(root))
+    assert not stage.GetPrimAtPath("/Room/Objects/pendant")
+
+
+def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
+    """SIGKILL at several moments of a run that saves one room after the other into the same folder."""
+    code = textwrap.dedent("""
+        import sys
+        from pathlib import Path
+        from dataclasses import replace
+        from small_room import StandIn, small_graph
+        import echousd
+        options = {"model": StandIn(0.5), "shapes": "boxes", "repair": False}
+        rooms = [echousd.generate(small_graph(), seed=seed, **options) for seed in (1, 2)]
+        rooms[0].save(sys.argv[1], preview=False)
+        print("go", flush=True)
+        for n in range(10**6):
+            rooms[n % 2].save(sys.argv[1], preview=False)
+    """)
+    folder = tmp_path / "bedroom"
+    paths = os.pathsep.join(p for p in sys.path if p)
+    for delay in (0.03, 0.21):
+        process = subprocess.Popen(
+            [sys.executable, "-c", code, str(folder)], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": paths}
+        )
+        assert process.stdout.readline() == b"go\n"
+        try:
+            process.wait(delay)
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+        process.stdout.close()
+        stage = opened(folder / "bedroom.usda")
+        assert stage.GetCompositionErrors() == []
+        assert stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    make(seed=1).save(folder, preview=False)
+    assert not (folder / STAGING).exists()
+
+
+def test_full_disk_says_so_and_changes_nothing(tmp_path, monkeypatch):
+    from pathlib import Path
+
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    before = hashes(folder)
+    real = Path.write_bytes
+
+    def full(self, data):
+        if STAGING in self.parts:
+            raise OSError(28, "No space left on device")
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(
+        ValueError, match=r"bedroom: cannot be written \(No space left on device\); nothing was changed"
+    ):
+        make(seed=2).save(folder, preview=False)
+    assert hashes(folder) == before
+
+
+def test_z_up_over_an_edited_y_up_root_is_refused(tmp_path):
+    folder = tmp_path / "bedroom"
+    root = make(seed=1).save(folder, preview=False)
+    root.write_text(root.read_text().replace("customLayerData = {", "customLayerData = {\n        bool mine = 1", 1))
+    with pytest.raises(ValueError, match="edited by hand and Y-up; a Z-up room needs another folder"):
+        make(seed=1, options=RoomOptions("Z")).save(folder, preview=False)
+
+
+def test_samples_are_one_variant_set_of_the_same_furniture(tmp_path):
+    room = make(seed=1, samples=3)
+    root = room.save(tmp_path / "bedroom", preview=False)
+    stage = Usd.Stage.Open(str(root))
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert variants.GetVariantNames() == ["layout_0", "layout_1", "layout_2"]
+    seen = []
+    for number, name in enumerate(variants.GetVariantNames()):
+        variants.SetVariantSelection(name)
+        bed = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects/bed")).ComputeLocalToWorldTransform(0)
+        seen.append(bed.ExtractTranslation()[0])
+        assert seen[-1] == pytest.approx(float(room.layouts[number].position[0, 0]), abs=1e-4)
+    assert len(set(seen)) == 3
+    alone = make(seed=1, samples=1)
+    assert (alone.boxes.position == room.boxes.position).all()  # more samples do not change the first
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdc"])
+def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
+    room = make(seed=1, samples=2)
+    path = save_flat(room, tmp_path / f"room{ending}")
+    stage = Usd.Stage.Open(str(path))
+    assert stage.GetCompositionErrors() == []
+    assert [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath] == [str(path)]
+    assert stage.GetPrimAtPath("/Room").GetVariantSet("layout").GetVariantNames() == ["layout_0", "layout_1"]
+    assert stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    assert echousd.read_graph(stage) == room.graph
+    text = stage.GetRootLayer().ExportToString()
+    assert str(tmp_path) not in text
+    assert "/tmp/" not in text
+    with pytest.raises(ValueError, match="exists; choose another file or use --force"):
+        save_flat(room, path)
+    with pytest.raises(ValueError, match=r"a flat room ends in .usda or .usdc, found '.obj'"):
+        save_flat(room, tmp_path / "room.obj")
+
+
+def test_room_is_shown_in_notebooks():
+    room = make(seed=1)
+    assert repr(room) == "Room('bedroom', 6 objects, 5 relations, seed 1)"
+    assert "<td>nightstand_left</td>" in room._repr_html_()
+    assert room.stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh")
+    assert len(room.scene().geometry) == 5
+    assert room.scene().bounds[1][1] == pytest.approx(2.8)
+
+
+@pytest.mark.parametrize(("word", "name"), [("out", "out"), ("my room", "my_room"), ("7", "_7"), ("über", "_ber")])
+def test_names_of_rooms_are_identifiers(word, name):
+    assert identifier(word) == name
+    assert Sdf.Path.IsValidIdentifier(name)
