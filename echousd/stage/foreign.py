@@ -21,7 +21,8 @@ from echousd.stage.read import opened, source
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
 OLD_SCHEMA = "SemanticsAPI:"  # Omniverse before UsdSemantics
 STRUCTURE = frozenset({"floor", "wall", "walls", "ceiling", "door", "window", "room", "building", "curtain", "rug"})
-_UPRIGHT = 1e-3
+_UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
+_FLAT = 1e-18  # the determinant of a transform that leaves no volume
 _Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) of a Z-up stage -> (x, z, -y)
 
 
@@ -155,12 +156,22 @@ def _is_structure(word: str) -> bool:
 
 
 def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:
-    """The prim's bound in its own axes: exact for a turned object, where a world box would be too large."""
-    bound = cache.ComputeUntransformedBound(prim)
-    to_world = UsdGeom.XformCache().GetLocalToWorldTransform(prim)
-    aligned = Gf.BBox3d(bound.ComputeAlignedRange())
-    aligned.SetMatrix(to_world)
-    return aligned
+    """The prim's bound along its own axes, where `BBoxCache` gives one along the world's to what is no component."""
+    imageable = UsdGeom.Imageable(prim)
+    if not imageable:
+        return Gf.BBox3d()
+    to_world = imageable.ComputeLocalToWorldTransform(Usd.TimeCode.Default())
+    if abs(to_world.GetDeterminant3()) < _FLAT:
+        return Gf.BBox3d()
+    whole = Gf.Range3d()
+    descendants = iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
+    for leaf in descendants:
+        if leaf.IsA(UsdGeom.Boundable):
+            bound = cache.ComputeWorldBound(leaf)
+            bound.Transform(to_world.GetInverse())
+            whole.UnionWith(bound.ComputeAlignedRange())
+            descendants.PruneChildren()
+    return Gf.BBox3d(whole, to_world) if not whole.IsEmpty() else cache.ComputeWorldBound(prim)
 
 
 def _unused(name: str, taken: dict[str, Node]) -> str:

@@ -1,0 +1,270 @@
+"""Stages that others authored: labels and bounds become nodes with boxes, boxes become relations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics
+
+from echousd.graph import Node, Relation, SceneGraph
+from echousd.stage import StageError, foreign_graph, graph_layer, read_graph, relations_from_boxes
+from echousd.stage.foreign import SkippedPrims, room_boxes
+
+CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+
+
+def stage_of(up: str, metres: float) -> Usd.Stage:
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, metres)
+    UsdGeom.Xform.Define(stage, "/World")
+    stage.SetDefaultPrim(stage.GetPrimAtPath("/World"))
+    return stage
+
+
+def box_mesh(stage: Usd.Stage, path: str, low, high) -> UsdGeom.Mesh:
+    """A box from `low` to `high` in the prim's own axes."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    points = np.asarray(low) + CORNERS * (np.asarray(high, float) - np.asarray(low))
+    mesh.CreatePointsAttr([Gf.Vec3f(*map(float, point)) for point in points])
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(mesh.GetPointsAttr().Get()))
+    return mesh
+
+
+def label(prim, *words: str, taxonomy: str = "category") -> None:
+    UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr(list(words))
+
+
+def close(node: Node, size, position, yaw) -> None:
+    assert node.size == pytest.approx(size, abs=1e-5)
+    assert node.position == pytest.approx(position, abs=1e-5)
+    assert math.remainder(node.yaw - yaw, 2 * math.pi) == pytest.approx(0, abs=1e-5)
+
+
+@pytest.mark.parametrize("metres", [1.0, 0.01, 0.0254])
+@pytest.mark.parametrize("yaw", [0.0, 0.5, -2.0, math.pi])
+def test_y_up(metres, yaw):
+    stage = stage_of("Y", metres)
+    bed = UsdGeom.Xform.Define(stage, "/World/Bed_01")
+    bed.AddTranslateOp().Set(Gf.Vec3d(2, 0.25, -1) / metres)
+    bed.AddRotateYOp().Set(math.degrees(yaw))
+    box_mesh(stage, "/World/Bed_01/mesh", np.array([-0.8, 0, -1]) / metres, np.array([0.8, 0.9, 1]) / metres)
+    label(bed.GetPrim(), "double_bed")
+    graph = read_graph(stage)
+    assert [(node.name, node.category) for node in graph.nodes] == [("Bed_01", "double_bed")]
+    close(graph.nodes[0], (1.6, 0.9, 2.0), (2, 0.25, -1), yaw)
+    assert graph.room.type == "bedroom"
+
+
+@pytest.mark.parametrize("metres", [1.0, 0.01])
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.5])
+def test_z_up(metres, yaw):
+    """(x, y, z) of a Z-up stage is (x, z, -y) of the room, so a front along -Y is a front along +Z."""
+    stage = stage_of("Z", metres)
+    sofa = UsdGeom.Xform.Define(stage, "/World/sofa")
+    sofa.AddTranslateOp().Set(Gf.Vec3d(1, 2, 0.5) / metres)
+    sofa.AddRotateZOp().Set(math.degrees(yaw))
+    box_mesh(stage, "/World/sofa/mesh", np.array([-1, -0.4, 0]) / metres, np.array([1, 0.4, 0.8]) / metres)
+    label(sofa.GetPrim(), "sofa")
+    close(read_graph(stage).node("sofa"), (2, 0.8, 0.8), (1, 0.5, -2), yaw)
+
+
+def test_a_y_up_asset_stood_up_in_a_z_up_stage():
+    stage = stage_of("Z", 1.0)
+    chair = UsdGeom.Xform.Define(stage, "/World/chair")
+    chair.AddTranslateOp().Set(Gf.Vec3d(1, 2, 0))
+    chair.AddRotateZOp().Set(30)
+    chair.AddRotateXOp().Set(90)
+    box_mesh(stage, "/World/chair/mesh", (-0.2, 0, -0.3), (0.2, 1, 0.3))
+    label(chair.GetPrim(), "chair")
+    close(read_graph(stage).node("chair"), (0.4, 1.0, 0.6), (1, 0, -2), math.radians(30))
+
+
+def test_a_z_up_asset_laid_down_in_a_y_up_stage():
+    stage = stage_of("Y", 0.01)
+    chair = UsdGeom.Xform.Define(stage, "/World/chair")
+    chair.AddRotateYOp().Set(30)
+    chair.AddRotateXOp().Set(-90)
+    chair.AddScaleOp().Set(Gf.Vec3f(100, 100, 100))
+    box_mesh(stage, "/World/chair/mesh", (-0.2, -0.3, 0), (0.2, 0.3, 1))
+    label(chair.GetPrim(), "chair")
+    close(read_graph(stage).node("chair"), (0.4, 1.0, 0.6), (0, 0, 0), math.radians(30))
+
+
+def test_a_tilted_object_gets_the_box_around_it():
+    stage = stage_of("Y", 1.0)
+    chair = UsdGeom.Xform.Define(stage, "/World/chair")
+    chair.AddTranslateOp().Set(Gf.Vec3d(0, 5, 0))
+    chair.AddRotateZOp().Set(45)
+    box_mesh(stage, "/World/chair/mesh", (-1, -1, -1), (1, 1, 1))
+    label(chair.GetPrim(), "chair")
+    wide = 2 * math.sqrt(2)
+    close(read_graph(stage).node("chair"), (wide, wide, 2), (0, 5 - wide / 2, 0), 0.0)
+
+
+def test_any_box_keeps_its_corners():
+    """The slow twin: whatever the stage's frame, the node's box has the corners of the mesh."""
+    rng = np.random.default_rng(3)
+    for up in ("Y", "Z"):
+        for _ in range(20):
+            metres, yaw = float(rng.choice([1, 0.01])), float(rng.uniform(-3, 3))
+            stage = stage_of(up, metres)
+            group = UsdGeom.Xform.Define(stage, "/World/group")
+            turn = group.AddRotateYOp() if up == "Y" else group.AddRotateZOp()
+            turn.Set(math.degrees(yaw))
+            group.AddTranslateOp().Set(Gf.Vec3d(*rng.uniform(-3, 3, 3)) / metres)
+            group.AddScaleOp().Set(Gf.Vec3f(2, 2, 2))
+            low = rng.uniform(-1, 0, 3) / metres
+            mesh = box_mesh(stage, "/World/group/table", low, low + rng.uniform(0.2, 1, 3) / metres)
+            label(mesh.GetPrim(), "table")
+            matrix = np.array(UsdGeom.Imageable(mesh).ComputeLocalToWorldTransform(Usd.TimeCode.Default()))
+            points = np.c_[np.array(mesh.GetPointsAttr().Get()), np.ones(8)] @ matrix[:, :3] * metres
+            if up == "Z":
+                points = np.c_[points[:, 0], points[:, 2], -points[:, 1]]
+            node = read_graph(stage).node("table")
+            cos, sin = math.cos(node.yaw), math.sin(node.yaw)
+            local = (CORNERS - (0.5, 0, 0.5)) * node.size
+            turned = np.c_[local[:, 0] * cos + local[:, 2] * sin, local[:, 1], local[:, 2] * cos - local[:, 0] * sin]
+            ours = turned + node.position
+            gaps = np.linalg.norm(ours[:, None] - points[None], axis=-1)
+            assert gaps.min(0).max() < 1e-4
+            assert gaps.min(1).max() < 1e-4
+
+
+def test_any_taxonomy_any_word_the_vocabulary_knows():
+    stage = stage_of("Y", 1.0)
+    for name, taxonomy, words in (
+        ("a", "wikidata_qcode", ("Q42177", "king size bed")),
+        ("b", "class", ("Couch",)),
+        ("c", "category", ("night stand",)),
+    ):
+        mesh = box_mesh(stage, f"/World/{name}", (0, 0, 0), (1, 1, 1))
+        label(mesh.GetPrim(), *words, taxonomy=taxonomy)
+    mesh = stage.GetPrimAtPath("/World/c")
+    label(mesh, "table", taxonomy="another")  # the taxonomy `category` is asked first
+    found = {node.name: node.category for node in read_graph(stage).nodes}
+    assert found == {"a": "double_bed", "b": "sofa", "c": "nightstand"}
+
+
+def test_omniverse_semantics_before_usd_semantics():
+    stage = stage_of("Z", 0.01)
+    prim = box_mesh(stage, "/World/desk", (0, 0, 0), (120, 60, 75)).GetPrim()
+    prim.AddAppliedSchema("SemanticsAPI:Semantics_x")
+    prim.CreateAttribute("semantic:Semantics_x:params:semanticType", Sdf.ValueTypeNames.String).Set("class")
+    prim.CreateAttribute("semantic:Semantics_x:params:semanticData", Sdf.ValueTypeNames.String).Set("desk")
+    graph = read_graph(stage)
+    close(graph.node("desk"), (1.2, 0.75, 0.6), (0.6, 0, -0.3), 0.0)
+    assert graph.room.type == "study"
+
+
+def test_the_topmost_labelled_prim_is_the_object():
+    stage = stage_of("Y", 1.0)
+    table = UsdGeom.Xform.Define(stage, "/World/table")
+    label(table.GetPrim(), "dining_table")
+    for leg in range(4):
+        label(box_mesh(stage, f"/World/table/leg{leg}", (leg, 0, 0), (leg + 0.1, 1, 0.1)).GetPrim(), "table")
+    assert [node.name for node in read_graph(stage).nodes] == ["table"]
+
+
+def test_names_become_identifiers_of_their_own():
+    stage = stage_of("Y", 1.0)
+    for parent in ("a", "b"):
+        label(box_mesh(stage, f"/World/{parent}/Stühle", (0, 0, 0), (1, 1, 1)).GetPrim(), "chair")
+    assert [node.name for node in read_graph(stage).nodes] == ["St_hle", "St_hle_2"]
+
+
+def test_instances_are_read():
+    source = stage_of("Y", 1.0)
+    mesh = box_mesh(source, "/World/mesh", (0, 0, 0), (1, 1, 1))
+    label(source.GetPrimAtPath("/World"), "armchair")
+    assert mesh
+    stage = stage_of("Y", 1.0)
+    for name in ("one", "two"):
+        prim = stage.DefinePrim(f"/World/{name}")
+        prim.GetReferences().AddReference(source.GetRootLayer().identifier)
+        prim.SetInstanceable(True)
+    assert [node.name for node in read_graph(stage).nodes] == ["one", "two"]
+
+
+def test_floor_and_room_type():
+    stage = stage_of("Y", 1.0)
+    label(stage.GetPrimAtPath("/World"), "Dining Room")
+    label(box_mesh(stage, "/World/ground", (-2, -0.1, -1), (3, 0, 4)).GetPrim(), "floor")
+    label(box_mesh(stage, "/World/wall", (-2, 0, -1), (3, 2, -1.1)).GetPrim(), "wall")
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1, 1, 1)).GetPrim(), "single_bed")
+    graph = read_graph(stage)
+    assert graph.room.type == "dining_room"
+    assert sorted(graph.room.floor_polygon) == [(-2, -1), (-2, 4), (3, -1), (3, 4)]
+    assert graph.names == ("bed",)
+    assert foreign_graph(stage, room_type="study").room.type == "study"
+
+
+def test_what_is_left_out_is_told():
+    stage = stage_of("Y", 1.0)
+    label(box_mesh(stage, "/World/bed", (0, 0, 0), (1, 1, 1)).GetPrim(), "bed")
+    label(box_mesh(stage, "/World/piano", (0, 0, 0), (1, 1, 1)).GetPrim(), "grand piano")
+    label(UsdGeom.Xform.Define(stage, "/World/ghost").GetPrim(), "chair")
+    with pytest.warns(SkippedPrims, match=r"became no node: unknown label 'grand piano' \(1\), no bounds \(1\)"):
+        assert read_graph(stage).names == ("bed",)
+
+
+def test_labels_without_bounds_are_no_graph():
+    stage = stage_of("Y", 1.0)
+    label(UsdGeom.Xform.Define(stage, "/World/ghost").GetPrim(), "chair")
+    with (
+        pytest.warns(SkippedPrims),
+        pytest.raises(StageError, match=r"no prims with semantics labels and bounds to make one of$"),
+    ):
+        read_graph(stage)
+
+
+def boxed() -> SceneGraph:
+    return SceneGraph(
+        "bedroom",
+        (
+            Node("bed", "double_bed", size=(1.8, 0.5, 2.0), position=(0, 0, 0), yaw=0.0),
+            Node("stand", "nightstand", size=(0.4, 0.5, 0.4), position=(0.6, 0, -1.2), yaw=0.0),
+            Node("closet", "wardrobe", size=(1.2, 2.2, 0.6), position=(-1.8, 0, 0), yaw=math.pi / 2),
+        ),
+    )
+
+
+def test_boxes_become_relations():
+    graph = relations_from_boxes(boxed())
+    said = {str(relation) for relation in graph.relations}
+    assert {"stand left bed", "bed right stand", "closet behind bed", "closet taller_than bed"} <= said
+    assert {"bed bigger_than stand", "stand smaller_than bed", "stand close_by bed"} <= said
+    assert not said & {"stand right bed", "closet front bed", "bed taller_than closet"}
+    assert read_graph(Usd.Stage.Open(graph_layer(graph))) == graph
+
+
+def test_what_is_stated_stays():
+    said = Relation("stand", "close_by", "bed", 0.5)
+    graph = relations_from_boxes(SceneGraph("bedroom", boxed().nodes, (said,)))
+    assert graph.relations[0] == said
+    assert [r for r in graph.relations if {r.subject, r.object} == {"stand", "bed"}] == [said]
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_relations_of_random_boxes_never_contradict(rules):
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        nodes = tuple(
+            Node(
+                f"n{i}",
+                "chair",
+                size=tuple(rng.uniform(0.2, 1.5, 3)),
+                position=(*rng.uniform(-2, 2, 1), 0, *rng.uniform(-2, 2, 1)),
+                yaw=float(rng.uniform(-3, 3)),
+            )
+            for i in range(8)
+        )
+        assert relations_from_boxes(SceneGraph("study", nodes), rules=rules).relations
+
+
+def test_a_node_without_a_box_is_named():
+    graph = boxed().add_node("lamp", "pendant_lamp")
+    with pytest.raises(StageError, match=r"object 'lamp' has no size, position and yaw, allowed: a box for every"):
+        room_boxes(graph)
