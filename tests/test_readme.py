@@ -1,0 +1,141 @@
+"""The commands in the README are executed, top to bottom, in one folder that holds a copy of samples/.
+
+Every ```bash and ```python block runs, except
+
+* blocks below a comment `<!-- not run: reason -->`,
+* `make` commands (they set up the environment that these tests run in).
+
+A ```text block below a comment `<!-- output -->` must be what the block above it printed; a line `...` in it stands for
+any number of lines.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+README = REPOSITORY / "README.md"
+FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\w*)\s*$")
+SECONDS = 600
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block with the comment that stands above it."""
+
+    line: int
+    language: str
+    text: str
+    comment: str
+
+
+def blocks(markdown: str) -> list[Block]:
+    """All fenced blocks of a Markdown text."""
+    found, comment, inside = [], "", None
+    for number, line in enumerate(markdown.splitlines(), 1):
+        fence = FENCE.match(line)
+        if inside is not None:
+            if fence and not fence["language"]:
+                start, language, _, lines = inside
+                found.append(Block(start, language, "\n".join(lines) + "\n", comment))
+                comment, inside = "", None
+            else:
+                inside[3].append(line.removeprefix(inside[2]))
+        elif fence:
+            inside = (number, fence["language"], fence["indent"], [])
+        elif line.strip():
+            note = re.fullmatch(r"\s*<!--\s*(.*?)\s*-->\s*", line)
+            comment = note[1] if note else ""
+    assert inside is None, f"the block in line {inside and inside[0]} is not closed"
+    return found
+
+
+def command_of(block: Block) -> list[str] | None:
+    """What runs a block, None for those that are not to be run."""
+    if block.comment.startswith("not run:") or block.language not in ("bash", "python"):
+        return None
+    if block.language == "python":
+        return [sys.executable, "-c", block.text]
+    kept = [line for line in block.text.splitlines() if not re.match(r"\s*make\b", line)]
+    return ["bash", "-euo", "pipefail", "-c", "\n".join(kept)] if any(map(str.strip, kept)) else None
+
+
+def run(markdown: str, folder: Path) -> int:
+    """Run the blocks of `markdown` in `folder`; the number of blocks that ran. Fails at the first that fails."""
+    paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
+    environment = {**os.environ, "PATH": os.pathsep.join(paths), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
+    count, printed = 0, ""
+    for block in blocks(markdown):
+        if block.comment == "output":
+            pattern = "".join(
+                r"(?:.*\n)*?" if line.strip() == "..." else re.escape(line.rstrip()) + r"[ \t]*\n"
+                for line in block.text.splitlines()
+            )
+            assert re.fullmatch(pattern, printed), f"README line {block.line}: printed was\n{printed}"
+        command = command_of(block)
+        if command is None:
+            continue
+        done = subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=SECONDS, encoding="utf-8"
+        )
+        printed = done.stdout
+        assert done.returncode == 0, f"README line {block.line}: exit code {done.returncode}\n{printed}{done.stderr}"
+        count += 1
+    return count
+
+
+@pytest.mark.skipif(not README.exists(), reason="no README.md in this checkout")
+def test_the_commands_in_the_readme_run(tmp_path):
+    shutil.copytree(REPOSITORY / "samples", tmp_path / "samples")
+    assert run(README.read_text("utf-8"), tmp_path) >= 3
+
+
+@pytest.mark.skipif(not README.exists(), reason="no README.md in this checkout")
+def test_the_readme_begins_with_make():
+    shown = [block for block in blocks(README.read_text("utf-8")) if block.language == "bash"]
+    assert re.findall(r"^make \w+", shown[0].text, re.MULTILINE)[:2] == ["make room", "make test"]
+
+
+# -- the runner itself -------------------------------------------------------------------------------------------------
+
+
+def test_blocks_run_in_order_in_one_folder(tmp_path):
+    markdown = (
+        "```bash\nmake room\necho hello > a.txt  # words\n```\n\n* in a list\n\n  ```python\n"
+        "  if True:\n      print(open('a.txt').read() * 3)\n  ```\n\n<!-- output -->\n```text\nhello\n...\n\n```\n"
+        "```yaml\nnot: run\n```\n"
+    )
+    assert run(markdown, tmp_path) == 2
+    assert (tmp_path / "a.txt").read_text() == "hello\n"
+
+
+def test_marked_blocks_and_make_do_not_run(tmp_path):
+    assert (
+        run("<!-- not run: needs a GPU -->\n\n```bash\nexit 3\n```\n```bash\nmake room\nmake test\n```\n", tmp_path)
+        == 0
+    )
+
+
+def test_a_remark_counts_for_the_next_block_alone(tmp_path):
+    markdown = "<!-- not run: slow -->\n```bash\nexit 3\n```\n```bash\nexit 4\n```\n"
+    with pytest.raises(AssertionError, match="README line 5: exit code 4"):
+        run(markdown, tmp_path)
+
+
+@pytest.mark.parametrize("block", ["bash\nfalse\ntrue", "bash\nfalse | true", "python\nraise ValueError"])
+def test_a_block_that_fails_fails_the_test(tmp_path, block):
+    with pytest.raises(AssertionError, match="README line 1: exit code 1"):
+        run(f"```{block}\n```\n", tmp_path)
+
+
+def test_other_output_fails_the_test(tmp_path):
+    with pytest.raises(AssertionError, match=r"README line 5: printed was\n +b"):
+        run("```bash\necho b\n```\n<!-- output -->\n```text\na\n```\n", tmp_path)
