@@ -1,0 +1,120 @@
+import json
+
+import pytest
+from PIL import Image
+from pxr import Usd
+from small_room import StandIn, small_graph
+
+
+@pytest.fixture
+def graph(tmp_path):
+    path = tmp_path / "graph.usda"
+    small_graph().to_stage(path)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def model(monkeypatch):
+    from echomodel.echo import EchoModel
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn(0.3)))
+
+
+def test_generate_render_and_export(graph, tmp_path, echousd_command):
+    folder = tmp_path / "out" / "bedroom"
+    done = echousd_command("generate", graph, "-o", folder, "--seed", 7, "--timings", "--faces", 600)
+    assert done.code == 0, done.err
+    assert f"room     {folder / 'bedroom.usda'}" in done.out
+    assert f"preview  {folder / 'bedroom.png'}" in done.out
+    assert "6 objects, 4 of 4 measured relations kept" in done.out
+    for stage in ("imports", "read", "load", "layout", "repair", "shapes", "meshes", "write", "preview", "total"):
+        assert f"{stage:>10} " in done.out
+    assert "Shaping the furniture" in done.err
+    assert Image.open(folder / "bedroom.png").size == (512, 512)
+    assert json.loads((folder / "bedroom.json").read_text())["seed"] == 7
+
+    picture = tmp_path / "top.png"
+    done = echousd_command("render", folder / "bedroom.usda", "-o", picture, "--view", "top", "--size", 64)
+    assert done.code == 0, done.err
+    assert Image.open(picture).size == (64, 64)
+    done = echousd_command("export", folder / "bedroom.usda", "-o", tmp_path / "room.glb")
+    assert done.code == 0, done.err
+    assert (tmp_path / "room.glb").read_bytes()[:4] == b"glTF"
+
+
+def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
+    out = tmp_path / "room.usdc"
+    words = ("--flat", "--samples", 2, "--up-axis", "z", "--shapes", "boxes", "--no-repair", "--walls")
+    done = echousd_command("generate", graph, "-o", out, *words)
+    assert done.code == 0, done.err
+    stage = Usd.Stage.Open(str(out))
+    assert stage.GetPrimAtPath("/Room").GetVariantSet("layout").GetVariantNames() == ["layout_0", "layout_1"]
+    assert stage.GetMetadata("upAxis") == "Z"
+    assert stage.GetPrimAtPath("/Room/Shell/Wall_1")
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("-o", "{tmp}/graph.usda"), "the output is a folder; --flat writes one file"),
+        (("-o", "{tmp}/graph.usda", "--flat"), "exists; choose another file or use --force"),
+        (("-o", "{tmp}/room.obj", "--flat"), "with --flat the output is a file that ends in .usda or .usdc"),
+        (("-o", "{tmp}"), "holds graph.usda and no room of EchoUSD; choose another folder or use --force"),
+        (("-o", "{tmp}/room", "--up-axis", "x"), "up axis is 'X', allowed: Y, Z"),
+        (("-o", "{tmp}/room", "--preset", "huge"), "preset is 'huge', allowed: compact"),
+        (("-o", "{tmp}/room", "--shapes", "lego"), "shapes is 'lego', allowed: generate, boxes"),
+        (("-o", "{tmp}/room", "--crate-version", "12"), "crate version is '12', allowed: 0.7.0 and newer"),
+    ],
+)
+def test_bad_command_lines(graph, tmp_path, echousd_command, words, text):
+    done = echousd_command("generate", graph, *(word.format(tmp=tmp_path) for word in words))
+    assert done.code == 2
+    assert text in done.err
+    assert done.err.count("\n") <= 2
+    assert {path.name for path in tmp_path.iterdir()} == {"graph.usda"}
+
+
+def test_bad_graphs_are_refused_before_anything_is_written(tmp_path, echousd_command):
+    contradiction = tmp_path / "graph.yaml"
+    contradiction.write_text("room: bedroom\nobjects: {a: stool, b: stool}\nrelations: [a left of b, b left of a]\n")
+    unknown = tmp_path / "unknown.yaml"
+    unknown.write_text("room: bedroom\nobjects: {a: stoool}\n")
+    empty = tmp_path / "empty.yaml"
+    empty.write_text("room: bedroom\nobjects: {}\n")
+    for path, text in ((contradiction, "contradicts"), (unknown, "stool"), (empty, "empty")):
+        done = echousd_command("generate", path, "-o", tmp_path / "room")
+        assert done.code == 2
+        assert text in done.err
+        assert path.name in done.err
+    assert not (tmp_path / "room").exists()
+
+
+def test_pictures_are_png(graph, tmp_path, echousd_command):
+    done = echousd_command("render", graph, "-o", tmp_path / "picture.jpg")
+    assert done.code == 2
+    assert "pictures are written as .png, found '.jpg'" in done.err
+    done = echousd_command("render", graph, "-o", tmp_path / "picture.png")
+    assert done.code == 2
+    assert "nothing to draw" in done.err
+
+
+def test_older_crate_version_for_older_hosts(graph, tmp_path):
+    """In a process of its own: USD reads the setting once."""
+    import os
+    import subprocess
+    import sys
+
+    code = (
+        "import sys; from echousd.cli.generate import set_crate_version; set_crate_version('0.8.0');"
+        "from small_room import *; import echousd;"
+        "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', repair=False);"
+        "room.save(sys.argv[1], preview=False)"
+    )
+    paths = os.pathsep.join(path for path in sys.path if path)
+    environment = {**os.environ, "PYTHONPATH": paths}
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "room")], check=True, env=environment)
+    crates = list((tmp_path / "room").rglob("*.usdc"))
+    assert crates
+    for crate in crates:
+        assert tuple(crate.read_bytes()[8:11]) == (0, 8, 0)
+        assert Usd.Stage.Open(str(crate))

@@ -1,0 +1,118 @@
+import json
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Sdf, Usd, UsdGeom, UsdShade
+from small_room import OBJECTS, StandIn, small_graph
+
+import echousd
+from echousd.export import export
+from echousd.room import RoomOptions
+
+
+@pytest.fixture(scope="module")
+def room():
+    return echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+
+
+@pytest.fixture(scope="module")
+def root(room, tmp_path_factory):
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+def world_bounds(stage, path="/Room"):
+    return UsdGeom.BBoxCache(0, ["default"]).ComputeWorldBound(stage.GetPrimAtPath(path)).ComputeAlignedRange()
+
+
+def test_usdz_for_the_web_is_one_flat_text_layer(root, tmp_path):
+    path = export(root, tmp_path / "room.usdz")
+    with zipfile.ZipFile(path) as package:
+        assert package.namelist() == ["bedroom.usda", "textures/floor.png"]
+        text = package.read("bedroom.usda").decode()
+    assert "double3 xformOp" not in text
+    assert str(root.parent) not in text
+    assert "/tmp" not in text
+    stage = Usd.Stage.Open(str(path))
+    assert stage.GetCompositionErrors() == []
+    meshes = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    assert len(meshes) == len(OBJECTS) + 1  # no colliders
+    box, wanted = world_bounds(stage), world_bounds(Usd.Stage.Open(str(root)))
+    np.testing.assert_allclose([box.GetMin(), box.GetMax()], [wanted.GetMin(), wanted.GetMax()], atol=1e-4)
+
+
+def test_usdz_for_arkit_has_one_crate_without_whole_number_doubles(root, tmp_path):
+    path = export(root, tmp_path / "room.usdz", arkit=True)
+    with zipfile.ZipFile(path) as package:
+        names = package.namelist()
+    assert names[0].endswith(".usdc")
+    assert sum(name.endswith((".usd", ".usda", ".usdc")) for name in names) == 1
+    stage = Usd.Stage.Open(str(path))
+    for prim in stage.Traverse():
+        for attribute in prim.GetAttributes():
+            if attribute.GetName().startswith("xformOp:translate"):
+                assert attribute.GetTypeName() == "float3"
+
+
+@pytest.mark.parametrize("ending", [".usda", ".usdc"])
+def test_flat_usd_keeps_the_graph_and_needs_no_other_file(root, room, tmp_path, ending):
+    path = export(root, tmp_path / f"room{ending}")
+    stage = Usd.Stage.Open(str(path))
+    assert [layer for layer in stage.GetUsedLayers() if not layer.anonymous] == [stage.GetRootLayer()]
+    assert echousd.read_graph(stage) == room.graph
+    floor = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/Room/Shell/Floor/Floor_mesh")).ComputeBoundMaterial()[0]
+    color = floor.ComputeSurfaceSource()[0].GetInput("diffuseColor")
+    assert not color.HasConnectedSource()
+    assert 0 < color.Get()[0] < 1
+    assert all(
+        not a.Get().path for p in stage.Traverse() for a in p.GetAttributes() if a.GetTypeName() == "asset" and a.Get()
+    )
+
+
+def test_glb_has_every_object_in_its_place(root, room, tmp_path):
+    path = export(root, tmp_path / "room.glb")
+    content = path.read_bytes()
+    length = struct.unpack("<I", content[12:16])[0]
+    tree = json.loads(content[20 : 20 + length])
+    assert set(OBJECTS) <= {node["name"] for node in tree["nodes"]}
+    assert "room_wood" in {material["name"] for material in tree["materials"]}
+    assert len(tree["images"]) == 1
+    scene = trimesh.load(path)
+    for number, name in enumerate(room.names):
+        parts = [node for node in scene.graph.nodes_geometry if scene.graph.transforms.parents.get(node) == name]
+        assert parts, name
+        points = np.concatenate(
+            [trimesh.transform_points(scene.geometry[scene.graph[n][1]].vertices, scene.graph[n][0]) for n in parts]
+        )
+        wanted = trimesh.transform_points(room.meshes[name].vertices, room.pose(number))
+        np.testing.assert_allclose([points.min(0), points.max(0)], [wanted.min(0), wanted.max(0)], atol=1e-4)
+
+
+def test_z_up_rooms_come_out_y_up_where_the_format_says_so(tmp_path):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions("Z"))
+    root = room.save(tmp_path / "bedroom", preview=False)
+    scene = trimesh.load(export(root, tmp_path / "room.glb"))
+    assert scene.bounds[1][1] == pytest.approx(2.8, abs=1e-3)
+    stage = Usd.Stage.Open(str(export(root, tmp_path / "room.usdz")))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    assert world_bounds(stage).GetMax()[2] == pytest.approx(2.8, abs=1e-3)
+
+
+def test_refusals(root, tmp_path):
+    with pytest.raises(ValueError, match=r"cannot export to '.fbx', allowed: .usdz, .glb, .usda, .usdc"):
+        export(root, tmp_path / "room.fbx")
+    with pytest.raises(ValueError, match=r"--arkit makes a .usdz, found '.glb'"):
+        export(root, tmp_path / "room.glb", arkit=True)
+    (tmp_path / "room.glb").write_text("mine")
+    with pytest.raises(ValueError, match="exists; choose another file or use --force"):
+        export(root, tmp_path / "room.glb")
+    assert export(root, tmp_path / "room.glb", force=True).read_bytes()[:4] == b"glTF"
+    empty = tmp_path / "empty.usda"
+    Sdf.Layer.CreateNew(str(empty)).Save()
+    with pytest.raises(ValueError, match="nothing to export, found no visible mesh"):
+        export(empty, tmp_path / "other.glb")
+    with pytest.raises(ValueError, match=r"nowhere\.usda"):
+        export(tmp_path / "nowhere.usda", tmp_path / "other.glb")
+    assert not (tmp_path / "other.glb").exists()

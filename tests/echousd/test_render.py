@@ -1,0 +1,152 @@
+import sys
+import time
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.drawables import read_drawables
+from echousd.render import render_file, render_stage, smooth_light
+from echousd.scenery import class_color, read_scenery
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+def pixels(picture):
+    return np.asarray(picture, float) / 255
+
+
+def cube_stage(up="Y", unit=1.0, size=1.0):
+    """A red-free cube of 1 m at (1, 0.5, 0), as a mesh."""
+    import trimesh
+
+    box = trimesh.creation.box((size / unit,) * 3)
+    points = box.vertices if up == "Y" else np.stack([box.vertices[:, 0], -box.vertices[:, 2], box.vertices[:, 1]], 1)
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    mesh = UsdGeom.Mesh.Define(stage, "/Cube")
+    mesh.CreatePointsAttr(points.astype(np.float32))
+    mesh.CreateFaceVertexCountsAttr([3] * 12)
+    mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
+    offset = (1 / unit, 0.5 / unit, 0) if up == "Y" else (1 / unit, 0, 0.5 / unit)
+    mesh.AddTranslateOp().Set(Gf.Vec3d(*offset))
+    return stage
+
+
+@pytest.mark.parametrize(("up", "unit"), [("Y", 1.0), ("Z", 1.0), ("Y", 0.01), ("Z", 0.01)])
+def test_up_axis_and_units_are_taken_care_of(up, unit):
+    scenery = read_scenery(cube_stage(up, unit))
+    np.testing.assert_allclose(scenery.bounds, [[0.5, 0, -0.5], [1.5, 1, 0.5]], atol=1e-5)
+    outward = (scenery.triangles.mean(1) - [1, 0.5, 0]) * scenery.normals.mean(1)
+    assert (outward.sum(1) > 0).all()
+
+
+def test_top_view_shows_things_where_they_are(root):
+    image = pixels(render_file(root, view="top", size=96, colors="class"))
+    assert image.shape == (96, 96, 3)
+    metre = 96 / (4.0 * 1.06)  # the floor is 4 m wide and fills the picture
+    hue = image - image.mean(-1, keepdims=True)
+
+    def at(x, z):
+        return hue[int(48 + z * metre), int(48 + x * metre)]
+
+    bed, wardrobe, floor = at(0, -0.9), at(-1.6, 0.9), at(1.4, 0.9)
+    for found, category in ((bed, "double_bed"), (wardrobe, "wardrobe")):
+        wanted = np.array(class_color(category)) ** (1 / 2.2)
+        wanted = wanted - wanted.mean()
+        assert found @ wanted / (np.linalg.norm(found) * np.linalg.norm(wanted)) > 0.95, category
+    assert np.abs(floor).max() < 0.08
+    np.testing.assert_allclose(image[1, 1], [0.90, 0.905, 0.915], atol=0.06)  # nothing but background in the corner
+
+
+def test_same_stage_gives_same_picture_and_materials_differ_from_classes(root):
+    first, second = (pixels(render_file(root, size=48)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert np.abs(first - pixels(render_file(root, size=48, colors="class"))).max() > 0.1
+
+
+def test_a_thing_throws_a_shadow_and_nothing_is_blown_out(root):
+    image = pixels(render_file(root, view="top", size=96))
+    metre = 96 / (4.0 * 1.06)
+    shadow, lit = (
+        image[int(48 - 0.2 * metre), int(48 - 1.7 * metre)],
+        image[int(48 + 1.3 * metre), int(48 + 0.8 * metre)],
+    )
+    assert shadow.mean() < 0.85 * lit.mean()
+    assert (image >= 0.999).mean() < 0.01
+
+
+def test_hidden_things_and_colliders_are_not_drawn(root):
+    stage = Usd.Stage.Open(str(root))
+    names = {mesh.component for mesh in read_drawables(stage)}
+    assert names == {"bed", "nightstand_left", "nightstand_right", "lamp", "wardrobe", "pendant", "Floor"}
+    stage.SetEditTarget(stage.GetSessionLayer())
+    UsdGeom.Imageable(stage.GetPrimAtPath("/Room/Objects/bed")).MakeInvisible()
+    assert "bed" not in {mesh.component for mesh in read_drawables(stage)}
+
+
+def test_instances_are_drawn():
+    stage = cube_stage()
+    copies = Usd.Stage.CreateInMemory()
+    for number in range(3):
+        prim = UsdGeom.Xform.Define(copies, f"/Copies/Copy{number}").GetPrim()
+        UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(10 * number, 0, 0))
+        inside = copies.DefinePrim(f"/Copies/Copy{number}/Inside")
+        inside.GetReferences().AddReference(stage.GetRootLayer().identifier, "/Furniture")
+        inside.SetInstanceable(True)
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Furniture")
+    stage.GetRootLayer().GetPrimAtPath("/Furniture").specifier = Sdf.SpecifierDef
+    Sdf.CopySpec(stage.GetRootLayer(), "/Cube", stage.GetRootLayer(), "/Furniture/Cube")
+    found = [mesh.world[0, 3] for mesh in read_drawables(copies)]
+    UsdGeom.SetStageMetersPerUnit(copies, 1.0)
+    assert [mesh.world[0, 3] for mesh in read_drawables(copies)] == [1.0, 11.0, 21.0]
+    assert found == pytest.approx([0.01, 0.11, 0.21])  # USD's default unit is the centimetre
+
+
+def test_light_is_smoothed_within_a_plane_only():
+    rng = np.random.default_rng(0)
+    light = 1 + 0.3 * rng.normal(size=(20, 20, 3)).astype(np.float32)
+    normal = np.zeros((20, 20, 3), np.float32)
+    normal[:, :10, 1], normal[:, 10:, 0] = 1, 1
+    light[:, 10:] += 5
+    point = np.zeros((20, 20, 3), np.float32)
+    smooth = smooth_light(light, normal, point)
+    assert smooth[:, :10].std() < 0.4 * light[:, :10].std()
+    assert abs(smooth[:, :10].mean() - 1) < 0.1
+    assert abs(smooth[:, 10:].mean() - 6) < 0.1
+
+
+def test_a_small_picture_is_quick(root):
+    stage = Usd.Stage.Open(str(root))
+    render_stage(stage, size=16)
+    started = time.process_time()
+    render_stage(stage, size=256)
+    assert time.process_time() - started < 3.0  # 0.7 s on an idle core
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"view": "side"}, "view is 'side', allowed: top, perspective"),
+        ({"colors": "pink"}, "colors is 'pink', allowed: materials, class"),
+        ({"size": 5}, "size is 5 pixels, allowed: 16 to 4096"),
+    ],
+)
+def test_bad_arguments_are_named(root, arguments, text):
+    with pytest.raises(ValueError, match=text):
+        render_file(root, **arguments)
+
+
+def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
+    with pytest.raises(ValueError, match="nothing to draw, found no visible mesh"):
+        render_stage(Usd.Stage.CreateInMemory())
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    with pytest.raises(ValueError, match=r'pip install "echousd\[render\]"'):
+        render_file(root, size=16)
