@@ -44,10 +44,14 @@ def _storable(value: str) -> str:
     return value
 
 
+def _converted(value: Any) -> float:
+    return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+
+
 def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callable[[Any], float]:
     def check(value: Any) -> float:
         try:
-            number = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+            number = value if type(value) is float else _converted(value)
         except OverflowError:
             number = math.inf
         if not (math.isfinite(number) and test(number)):

@@ -103,7 +103,10 @@ class Vocabulary:
         return self._find("room type", word)
 
     def _find(self, kind: str, word: str) -> int:
-        index, key = self._index[kind], normalised(word)
+        index = self._index[kind]
+        if word in index:  # the canonical spelling, as in most calls
+            return index[word]
+        key = normalised(word)
         if key in index:
             return index[key]
         if kind == "predicate":
