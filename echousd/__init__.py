@@ -11,6 +11,7 @@ plugin.register()  # first act: a stage opened before the schema is registered n
 
 if TYPE_CHECKING:
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+    from echousd.room import Room, generate
     from echousd.stage import read_graph, read_rooms, write_graph
 
 __version__ = "0.1.0"
@@ -25,12 +26,14 @@ _HOME = {
     "read_graph": "echousd.stage",
     "read_rooms": "echousd.stage",
     "write_graph": "echousd.stage",
+    "Room": "echousd.room",
     "generate": "echousd.room",
 }
 __all__ = [
     "GraphError",
     "Node",
     "Relation",
+    "Room",
     "RoomSpec",
     "SceneGraph",
     "generate",
