@@ -1,0 +1,153 @@
+"""`echousd eval`: scores of a model on rooms (`layout`); other topics add their own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from echomodel.metrics.layout_evaluation import EditedGraph, Sampler
+
+eval_app = typer.Typer(help="Scores of a model: relations, sizes, collisions, shapes.", no_args_is_help=True)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the topic."""
+    app.add_typer(eval_app, name="eval")
+
+
+@eval_app.command("layout")
+def layout(
+    rooms: Annotated[Path, typer.Option(help="Rooms file (JSON) or folder of a room set.")],
+    rules: Annotated[str, typer.Option(help="strict or sgfront, for labels and scores.")] = "strict",
+    change: Annotated[bool, typer.Option("--change", help="Also after turning one relation per room round.")] = False,
+    add: Annotated[bool, typer.Option("--add", help="Also after adding one object per room.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the dropping, the edits and the sampling.")] = 0,
+    drop: Annotated[float, typer.Option(help="Share of the relations that the graph does not tell.")] = 0.5,
+    limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
+    contradictions: Annotated[
+        bool, typer.Option("--contradictions", help="Keep what contradicts a changed relation, as published.")
+    ] = False,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps [the model's].")] = None,
+    guidance: Annotated[float, typer.Option(help="Scale of guidance towards the relations, 1 = off.")] = 1.0,
+    model: Annotated[str | None, typer.Option(help='Weights [shipped]; "truth" scores the true boxes.')] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
+    json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
+) -> None:
+    """Label rooms by rule, have their boxes sampled from the graphs alone, and score them.
+
+    Example: echousd eval layout --rooms rooms.json --rules sgfront --change --add
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
+    from echousd.cli.data import load_rooms
+
+    found = load_rooms(rooms, limit)
+    settings = LayoutEvaluation(rules, drop, seed, change, add, contradictions)
+    console = Console(stderr=True, highlight=False)
+    if model == "truth":
+        sampler = _truth(found)
+    else:
+        sampler = _model_sampler(None if model is None else Path(model), seed, rules, steps, guidance)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("sampling", total=None)
+        result = evaluate_layout(
+            found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    if out is not None:
+        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+    if json_out:
+        typer.echo(json.dumps(result))
+    else:
+        _print(result, Console(highlight=False))
+
+
+def _model_sampler(weights: Path | None, seed: int, rules: str, steps: int | None, guidance: float) -> Sampler:
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.echo import EchoModel, GraphEdit
+
+    model = EchoModel.load(weights)
+    generator = torch.Generator().manual_seed(seed)
+
+    def sample(edited: EditedGraph) -> Boxes:
+        edit = None if edited.before is None else GraphEdit(before=edited.before, added=edited.added)
+        return model.sample_layout(
+            edited.graph, generator=generator, steps=steps, rules=rules, guidance=guidance, edit=edit
+        )
+
+    return sample
+
+
+def _truth(rooms: list) -> Sampler:
+    """A sampler that knows the answer: what the scores are for the true boxes themselves."""
+    from echomodel.boxes import Boxes
+    from echomodel.metrics.room_figures import with_known_words
+
+    boxes = [Boxes.from_room(room) for room in with_known_words(rooms) if len(room) > 1]
+    given = 0
+
+    def sample(edited: EditedGraph) -> Boxes:
+        nonlocal given
+        chosen = [boxes[(given + k) % len(boxes)] for k in range(edited.graph.num_scenes)]
+        given += edited.graph.num_scenes
+        return Boxes.cat(chosen)
+
+    return sample
+
+
+def _print(result: dict, console: Console) -> None:
+    from rich.table import Table
+
+    from echomodel.data.report import rows_between
+
+    modes = [mode for mode in ("generation", "change", "add") if mode in result]
+    table = Table("relations kept", *modes, "n", box=None)
+
+    def cell(share: float | None) -> str:
+        return "-" if share is None else f"{share:.3f}"
+
+    for name in result["generation"]["groups"]:
+        count = sum(
+            entry["n"]
+            for predicate, entry in result["generation"]["relations"].items()
+            if predicate.split("_")[0] in name or predicate == name
+        )
+        table.add_row(name, *(cell(result[mode]["groups"].get(name)) for mode in modes), str(count))
+    for name in ("total", "mean"):
+        table.add_row(name, *(cell(result[mode][name]) for mode in modes), "")
+    for name in ("edited", "untouched"):
+        if len(modes) > 1:
+            parts = [cell(result[mode][name]["total"]) if name in result[mode] else "" for mode in modes]
+            table.add_row(f"total, {name}", *parts, "")
+    console.print(f"{result['rooms']} rooms, rules {result['rules']}, {result['drop']:.0%} of the relations dropped")
+    console.print(table)
+    sizes = [row for row in result["sizes"] if row["ks"] is not None]
+    if sizes:
+        off = [row for row in sizes if abs(row["median_ratio"] - 1) > 0.1 or row["ks"] > 0.25]
+        console.print(f"\nsizes: {len(off)} of {len(sizes)} classes and axes are off (median by 10% or KS above 0.25)")
+        table = Table("class", "axis", "n", "median ratio", "KS", box=None)
+        for row in sorted(off, key=lambda row: -row["ks"])[:15]:
+            table.add_row(
+                row["category"], row["axis"], str(row["n"]), f"{row['median_ratio']:.2f}", f"{row['ks']:.2f}"
+            )
+        console.print(table)
+    ours, real = result["figures"]["overlap"], result["real_figures"]["overlap"]
+    console.print(
+        f"\nfloor pairs that overlap {ours['floor_pairs']:.3f} (true rooms {real['floor_pairs']:.3f}), objects outside "
+        f"the floor {ours['outside_floor']:.3f} ({real['outside_floor']:.3f})"
+    )
+    rows = [row for row in rows_between(result["figures"], result["real_figures"]) if row.section.startswith("pair")]
+    table = Table("pairs and headings", "", "here", "true", "distance", box=None)
+    for row in sorted(rows, key=lambda row: -row.distance)[:12]:
+        values = (" ".join(f"{v:.2f}" for v in part) for part in (row.ours, row.real))
+        table.add_row(row.section, row.name, *values, f"{row.distance:.2f}")
+    console.print(table)

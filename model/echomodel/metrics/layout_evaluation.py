@@ -1,0 +1,195 @@
+"""Layout evaluation: label rooms by rule, drop edges, have boxes sampled, score them; also after edits of the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.graph import GraphBatch
+from echomodel.metrics.layout import relation_scores, size_rows, touched_triplets
+from echomodel.metrics.room_figures import room_figures, with_known_words
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_rooms
+from echomodel.vocabulary import vocabulary
+
+# Predicates that an evaluation changes, and into what (SPEC: the four pairs of opposites).
+OPPOSITE = {1: 2, 2: 1, 3: 4, 4: 3, 8: 9, 9: 8, 10: 11, 11: 10}
+
+
+@dataclass(frozen=True, eq=False)
+class EditedGraph:
+    """Scenes to sample, with what was edited in them.
+
+    Arguments:
+        graph: the scenes after the edit.
+        before: (E, 3) int64 triplets before the edit, None where there was none.
+        added: (N,) bool, nodes that came in. touched: (N,) bool, nodes that an edit concerns.
+    """
+
+    graph: GraphBatch
+    before: Tensor | None
+    added: Tensor
+    touched: Tensor
+
+
+Sampler = Callable[[EditedGraph], Boxes]
+
+
+@dataclass(frozen=True)
+class LayoutEvaluation:
+    """How to evaluate.
+
+    Arguments:
+        rules: `strict` or `sgfront`, for labels and scores.
+        drop: share of the labelled edges that the graph does not tell.
+        seed: of the dropping and the edits.
+        change, add: also score after one relation per scene was turned round, after one node per scene was added.
+        contradictions: keep what contradicts a changed relation, as the published evaluation does.
+        scenes: scenes in a batch.
+    """
+
+    rules: str = "strict"
+    drop: float = 0.5
+    seed: int = 0
+    change: bool = False
+    add: bool = False
+    contradictions: bool = False
+    scenes: int = 64
+
+
+def evaluate_layout(
+    rooms: Sequence[RoomBoxes],
+    sample: Sampler,
+    settings: LayoutEvaluation = LayoutEvaluation(),
+    progress: Callable[[int, int], None] | None = None,
+) -> dict:
+    """Score boxes that `sample` makes for the graphs of `rooms`.
+
+    Arguments:
+        rooms: true rooms of any source; words that the vocabulary does not hold are left out, as are rooms with fewer
+            than two objects.
+        sample: gives the N boxes of some scenes, in the order of their nodes.
+        settings: rules, dropping, edits.
+        progress: called with (scenes done, in all).
+
+    Returns:
+        `generation` (and `change`, `add`): shares of relations kept per predicate and group, for edits also of the
+        triplets that touch an edited node and of the others; `sizes`: rows per class and axis; `figures` and
+        `real_figures`: collisions, outside floor, pairs, walls, in the form of `room_statistics.json`.
+    """
+    rooms = [room for room in with_known_words(rooms) if len(room) > 1]
+    if not rooms:
+        raise ValueError("no room with two or more known objects to evaluate")
+    rng = np.random.default_rng(settings.seed)
+    labels = label_rooms(rooms, rules=settings.rules, drop=settings.drop, rng=rng)
+    graphs = [
+        GraphBatch.from_room(room, triplets=torch.from_numpy(edges)) for room, edges in zip(rooms, labels, strict=True)
+    ]
+    modes = ["generation"] + ["change"] * settings.change + ["add"] * settings.add
+    done, total = 0, len(rooms) * len(modes)
+    out: dict = {"rooms": len(rooms), **asdict(settings)}
+    drawn: list[RoomBoxes] = []
+    for mode in modes:
+        found, scenes, edits, offset = [], [], [], 0
+        for start in range(0, len(rooms), settings.scenes):
+            part = slice(start, start + settings.scenes)
+            edited = _edited(graphs[part], mode, rng, settings)
+            boxes = sample(edited)
+            if len(boxes) != edited.graph.num_nodes:
+                raise ValueError(f"the sampler gave {len(boxes)} boxes for {edited.graph.num_nodes} nodes")
+            if mode == "generation":
+                drawn += _rooms_of(rooms[part], edited.graph, boxes)
+            found.append(boxes.to("cpu"))
+            scenes.append(edited.graph.triplets + torch.tensor([offset, 0, offset]))
+            edits.append(edited.touched)
+            offset += edited.graph.num_nodes
+            done += len(rooms[part])
+            if progress:
+                progress(done, total)
+        out[mode] = _scores(Boxes.cat(found), torch.cat(scenes), torch.cat(edits), mode, settings.rules)
+    out.update(_distributions(drawn, rooms))
+    return out
+
+
+def _scores(boxes: Boxes, triplets: Tensor, touched: Tensor, mode: str, rules: str) -> dict:
+    scores = relation_scores(boxes, triplets, rules=rules).to_json()
+    if mode != "generation":
+        near = touched_triplets(triplets, touched)
+        scores["edited"] = relation_scores(boxes, triplets, rules=rules, subset=near).to_json()
+        scores["untouched"] = relation_scores(boxes, triplets, rules=rules, subset=~near).to_json()
+    return scores
+
+
+def _edited(
+    graphs: Sequence[GraphBatch], mode: str, rng: np.random.Generator, settings: LayoutEvaluation
+) -> EditedGraph:
+    """Pack scenes, each with one random edit of the given kind."""
+    packed = GraphBatch.pack(graphs)
+    none = torch.zeros(packed.num_nodes, dtype=torch.bool)
+    if mode == "generation":
+        return EditedGraph(packed, None, none, none)
+    touched, added = none.clone(), none.clone()
+    after, before, first = [], [], 0
+    for graph in graphs:
+        shift = torch.tensor([first, 0, first])
+        if mode == "change":
+            old, new, ends = _change(graph.triplets, rng, settings.contradictions)
+            touched[[first + end for end in ends]] = True
+        else:
+            node = int(rng.integers(graph.num_nodes))
+            ends = [node]
+            old, new = graph.triplets[(graph.triplets[:, [0, 2]] != node).all(1)], graph.triplets
+            added[first + node] = touched[first + node] = True
+        after.append(new + shift)
+        before.append(old + shift)
+        first += graph.num_nodes
+    return EditedGraph(packed.with_triplets(torch.cat(after)), torch.cat(before), added, touched)
+
+
+def _change(triplets: Tensor, rng: np.random.Generator, contradictions: bool) -> tuple[Tensor, Tensor, list[int]]:
+    """Turn one relation round: the triplets before and after, and the two ends (none where nothing can be turned)."""
+    can = np.flatnonzero(np.isin(triplets[:, 1].numpy(), list(OPPOSITE)))
+    if not len(can):
+        return triplets, triplets, []
+    chosen = int(can[rng.integers(len(can))])
+    subject, predicate, object_ = triplets[chosen].tolist()
+    after = triplets.clone()
+    after[chosen, 1] = OPPOSITE[predicate]
+    if not contradictions:
+        # The mirrored edge says what no longer holds.
+        wrong = (after == torch.tensor([object_, OPPOSITE[predicate], subject])).all(1)
+        after = after[~wrong]
+    return triplets, after, [subject, object_]
+
+
+def _rooms_of(rooms: Sequence[RoomBoxes], graph: GraphBatch, boxes: Boxes) -> list[RoomBoxes]:
+    """The true rooms with the sampled boxes in place of theirs."""
+    out, first = [], 0
+    for room in rooms:
+        last = first + len(room)
+        centre = np.zeros(3)
+        if len(room.floor_polygon):
+            centre[[0, 2]] = (room.floor_polygon.min(0) + room.floor_polygon.max(0)) / 2
+        part = (boxes.size, boxes.position, boxes.yaw)
+        size, position, yaw = (field[first:last].detach().cpu().numpy().astype(float) for field in part)
+        out.append(replace(room, size=size, position=position + centre, yaw=yaw, relations=None))
+        first = last
+    return out
+
+
+def _distributions(drawn: Sequence[RoomBoxes], rooms: Sequence[RoomBoxes]) -> dict:
+    def joined(of: Sequence[RoomBoxes]) -> tuple[list[str], np.ndarray]:
+        return [word for room in of for word in room.categories], np.concatenate([room.size for room in of])
+
+    words = {category.name for category in vocabulary().categories}
+    rows = size_rows(*joined(drawn), *joined(rooms))
+    return {
+        "sizes": [asdict(row) for row in rows if row.category in words],
+        "figures": room_figures(drawn),
+        "real_figures": room_figures(rooms),
+    }
