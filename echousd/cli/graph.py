@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from echousd.graph import Node, SceneGraph
+    from echousd.graph import Node, Relation, SceneGraph
 
 NEW_EXAMPLES = """Examples:
 
@@ -213,6 +213,9 @@ def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
     from rich.text import Text
     from rich.tree import Tree
 
+    stated: dict[str, list[Relation]] = {node.name: [] for node in made.nodes}
+    for relation in made.relations:
+        stated[relation.subject].append(relation)
     tree = Tree(Text(_heading(made, path), style="bold"), guide_style="dim")
     for node in made.nodes:
         label = Text(node.name, style="bold cyan")
@@ -221,12 +224,13 @@ def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
         for fact in _facts(node):
             label.append(f"  {fact}", style="not bold dim")
         branch = tree.add(label)
-        for relation in made.relations:
-            if relation.subject == node.name:
-                line = Text(f"{_words(relation.predicate)} ", style="yellow").append(relation.object, style="cyan")
+        for predicate in dict.fromkeys(relation.predicate for relation in stated[node.name]):
+            line = Text(_words(predicate), style="yellow")
+            for i, relation in enumerate(r for r in stated[node.name] if r.predicate == predicate):
+                line.append(", " if i else " ").append(relation.object, style="cyan")
                 if relation.confidence != 1:
-                    line.append(f"  confidence {relation.confidence:.3g}", style="dim")
-                branch.add(line)
+                    line.append(f" ({relation.confidence:.3g})", style="dim")
+            branch.add(line)
     console.print(tree)
 
 

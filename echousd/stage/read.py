@@ -41,7 +41,8 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
 
 def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
     """Every room's graph by the prim path of the room, in the stage's order; empty where there is none."""
-    return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(opened(stage))}
+    stage = opened(stage)  # held here: prims do not outlive their stage
+    return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(stage)}
 
 
 def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None = None) -> RoomPrims:
