@@ -213,15 +213,21 @@ def repair_boxes(
     boxes = Boxes(*(t.float() for t in ends))
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre))
     margin, _ = relation_margins(found.size, end, turn, triplets, rules=rules, centre=centre)
+    hit, beyond = collisions(problem, found.size, end, turn), outside(problem, found.size, end, turn)
+    failures = (
+        set(np.flatnonzero(verdict.numpy() == 0).tolist()),
+        {pair for pair, _ in hit},
+        {number for number, _ in beyond},
+    )
     return RepairedBoxes(
         size=found.size,
         position=end,
         yaw=turn,
         verdict=verdict.numpy(),
         margin=margin,
-        conflicts=conflicts(problem, found, np.flatnonzero(judged)),
-        collisions=collisions(problem, found.size, end, turn),
-        outside=outside(problem, found.size, end, turn),
+        conflicts=conflicts(problem, found, np.flatnonzero(judged), failures),
+        collisions=hit,
+        outside=beyond,
         moved=np.linalg.norm(end - position, axis=1),
         resized=np.abs(found.size / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
         seconds=time.perf_counter() - started,

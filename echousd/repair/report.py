@@ -56,7 +56,9 @@ def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.nd
     return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())
 
 
-def conflicts(problem: Problem, found: Solution, rows: np.ndarray) -> tuple[Conflict, ...]:
+def conflicts(
+    problem: Problem, found: Solution, rows: np.ndarray, failures: tuple[set[int], set[tuple[int, int]], set[int]]
+) -> tuple[Conflict, ...]:
     """Groups of demands that could not all be met: violated constraints that share objects that could have moved.
 
     At the least violation the contradicting constraints press against each other and share it, so that the violated
@@ -64,6 +66,7 @@ def conflicts(problem: Problem, found: Solution, rows: np.ndarray) -> tuple[Conf
 
     Arguments:
         rows: (e,) int, number in the caller's triplets of each of the problem's triplets.
+        failures: broken relations, colliding pairs and objects outside; a group without any is no conflict.
     """
     at = found.at
     violated = np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR)))
@@ -84,7 +87,7 @@ def conflicts(problem: Problem, found: Solution, rows: np.ndarray) -> tuple[Conf
         groups = [*apart, (joined, members)]
     first = {kind: int(np.argmax(at.kind == kind)) for kind in (RELATION, COLLISION)}
     objects_of = dict(zip(violated.tolist(), touched, strict=True))
-    return tuple(
+    every = (
         Conflict(
             tuple(int(rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
             tuple(
@@ -95,6 +98,14 @@ def conflicts(problem: Problem, found: Solution, rows: np.ndarray) -> tuple[Conf
             tuple(sorted({int(i) for r in members if at.kind[r] == FLOOR for i in objects_of[r]})),
         )
         for _, members in groups
+    )
+    return tuple(
+        conflict
+        for conflict in every
+        if any(
+            set(met) & failed
+            for met, failed in zip((conflict.relations, conflict.pairs, conflict.outside), failures, strict=True)
+        )
     )
 
 

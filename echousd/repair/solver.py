@@ -7,7 +7,7 @@ because the objective is piecewise quadratic. The weights rho are so large that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -36,8 +36,8 @@ class RepairConfig:
         stretch: change of the logarithm of a size that costs as much as `move`.
         limit: largest change of the logarithm of a size.
         slack: metres or ratio by which relations are to hold.
-        rounds: most linearisations per attempt.
-        attempts: how often a stuck room is tried again with other separating axes.
+        rounds: most linearisations in one attempt; patience: how many of them without progress end it.
+        budget: no further attempt is started after this many linearisations in all.
     """
 
     move: float = 0.3
@@ -45,12 +45,14 @@ class RepairConfig:
     limit: float = 0.4
     slack: float = 0.004
     rounds: int = 16
-    attempts: int = 3
+    patience: int = 6
+    budget: int = 30
 
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
 STIFFNESS = {RELATION: 1e5, COLLISION: 1e5, FLOOR: 1e5, WALL: 3e2, SUPPORT: 1e5, CEILING: 1e3, OVERHANG: 1e4}
 LIMIT_STIFFNESS = 1e6
+THROUGH = 4  # rounds in which collisions do not count, in an attempt that walks through other things
 SOFT = 1e-2  # weight of a metre to the wall or the ceiling against a metre of collision when results are compared
 LARGEST_STEP = np.array([0.5, 0.5, 0.5, 0.25, 0.25, 0.25])
 
@@ -61,7 +63,7 @@ class Solution:
 
     Arguments:
         size, position: (n, 3) float, metres.
-        at: constraints linearised there; rounds: linearisations before it.
+        at: constraints linearised there; rounds: linearisations of the attempt.
         score: violations of the hard constraints and a little of the soft ones.
     """
 
@@ -91,15 +93,21 @@ def solve(
     handicap = np.zeros((len(problem.pairs), 5))
     handicap[:, 4] = np.where(problem.lift, 0.0, np.inf)
     best: Solution | None = None
-    for _ in range(config.attempts):
-        found = _descend(problem, size, position, yaw, handicap, rules=rules, centre=centre, config=config)
+    through = 0
+    spent = 0
+    while best is None or spent < config.budget:
+        found = _descend(problem, size, position, yaw, handicap, through, rules=rules, centre=centre, config=config)
+        spent += found.rounds
         if best is None or found.score < best.score:
             best = found
-        stuck = (found.at.kind == COLLISION) & (found.at.value < -0.01)
-        if not stuck.any():
+        if violation(found.at) == 0:
             break
-        colliding = np.flatnonzero(stuck) - int(np.argmax(found.at.kind == COLLISION))
+        # Next time colliding pairs part along another axis; what still does not fit first walks through the others.
+        stuck = np.flatnonzero((found.at.kind == COLLISION) & (found.at.value < -0.01))
+        colliding = stuck - int(np.argmax(found.at.kind == COLLISION))
         handicap[colliding, found.at.axis[colliding]] += 0.4
+        if not len(stuck) or best is not found:
+            through = THROUGH
     assert best is not None
     return best
 
@@ -110,6 +118,7 @@ def _descend(
     position: np.ndarray,
     yaw: np.ndarray,
     handicap: np.ndarray,
+    through: int,
     *,
     rules: str,
     centre: np.ndarray,
@@ -124,7 +133,7 @@ def _descend(
     bounds = np.concatenate((-sides, sides))
     state = origin.copy()
     best: Solution | None = None
-    before = np.inf
+    before, last = np.inf, 0
     for number in range(config.rounds + 1):
         now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
         at = linearise(
@@ -133,19 +142,22 @@ def _descend(
         hard, soft = violation(at), unmet(at)
         score = hard + SOFT * soft
         if best is None or score < best.score - 1e-9:
-            best = Solution(now_size, now_position, at, score, number)
+            best, last = Solution(now_size, now_position, at, score, number), number
         settled = number > 0 and hard < 1e-9 and (soft < 0.01 or abs(soft - before) < 0.005)
         before = soft
-        if number == config.rounds or settled or number - best.rounds > 6:
+        if number == config.rounds or settled or number - max(last, through) > config.patience:
             break
         # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
-        damping = 1.0 if number < 6 else 4.0 * (number - 5)
+        damping = 1.0 if number < 6 + through else 4.0 * (number - through - 5)
+        stiffness = stiffnesses[at.kind]
+        if number < through:
+            stiffness = np.where(at.kind == COLLISION, 0.0, stiffness)
         grown = (state - origin)[:, 3:].ravel()
         step = newton(
             np.concatenate((at.gradient, bounds))[:, free],
             np.concatenate((at.value, config.limit - grown, config.limit + grown)),
             np.concatenate((at.equal, np.zeros(len(bounds), bool))),
-            np.concatenate((stiffnesses[at.kind], np.full(len(bounds), LIMIT_STIFFNESS))),
+            np.concatenate((stiffness, np.full(len(bounds), LIMIT_STIFFNESS))),
             weight,
             (state - origin).ravel()[free],
             damping,
@@ -155,7 +167,7 @@ def _descend(
         state = state + np.clip(full.reshape(n, COLUMNS), -LARGEST_STEP, LARGEST_STEP)
         state[:, 3:] = np.clip(state[:, 3:], origin[:, 3:] - config.limit, origin[:, 3:] + config.limit)
     assert best is not None
-    return best
+    return replace(best, rounds=number + 1)
 
 
 def violation(at: Linearised) -> float:
