@@ -36,6 +36,8 @@ class LayoutConfig:
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
         sampler: default sampler.
+        guidance: default step length of the relation guidance, 0 = off (see `echomodel.guidance`).
+        guidance_rounds: its steps per call of the denoiser.
     """
 
     width: int = 192
@@ -44,6 +46,8 @@ class LayoutConfig:
     objective: Objective = "flow"
     steps: int = 20
     sampler: Sampler = "euler"
+    guidance: float = 0.1
+    guidance_rounds: int = 4
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor, shape_predictor
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
+from echomodel.guidance import relation_guided
 from echomodel.samplers import Predict, guided, sample
 
 Progress = Callable[[int, int], None]
@@ -81,6 +82,7 @@ class EchoModel:
         edit: GraphEdit | None = None,
         rules: str = "strict",
         guidance: float = 1.0,
+        relation_guidance: float | None = None,
         noise: Tensor | None = None,
         progress: Progress | None = None,
     ) -> Boxes:
@@ -94,6 +96,8 @@ class EchoModel:
             edit: what was changed in the graph, None = nothing.
             rules: the rule set that the relations are meant in, `strict` or `sgfront`.
             guidance: scale of classifier-free guidance towards the relations, 1 = off.
+            relation_guidance: strength of the pull of the rules' margins on the denoised boxes at every step, 0 = off,
+                None = the config's.
             noise: (N, 8) starting noise in place of the generator's.
             progress: called with (steps done, steps).
 
@@ -112,6 +116,12 @@ class EchoModel:
             bare = graph.with_triplets(graph.triplets[:0])
             free = self._layout_predictor(bare, self.graph_latent(bare), rules)
             conditional = guided(conditional, free, guidance)
+        strength = config.layout.guidance if relation_guidance is None else relation_guidance
+        if strength:
+            conditional = relation_guided(
+                conditional, graph.triplets, self.model.statistics,
+                rules=rules, strength=strength, rounds=config.layout.guidance_rounds,
+            )  # fmt: skip
         x = self._noise((graph.num_nodes, 8), generator, noise)
         vectors = sample(
             sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,

@@ -97,9 +97,11 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         metadata[path] = header
     first = next(iter(metadata))
     _agree(metadata, first)
-    config = from_dict(CompactConfig, json.loads(metadata[first]["config"]))
+    config = _config(metadata[first])
     parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
-    model = CompactModel(config, BoxStatistics.from_json(json.loads(metadata[first]["statistics"])), parts)
+    # only a file with the layout branch knows the boxes
+    own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
+    model = CompactModel(config, BoxStatistics.from_json(json.loads(own["statistics"])), parts)
     _fit(model, tensors, ", ".join(str(path) for path in metadata))
     return model.to(device).eval(), digest.hexdigest()[:12]
 
@@ -107,11 +109,14 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
 def _agree(metadata: dict[Path, dict[str, str]], first: Path) -> None:
     words = json.dumps(_words())
     for path, header in metadata.items():
-        for field in ("config", "statistics"):
-            if header.get(field) != metadata[first].get(field):
-                raise WeightsError(f"{path}: {field} differs from that of {first}, they are not one model")
+        if _config(header) != _config(metadata[first]):
+            raise WeightsError(f"{path}: config differs from that of {first}, they are not one model")
         if header.get("vocabulary") != words:
             raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
+
+
+def _config(header: dict[str, str]) -> CompactConfig:
+    return from_dict(CompactConfig, json.loads(header["config"]))
 
 
 def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:

@@ -27,7 +27,7 @@ class AutoencoderStage:
         side: side of a crop in voxels.
     """
 
-    trained = ("autoencoder",)
+    trained = saved = ("autoencoder",)
 
     def __init__(self, shapes: ShapeGrids, held: ShapeGrids, batch: int, side: int = 64) -> None:
         self.shapes, self.held, self.batch, self.side = shapes, held, batch, side

@@ -89,6 +89,8 @@ class LayoutStage:
         frozen: parts that stay as they are.
     """
 
+    saved = ("latent", "layout")
+
     def __init__(
         self,
         rooms: PackedRooms,

@@ -125,7 +125,7 @@ class ShapeStage:
         batch: objects per batch, per process.
     """
 
-    trained: tuple[str, ...] = ("shape",)
+    trained = saved = ("shape",)
 
     def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, held: EncodedShapes, batch: int) -> None:
         self.rooms, self.shapes, self.held, self.batch = rooms, shapes, held, batch

@@ -24,10 +24,13 @@ Report = Callable[[int, dict[str, float]], None]
 
 
 class TrainingStage(Protocol):
-    """What a stage brings: the parts that it trains, its loss and its validation."""
+    """What a stage brings: parts that it trains, parts that its weights file holds, loss and validation."""
 
     @property
     def trained(self) -> tuple[str, ...]: ...
+
+    @property
+    def saved(self) -> tuple[str, ...]: ...
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]: ...
 
@@ -159,7 +162,7 @@ class Trainer:
         copies = {key: value.detach().contiguous().clone() for key, value in tensors.items()}
         save_file(copies, partial, metadata=metadata)
         partial.replace(self.folder / "checkpoint.safetensors")
-        save_weights(self.folder / "weights.safetensors", self.average, self.stage.trained)
+        save_weights(self.folder / "weights.safetensors", self.average, self.stage.saved)
 
     def _load(self) -> None:
         path = self.folder / "checkpoint.safetensors"
