@@ -98,7 +98,14 @@ def build_shapes(
             write_shard(path, _records(chunk, names, seed, lambda done: progress and progress(done, total)))
         elif progress:
             progress(chunk[-1] * len(names) + len(names), total)
-    _write_json(folder / "shapes.json", {**plan, "count": total, "resolution": RESOLUTION, "truncation": TRUNCATION})
+    return finish_set(folder, plan, total)
+
+
+def finish_set(folder: Path, info: dict, count: int) -> ShapeSet:
+    """Write `shapes.json`, which makes the shards of a folder a set, and open it."""
+    categories = [category.name for category in vocabulary().categories]
+    grid = {"resolution": RESOLUTION, "truncation": TRUNCATION}
+    _write_json(folder / "shapes.json", {"categories": categories, **info, "count": count, **grid})
     return ShapeSet(folder)
 
 
