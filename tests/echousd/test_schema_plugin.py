@@ -46,13 +46,21 @@ def test_every_attribute_ends_its_documentation_with_range_and_unit():
     for spec in classes:
         assert len(spec.documentation) > 80, spec.name
         for prop in spec.properties:
-            text = " ".join(prop.documentation.split())
             if isinstance(prop, Sdf.RelationshipSpec):
-                assert re.search(r"Targets: [^.]+\.$", text), prop.path
+                ending = r"; targets: [^;]+\.$"
             elif prop.typeName == Sdf.ValueTypeNames.Token:
-                assert re.search(r"(Allowed|Range): [^.]+\.$", text), prop.path
+                ending = r"; allowed: [^;]+\.$"
             else:
-                assert re.search(r"Range: .+\. Unit: [^.]+\.$", text), prop.path
+                ending = r"; range: [^;]+; unit: [^;]+\.$"
+            assert re.search(ending, prop.documentation), prop.path
+
+
+def test_clients_see_range_and_unit_in_the_registry():
+    registry = Usd.SchemaRegistry()
+    relation = registry.FindConcretePrimDefinition("EchoRelation")
+    node = registry.FindAppliedAPIPrimDefinition("EchoNodeAPI")
+    assert relation.GetPropertyDocumentation("echo:confidence").endswith("; range: 0 to 1; unit: none (probability).")
+    assert node.GetPropertyDocumentation("echo:yaw").endswith("; unit: radians.")
 
 
 def test_the_schema_knows_the_words_of_the_vocabulary():
