@@ -21,7 +21,20 @@ app = typer.Typer(
 )
 
 # Each topic's module defines `register(app)`; it must not import torch or pxr at module level (start-up time).
-TOPICS: tuple[str, ...] = ("graph", "generate", "render", "export", "check", "train", "convert", "doctor", "data", "data_meshes", "eval")
+TOPICS: tuple[str, ...] = (
+    "graph",
+    "generate",
+    "edit",
+    "render",
+    "export",
+    "check",
+    "train",
+    "convert",
+    "doctor",
+    "data",
+    "data_meshes",
+    "eval",
+)
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
 

@@ -78,12 +78,16 @@ def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
     return mesh
 
 
-def collider(mesh: trimesh.Trimesh, category: str) -> tuple[trimesh.Trimesh, str]:
-    """A light mesh for collisions and its UsdPhysics approximation, `convexHull` or `convexDecomposition`."""
-    if kind_of(category) in CONVEX:
-        hull = mesh.convex_hull
-        return _reduced(hull, 120).convex_hull, "convexHull"
-    return _reduced(mesh, COLLIDER_FACES), "convexDecomposition"
+def approximation(category: str) -> str:
+    """The UsdPhysics approximation of a category's collider, `convexHull` or `convexDecomposition`."""
+    return "convexHull" if kind_of(category) in CONVEX else "convexDecomposition"
+
+
+def collider(mesh: trimesh.Trimesh, category: str) -> trimesh.Trimesh:
+    """A light mesh for collisions: a hull where the approximation is one, else the shape with few faces."""
+    if approximation(category) == "convexHull":
+        return _reduced(mesh.convex_hull, 120).convex_hull
+    return _reduced(mesh, COLLIDER_FACES)
 
 
 def geometry_layer(name: str, form: Surface, collision: trimesh.Trimesh, data: Mapping[str, Any]) -> Sdf.Layer:

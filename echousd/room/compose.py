@@ -28,7 +28,7 @@ class Asset:
 
     name: str
     category: str
-    surface: Surface
+    groups: tuple[str, ...]
     files: Mapping[str, bytes]
     approximation: str
 
@@ -37,9 +37,8 @@ def room_files(room: Room) -> dict[str, bytes]:
     """Relative path -> content of everything that a room consists of, except the preview and the manifest."""
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
-    category = {node.name: node.category for node in room.graph.nodes}
-    for name in dict.fromkeys(room.assets.values()):
-        made[name] = _asset(room, name, category[name])
+    for name, user in room.asset_users.items():
+        made[name] = _asset(room, name, user)
         files.update(made[name].files)
     shell_surfaces = _shell(room)
     palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
@@ -153,17 +152,17 @@ def materials_layer(
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}
 
-    def bind(path: str, form: Surface, style: str) -> None:
+    def bind(path: str, groups: tuple[str, ...], style: str) -> None:
         slug = "".join(c if c.isalnum() else "_" for c in style)
         palette = looks.palette_for(f"{style} {room.provenance.seed}")
-        for group in form.groups:
+        for group in groups:
             name = f"{slug}_{group}" if slug[0].isalpha() else f"style_{slug}_{group}"
             table[name] = looks.look(palette, group)
-            bindings[f"{path}/{group}" if len(form.groups) > 1 else path] = name
+            bindings[f"{path}/{group}" if len(groups) > 1 else path] = name
 
     for node in room.graph.nodes:
         asset = room.assets[node.name]
-        bind(f"{OBJECTS}/{node.name}/{asset}_mesh", made[asset].surface, styles[node.name])
+        bind(f"{OBJECTS}/{node.name}/{asset}_mesh", made[asset].groups, styles[node.name])
     boards = looks.floor_color(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"))
     table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
     table["wall"] = looks.Look(looks.linear("ece8e1"), 0.9)
@@ -223,10 +222,14 @@ def _add_sublayers(layer: Sdf.Layer) -> None:
     layer.subLayerPaths = [f"./layers/{name}.usda" for name in LAYERS]
 
 
-def _asset(room: Room, name: str, category: str) -> Asset:
-    mesh, groups = looks.material_groups(room.meshes[name], category)
+def _asset(room: Room, name: str, user: str) -> Asset:
+    category = room.graph.node(user).category
+    if name in room.carried:
+        carried = room.carried[name]
+        return Asset(name, category, carried.groups, carried.files, assets.approximation(category))
+    mesh, groups = looks.material_groups(room.meshes[user], category)
     form = surface(mesh, groups, atlas=room.options.atlas)
-    collision, approximation = assets.collider(room.meshes[name], category)
+    collision = assets.collider(room.meshes[user], category)
     data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
     folder = f"assets/{name}/{name}"
     geometry = assets.geometry_layer(name, form, collision, data)
@@ -235,7 +238,7 @@ def _asset(room: Room, name: str, category: str) -> Asset:
         f"{folder}_geo.usdc": assets.layer_bytes(geometry, ".usdc"),
         f"{folder}.usda": assets.layer_bytes(component, ".usda"),
     }
-    return Asset(name, category, form, files, approximation)
+    return Asset(name, category, tuple(form.groups), files, assets.approximation(category))
 
 
 def _shell(room: Room) -> dict[str, tuple[str, Surface]]:

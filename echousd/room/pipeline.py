@@ -102,12 +102,12 @@ def generate(
     with watch.stage("load"):
         echo = load_model(model)
     layouts = [sample_boxes(echo, graph, seed=seed, number=0, steps=steps, watch=watch)]
-    layouts[0], notes = _settled(graph, layouts[0], repair, watch)
+    layouts[0], notes = settled(graph, layouts[0], repair, watch)
     sized = _with_sizes(graph, layouts[0])
     for number in range(1, samples):
         found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, watch=watch)
         found = Boxes(layouts[0].size, found.position, found.yaw)
-        layouts.append(_settled(sized, found, repair, watch)[0])
+        layouts.append(settled(sized, found, repair, watch)[0])
     boxes = layouts[0]
     grids = sample_shapes(echo, graph, boxes, seed=seed, steps=steps, watch=watch) if shapes == "generate" else None
     meshes, assets = make_meshes(graph, boxes, grids, faces=faces, watch=watch)
@@ -256,7 +256,7 @@ def room_floor(graph: SceneGraph, layouts: list[Boxes]) -> np.ndarray:
     return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
 
 
-def _settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tuple[Boxes, tuple[str, ...]]:
+def settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tuple[Boxes, tuple[str, ...]]:
     """Sampled boxes after equal sizes within style groups and, if wanted, repair; and what could not be met."""
     boxes = _alike(graph, boxes)
     if not repair:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from echomodel.boxes import Boxes
     from echousd.graph import SceneGraph
+    from echousd.room.reading import CarriedAsset
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ class Room:
         layouts: all arrangements of the same furniture; the first is `boxes`.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
+        carried: assets that are written again byte for byte, see `echousd.room.reading`.
     """
 
     name: str
@@ -95,11 +97,20 @@ class Room:
     provenance: Provenance = Provenance()
     options: RoomOptions = RoomOptions()
     timings: Mapping[str, float] = field(default_factory=dict)
+    carried: Mapping[str, CarriedAsset] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the objects, in the order of the boxes."""
         return tuple(node.name for node in self.graph.nodes)
+
+    @property
+    def asset_users(self) -> dict[str, str]:
+        """Asset name -> the first object that references it."""
+        users: dict[str, str] = {}
+        for name in self.names:
+            users.setdefault(self.assets[name], name)
+        return users
 
     @property
     def height(self) -> float:

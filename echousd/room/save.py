@@ -120,6 +120,8 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
         "shapes": room.provenance.shapes,
         "source": room.provenance.source,
         "up_axis": room.options.up_axis,
+        "walls": room.options.walls,
+        "atlas": room.options.atlas,
         "layouts": max(len(room.layouts), 1),
         "relations": {"kept": kept, "broken": broken, "unmeasured": len(room.verdicts) - kept - broken},
         "notes": list(room.notes),
@@ -127,8 +129,8 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
         "graph": json.loads(room.graph.to_json()),
         "assets": dict(room.assets),
         "meshes": {
-            name: {"faces": len(room.meshes[name].faces), "watertight": bool(room.meshes[name].is_watertight)}
-            for name in sorted(set(room.assets.values()))
+            asset: {"faces": len(room.meshes[user].faces), "watertight": bool(room.meshes[user].is_watertight)}
+            for asset, user in sorted(room.asset_users.items())
         },
         "files": dict(sorted(files.items())),
     }

@@ -19,7 +19,8 @@ ROOM_STYLE = "room"
 def style_groups(graph: SceneGraph) -> dict[str, str]:
     """Object name -> name of its style; objects joined by `same_style_as` or by one `style` are one group.
 
-    Objects of no group have the style `room`, so that a room looks of one piece.
+    A group without a name is called `set_<its first object>`. Objects of no group have the style `room`, so that a room
+    looks of one piece.
     """
     parent = {node.name: node.name for node in graph.nodes}
 
@@ -41,7 +42,6 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
         members.setdefault(root(node.name), []).append(node.name)
     style_of = {node.name: node.style for node in graph.nodes}
     out: dict[str, str] = {}
-    number = 0
     for node in graph.nodes:
         if node.name in out:
             continue
@@ -50,9 +50,7 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
         if named is None and len(group) == 1:
             out[node.name] = ROOM_STYLE
             continue
-        if named is None:
-            number += 1
-            named = f"style_{number}"
+        named = named or f"set_{group[0]}"
         out.update(dict.fromkeys(group, named))
     return {node.name: out[node.name] for node in graph.nodes}
 

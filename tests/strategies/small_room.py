@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import torch
 
@@ -70,12 +72,14 @@ class StandIn:
         return np.stack([ball_tsdf() if c % 2 else table_tsdf() for c in graph.category.tolist()])
 
 
+@cache
 def ball_tsdf() -> np.ndarray:
     """A sphere that fills its box."""
     x, y, z = np.meshgrid(*[(np.arange(64) + 0.5) / 64 - 0.5] * 3, indexing="ij")
     return np.clip((np.sqrt(x**2 + y**2 + z**2) - 30 / 64) * 16, -1, 1).astype(np.float32)
 
 
+@cache
 def table_tsdf(leg: float = 2.0) -> np.ndarray:
     """A plate on four legs; `leg` is half the thickness of a leg in voxels."""
 

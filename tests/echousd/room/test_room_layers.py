@@ -124,7 +124,7 @@ def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
         return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
 
     left = bound("/Room/Objects/nightstand_left/nightstand_left_mesh/wood")
-    assert left == bound("/Room/Objects/nightstand_right/nightstand_left_mesh/wood") == "style_1_wood"
+    assert left == bound("/Room/Objects/nightstand_right/nightstand_left_mesh/wood") == "set_nightstand_left_wood"
     assert bound("/Room/Objects/wardrobe/wardrobe_mesh/wood") == "room_wood"
 
 

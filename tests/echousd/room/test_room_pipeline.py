@@ -19,7 +19,7 @@ def test_style_groups_join_relations_and_names():
     graph = chairs(("chair_0", "same_style_as", "chair_1"), styles=(None, "ash", None))
     assert style_groups(graph) == {"chair_0": "ash", "chair_1": "ash", "chair_2": "room"}
     graph = chairs(("chair_2", "same_style_as", "chair_1"))
-    assert style_groups(graph) == {"chair_0": "room", "chair_1": "style_1", "chair_2": "style_1"}
+    assert style_groups(graph) == {"chair_0": "room", "chair_1": "set_chair_1", "chair_2": "set_chair_1"}
 
 
 def test_assets_are_shared_by_equal_shapes_of_one_style_only():

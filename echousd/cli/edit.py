@@ -1,0 +1,72 @@
+"""`echousd edit`: change the graph of a room, make anew only what the change touches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command(
+        epilog='Example: echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
+    )
+    def edit(
+        room: Annotated[Path, typer.Argument(help="Root layer of a room that generate made.", show_default=False)],
+        add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
+        remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
+        relabel: Annotated[list[str] | None, typer.Option(help="Other category, as name:category.")] = None,
+        relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
+        unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
+        output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
+        seed: Annotated[int, typer.Option(help="Seed of the new randomness.", min=0)] = 0,
+        shapes: Annotated[str, typer.Option(help="generate, or boxes for new objects.")] = "generate",
+        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+        repair: Annotated[
+            bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
+        ] = True,
+        force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
+    ) -> None:
+        """Change what a room holds; objects that the change does not touch stay byte for byte."""
+        from echousd.cli.generate import check_output, progress_bar, report
+        from echousd.graph.text import relation_from_text
+        from echousd.room.edit import edit as change
+        from echousd.room.reading import read_room
+        from echousd.room.save import save_layers, write_preview
+
+        check_output(output or room.parent, flat=False, force=force)
+        old = graph = read_room(room).graph
+        for name in remove or ():
+            graph = graph.remove_node(name)
+        for text in unrelate or ():
+            gone = relation_from_text(text)
+            graph = graph.unrelate(gone.subject, gone.predicate, gone.object)
+        for text in relabel or ():
+            graph = graph.relabel_node(*_named(text))
+        for text in add or ():
+            graph = graph.add_node(*_named(text))
+        for text in relate or ():
+            new = relation_from_text(text)
+            graph = graph.relate(new.subject, new.predicate, new.object)
+        steps = old.diff(graph).lines()
+        if not steps:
+            raise ValueError("nothing to change; use --add, --remove, --relabel, --relate or --unrelate")
+        with progress_bar() as listen:
+            made = change(
+                room, graph, seed=seed, shapes=shapes, model=weights, repair=repair, progress=listen,
+            )  # fmt: skip
+            listen("write", 0, 1)
+            root = save_layers(made, output or room.parent, force=force)
+            listen("write", 1, 1)
+            preview = write_preview(root)
+        for step in steps:
+            typer.echo(step)
+        report(made, root, preview)
+
+
+def _named(text: str) -> tuple[str, str]:
+    name, _, category = text.partition(":")
+    return name, category or name

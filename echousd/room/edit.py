@@ -1,0 +1,154 @@
+"""Change the graph of a finished room and make anew only what the change touches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from echomodel.boxes import Boxes
+from echousd.graph import SceneGraph
+from echousd.room import pipeline
+from echousd.room.reading import SavedRoom, read_room
+from echousd.room.room import Provenance, Room, RoomOptions
+
+if TYPE_CHECKING:
+    from echomodel.echo import EchoModel
+
+
+def edit(
+    root: str | Path,
+    graph: SceneGraph,
+    *,
+    seed: int = 0,
+    shapes: str = "generate",
+    model: EchoModel | str | Path | None = None,
+    repair: bool = True,
+    steps: int | None = None,
+    progress: pipeline.Progress | None = None,
+) -> Room:
+    """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
+
+    New objects and objects of another category get boxes and shapes, subjects of new relations (and what stands on
+    them) get new places.
+
+    Arguments:
+        root: root layer of a room that `generate` made.
+        graph: what its graph (`read_room(root).graph`) shall become.
+        seed: of the new randomness.
+        shapes, model, repair, steps, progress: as for `generate`.
+
+    Raises ValueError as `generate` and `read_room` do.
+    """
+    if shapes not in pipeline.SHAPES:
+        raise ValueError(f"shapes is {shapes!r}, allowed: {', '.join(pipeline.SHAPES)}")
+    watch = pipeline.Watch(progress)
+    with watch.stage("read"):
+        saved = read_room(root)
+    fresh, moving = touched(saved.graph, graph)
+    pinned = _pinned(graph, saved, fresh, moving)
+    if fresh or moving:
+        with watch.stage("load"):
+            echo = pipeline.load_model(model)
+        boxes = pipeline.sample_boxes(echo, pinned, seed=seed, number=0, steps=steps, watch=watch)
+        boxes, notes = pipeline.settled(pinned, boxes, repair, watch)
+    else:
+        echo, notes = None, ()
+        boxes = _boxes_of(pinned)
+    grids = None
+    if fresh and shapes == "generate" and echo is not None:
+        grids = pipeline.sample_shapes(echo, graph, boxes, seed=seed, steps=steps, watch=watch)
+    made = _without(graph, set(graph.names) - fresh)
+    rows = torch.tensor([i for i, name in enumerate(graph.names) if name in fresh], dtype=torch.long)
+    meshes, assets = dict(saved.meshes), dict(saved.assets)
+    if made is not None:
+        part = None if grids is None else grids[rows.numpy()]
+        new_meshes, new_assets = pipeline.make_meshes(made, boxes[rows], part, watch=watch)
+        meshes.update(new_meshes)
+        assets.update(new_assets)
+    assets = _own_names({name: assets[name] for name in graph.names}, fresh, saved)
+    manifest = saved.manifest
+    return Room(
+        name=manifest["name"],
+        graph=graph,
+        boxes=boxes,
+        meshes={name: meshes[name] for name in graph.names},
+        assets=assets,
+        floor=pipeline.room_floor(graph, [boxes]),
+        verdicts=pipeline.judge(graph, boxes),
+        layouts=(boxes,),
+        notes=notes,
+        provenance=_provenance(manifest, echo),
+        options=RoomOptions(manifest["up_axis"], manifest.get("walls", False), manifest.get("atlas", False)),
+        timings=watch.seconds,
+        carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},
+    )
+
+
+def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
+    """Names of objects that need a box and a shape, and of objects that only need another place."""
+    diff = before.diff(after)
+    fresh = {node.name for node in diff.added}
+    fresh |= {new.name for old, new in diff.changed if (old.category, old.size) != (new.category, new.size)}
+    moving = {relation.subject for relation in diff.related}
+    moving |= {new.name for old, new in diff.changed if (old.position, old.yaw) != (new.position, new.yaw)}
+    on = [(r.subject, r.object) for r in after.relations if r.predicate in ("standing_on", "above")]
+    for _ in on:  # what stands on something goes with it, and what stands on that
+        moving |= {subject for subject, carrier in on if carrier in moving | fresh}
+    return fresh, {name for name in moving - fresh if not after.node(name).locked}
+
+
+def _pinned(graph: SceneGraph, saved: SavedRoom, fresh: Iterable[str], moving: Iterable[str]) -> SceneGraph:
+    """The graph with the boxes of everything that stays written into its nodes."""
+    row = {name: i for i, name in enumerate(saved.graph.names)}
+    nodes = []
+    for node in graph.nodes:
+        if node.name not in fresh:
+            size, position, yaw = (v[row[node.name]].tolist() for v in _arrays(saved.boxes))
+            fields: dict[str, Any] = {"size": node.size or tuple(size)}
+            if node.name not in moving:
+                fields |= {"position": node.position or tuple(position), "yaw": yaw if node.yaw is None else node.yaw}
+            node = node.replaced(**fields)
+        nodes.append(node)
+    return graph.replaced(nodes=tuple(nodes))
+
+
+def _arrays(boxes: Boxes) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    return boxes.size, boxes.position, boxes.yaw
+
+
+def _boxes_of(graph: SceneGraph) -> Boxes:
+    return Boxes(
+        torch.tensor([node.size for node in graph.nodes]),
+        torch.tensor([node.position for node in graph.nodes]),
+        torch.tensor([node.yaw for node in graph.nodes]),
+    )
+
+
+def _without(graph: SceneGraph, names: set[str]) -> SceneGraph | None:
+    """The graph without some objects and their relations; None if nothing is left."""
+    nodes = tuple(node for node in graph.nodes if node.name not in names)
+    if not nodes:
+        return None
+    relations = tuple(r for r in graph.relations if r.subject not in names and r.object not in names)
+    return graph.replaced(nodes=nodes, relations=relations)
+
+
+def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> dict[str, str]:
+    """An object may have taken the name of one whose asset others still use: then its asset gets another name."""
+    kept = {asset for name, asset in assets.items() if name not in fresh}
+    renamed: dict[str, str] = {}
+    for name in fresh:
+        asset, number = assets[name], 2
+        if asset in kept and asset not in renamed:
+            while f"{asset}_{number}" in kept or f"{asset}_{number}" in assets.values():
+                number += 1
+            renamed[asset] = f"{asset}_{number}"
+    return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
+
+
+def _provenance(manifest: Mapping[str, Any], echo: Any) -> Provenance:
+    model = getattr(echo, "hash", "") or manifest["model"]
+    return Provenance(manifest["seed"], manifest["preset"], model, manifest["shapes"], manifest["source"])

@@ -1,0 +1,119 @@
+import hashlib
+
+import pytest
+import torch
+from pxr import Usd
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.graph import Relation
+from echousd.room.edit import edit, touched
+from echousd.room.reading import read_room
+
+
+@pytest.fixture
+def root(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600)
+    return room.save(tmp_path / "bedroom", preview=False)
+
+
+def hashes(folder):
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_room_reads_back(root):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600)
+    saved = read_room(root)
+    assert saved.graph == room.graph
+    assert saved.assets == room.assets
+    for name in ("size", "position", "yaw"):
+        torch.testing.assert_close(getattr(saved.boxes, name), getattr(room.boxes, name), atol=2e-4, rtol=0)
+    assert saved.carried["bed"].groups == ("blanket", "linen", "wood")
+
+
+def test_edit_without_change_keeps_every_byte_of_the_assets_and_looks(root):
+    before = hashes(root.parent)
+    edit(root, small_graph(), model=StandIn()).save(root.parent, preview=False)
+    after = hashes(root.parent)
+    different = {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
+    assert different <= {"layers/layout.usda", "bedroom.usda", "bedroom.json", "layers/physics.usda"}
+
+
+def test_new_object_leaves_all_others_alone(root):
+    old = read_room(root)
+    before = hashes(root.parent)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    room = edit(root, graph, model=StandIn(), seed=9)
+    room.save(root.parent, preview=False)
+    after = hashes(root.parent)
+    assert {path: after[path] for path in before if path.startswith("assets/")} == {
+        path: value for path, value in before.items() if path.startswith("assets/")
+    }
+    assert "assets/chair/chair_geo.usdc" in after
+    torch.testing.assert_close(room.boxes.position[:6], old.boxes.position, atol=2e-3, rtol=0)
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    assert stage.GetCompositionErrors() == []
+    assert echousd.read_graph(stage) == graph
+
+
+def test_owner_of_a_shared_asset_may_go(root):
+    graph = small_graph().unrelate("lamp", "standing_on", "nightstand_left")
+    graph = graph.remove_node("nightstand_left")
+    room = edit(root, graph, model=StandIn())
+    room.save(root.parent, preview=False)
+    assert room.assets["nightstand_right"] == "nightstand_left"
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_left_mesh")
+    assert not stage.GetPrimAtPath("/Room/Objects/nightstand_left")
+    again = graph.add_node("nightstand_left", "wardrobe")
+    assert edit(root, again, model=StandIn()).assets["nightstand_left"] == "nightstand_left_2"
+
+
+def test_another_category_gets_another_shape(root):
+    before = hashes(root.parent)
+    edit(root, small_graph().relabel_node("wardrobe", "double_bed"), model=StandIn(), repair=False).save(
+        root.parent, preview=False
+    )
+    after = hashes(root.parent)
+    path = "assets/{0}/{0}_geo.usdc"
+    assert after[path.format("wardrobe")] != before[path.format("wardrobe")]
+    assert after[path.format("bed")] == before[path.format("bed")]
+
+
+def test_what_an_edit_touches():
+    graph = small_graph()
+    assert touched(graph, graph) == (set(), set())
+    assert touched(graph, graph.relate("nightstand_left", "left", "bed")) == (set(), {"nightstand_left", "lamp"})
+    assert touched(graph, graph.lock("lamp").relate("nightstand_left", "left", "bed"))[1] == {"nightstand_left"}
+    assert touched(graph, graph.remove_node("pendant")) == (set(), set())
+
+
+def test_only_rooms_of_ours_can_be_edited(tmp_path):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    with pytest.raises(ValueError, match=r"graph.usda: not a room made by `echousd generate`"):
+        read_room(tmp_path / "graph.usda")
+
+
+def test_command(root, echousd_command, monkeypatch):
+    from echomodel.echo import EchoModel
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+    words = ("--add", "chair:nightstand", "--relate", "chair close by wardrobe", "--remove", "pendant")
+    done = echousd_command("edit", root, *words)
+    assert done.code == 0, done.err
+    assert "+ object chair (nightstand)" in done.out
+    graph = echousd.read_graph(root)
+    assert Relation("chair", "close_by", "wardrobe") in graph.relations
+    assert "pendant" not in graph.names
+    done = echousd_command("edit", root)
+    assert done.code == 2
+    assert "nothing to change; use --add, --remove" in done.err
+    done = echousd_command("edit", root, "--remove", "sofa")
+    assert done.code == 2
+    assert "sofa" in done.err
