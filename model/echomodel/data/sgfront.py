@@ -1,0 +1,303 @@
+"""SG-FRONT as published: scene graphs over 3D-FRONT rooms, their boxes, and the 3D-FUTURE-SDF grids (SPEC 1 and 2).
+
+Whoever has the files puts them in one folder: `relationships_{room}_{split}.json`, `obj_boxes_{room}_{split}.json`,
+`classes_{room}.txt`, `relationships.txt`, `mapping.json`, `centered_bounds_{room}_trainval.txt`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import vocabulary
+
+ROOMS = ("bedroom", "livingroom", "diningroom", "library", "all")
+SPLITS = ("trainval", "test")  # the paper's; test is what its tables are computed on
+SCENE, FLOOR, IN, STANDING_ON = "_scene_", "floor", 0, 7
+BOUNDS = 14
+SDF_LIMIT = 0.2
+# What a scan is called before its dash -> our room type.
+ROOM_TYPES = {
+    "Bedroom": "bedroom", "MasterBedroom": "bedroom", "SecondBedroom": "bedroom", "LivingRoom": "living_room",
+    "DiningRoom": "dining_room", "LivingDiningRoom": "living_dining_room", "Library": "study",
+}  # fmt: skip
+
+
+class SGFrontError(ValueError):
+    """A file of SG-FRONT that is missing or not as published; the message names the file and the scan."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One room: n objects (the floor among them, last) and its graph, exactly as the files say.
+
+    Arguments:
+        name: name of the scan, `MasterBedroom-33296`.
+        instances: n instance numbers. fine: n fine class names. model_ids: n 3D-FUTURE ids, "" where there is none.
+        size: (n, 3) float, extents, metres. position: (n, 3) float, bottom centres relative to `centre`, metres.
+        yaw: (n,) float, radians. centre: (3,) float, the scan's `scene_center`.
+        triples: (e, 3) int64 [subject, predicate 1..15, object], local indices, in the file's order.
+    """
+
+    name: str
+    instances: tuple[int, ...]
+    fine: tuple[str, ...]
+    model_ids: tuple[str, ...]
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+    centre: np.ndarray
+    triples: np.ndarray
+
+    @property
+    def room_type(self) -> str:
+        """Our room type, told by the scan's name (the name itself where it is of no known kind)."""
+        return ROOM_TYPES.get(self.name.split("-")[0], self.name.split("-")[0])
+
+    def room(self) -> RoomBoxes:
+        """The furniture as a labelled room; the floor becomes the polygon, its relations are left out."""
+        keep = [k for k, name in enumerate(self.fine) if name != FLOOR]
+        place = {k: number for number, k in enumerate(keep)}
+        floor = [k for k, name in enumerate(self.fine) if name == FLOOR]
+        if floor:
+            half, middle = self.size[floor[0]][[0, 2]] / 2, self.position[floor[0]][[0, 2]]
+            low, high = middle - half, middle + half
+        elif keep:
+            reach = np.linalg.norm(self.size[keep][:, [0, 2]], axis=1)[:, None] / 2
+            plan = self.position[keep][:, [0, 2]]
+            low, high = (plan - reach).min(0), (plan + reach).max(0)
+        else:
+            low = high = np.zeros(2)
+        corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+        triples = [t for t in self.triples.tolist() if t[0] in place and t[2] in place]
+        return RoomBoxes(
+            id=self.name,
+            room_type=self.room_type,
+            floor_polygon=corners,
+            height=float(max([2.6, *(self.position[keep, 1] + self.size[keep, 1])])),
+            categories=tuple(self.fine[k] for k in keep),
+            size=self.size[keep],
+            position=self.position[keep],
+            yaw=self.yaw[keep],
+            models=tuple(self.model_ids[k] for k in keep),
+            relations=np.array([[place[s], p, place[o]] for s, p, o in triples], np.int64).reshape(-1, 3),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A scan as the published networks see it (SPEC 1.3), the `_scene_` node last.
+
+    Arguments:
+        classes, fine: (m,) int64 class ids, small (or fine) and fine. boxes: (m, 7) float32, normalised size and
+        position and the angle in radians. triples: (e, 3) int64 with `in` edges to the scene node behind the others.
+    """
+
+    classes: np.ndarray
+    fine: np.ndarray
+    boxes: np.ndarray
+    triples: np.ndarray
+
+
+class SGFront:
+    """One split of SG-FRONT.
+
+    Arguments:
+        folder: where the files are.
+        room: `bedroom`, `livingroom`, `diningroom`, `library` or `all` (the published weights).
+        split: `trainval` or `test`.
+        large: fine classes as node classes instead of the small ones (14 for `all`).
+
+    Attributes: `classes` and `fine_classes`, names by id; `predicates`, names by id (0 is `in`); `bounds` (14,).
+
+    Raises:
+        SGFrontError: a file is missing or malformed.
+    """
+
+    def __init__(
+        self, folder: str | os.PathLike[str], room: str = "all", split: str = "trainval", *, large: bool = False
+    ) -> None:
+        if room not in ROOMS or split not in SPLITS:
+            raise SGFrontError(
+                f"room {room!r}, split {split!r}: allowed are {', '.join(ROOMS)} and {', '.join(SPLITS)}"
+            )
+        self.folder, self.room, self.split, self.large = Path(folder), room, split, large
+        names = self._lines(f"classes_{room}.txt")
+        self.fine_classes = tuple(sorted(set(names)))
+        self.predicates = ("in", *self._lines("relationships.txt"))
+        if len(self.predicates) != 16:
+            path = self.folder / "relationships.txt"
+            raise SGFrontError(f"{path}: holds {len(self.predicates) - 1} relationships, expected 15")
+        self.mapping = self._mapping()
+        self.classes = self.fine_classes if large else tuple(sorted({self.mapping[n] for n in self.fine_classes}))
+        self.scans = self._scans()
+
+    def __len__(self) -> int:
+        return len(self.scans)
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """Minimum and maximum size, minimum and maximum position, angles: 14 numbers of the trainval split."""
+        path = self._path(f"centered_bounds_{self.room}_trainval.txt", f"boxes_centered_stats_{self.room}_trainval.txt")
+        try:
+            values = np.array([float(word) for word in path.read_text("utf-8").split()])
+        except ValueError as error:
+            raise SGFrontError(f"{path}: {error}") from None
+        if len(values) != BOUNDS:
+            raise SGFrontError(f"{path}: holds {len(values)} numbers, expected {BOUNDS}")
+        return values
+
+    def sample(self, number: int) -> Sample:
+        """One scan with its scene node, boxes normalised (SPEC 1.3 and 2)."""
+        scan, low_high = self.scans[number], self.bounds
+        fine = [self.fine_classes.index(name) for name in scan.fine]
+        names = scan.fine if self.large else [self.mapping[name] for name in scan.fine]
+        n = len(fine)
+        size = _normalised(scan.size, low_high[0:3], low_high[3:6])
+        position = _normalised(scan.position, low_high[6:9], low_high[9:12])
+        boxes = np.concatenate([size, position, scan.yaw[:, None]], -1)
+        inside = np.stack([np.arange(n), np.full(n, IN), np.full(n, n)], -1)
+        return Sample(
+            classes=np.array([*(self.classes.index(name) for name in names), self.classes.index(SCENE)], np.int64),
+            fine=np.array([*fine, self.fine_classes.index(SCENE)], np.int64),
+            boxes=np.concatenate([boxes, -np.ones((1, 7))]).astype(np.float32),
+            triples=np.concatenate([scan.triples, inside]).astype(np.int64),
+        )
+
+    def rooms(self) -> list[RoomBoxes]:
+        """All scans as labelled rooms."""
+        return [scan.room() for scan in self.scans]
+
+    # -- files ---------------------------------------------------------------------------------------------------
+
+    def _path(self, *names: str) -> Path:
+        for name in names:
+            if (self.folder / name).exists():
+                return self.folder / name
+        raise SGFrontError(f"{self.folder / names[0]}: no such file, SG-FRONT has it")
+
+    def _lines(self, name: str) -> list[str]:
+        return [line.strip() for line in self._path(name).read_text("utf-8").splitlines() if line.strip()]
+
+    def _json(self, name: str) -> dict:
+        path = self._path(name)
+        try:
+            return json.loads(path.read_text("utf-8"))
+        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            raise SGFrontError(f"{path}: not JSON ({error})") from None
+
+    def _mapping(self) -> dict[str, str]:
+        mapping = {SCENE: SCENE, FLOOR: FLOOR, **self._json("mapping.json")}
+        missing = [name for name in self.fine_classes if name not in mapping]
+        if missing:
+            raise SGFrontError(f"{self.folder / 'mapping.json'}: no small class for {', '.join(missing)}")
+        return mapping
+
+    def _scans(self) -> list[Scan]:
+        graphs = f"relationships_{self.room}_{self.split}.json"
+        boxes = f"obj_boxes_{self.room}_{self.split}.json"
+        raw, boxed = self._json(graphs), self._json(boxes)
+        if not isinstance(raw.get("scans"), list):
+            raise SGFrontError(f"{self.folder / graphs}: no list `scans`")
+        scans, seen = [], set()
+        for number, entry in enumerate(raw["scans"]):
+            name = entry.get("scan", f"number {number}")
+            if name in seen:
+                raise SGFrontError(f"{self.folder / graphs}: scan {name}: appears twice")
+            seen.add(name)
+            if name not in boxed:
+                raise SGFrontError(f"{self.folder / boxes}: scan {name}: missing")
+            scans.append(self._scan(name, entry, boxed[name], graphs, boxes))
+        return scans
+
+    def _scan(self, name: str, entry: dict, boxed: dict, graphs: str, boxes: str) -> Scan:
+        def fault(file: str, text: str) -> SGFrontError:
+            return SGFrontError(f"{self.folder / file}: scan {name}: {text}")
+
+        objects = entry.get("objects")
+        if not isinstance(objects, dict) or not objects:
+            raise fault(graphs, "no objects")
+        params, models = [], []
+        for key, category in objects.items():
+            if category not in self.fine_classes:
+                raise fault(graphs, f"object {key} is a {category!r}, which classes_{self.room}.txt does not hold")
+            box = boxed.get(key)
+            if box is None:
+                raise fault(boxes, f"no box for object {key} ({category})")
+            param7 = box.get("param7", ())
+            if len(param7) != 7 or not all(isinstance(v, int | float) and math.isfinite(v) for v in param7):
+                raise fault(boxes, f"object {key}: param7 is {param7}, expected 7 finite numbers")
+            if min(param7[:3]) < 0:
+                raise fault(boxes, f"object {key}: size {param7[:3]} is negative")
+            params.append(param7)
+            path = box.get("model_path") or ""
+            models.append(Path(path).parent.name)
+        centre = boxed.get("scene_center")
+        if centre is None or len(centre) != 3:
+            raise fault(boxes, f"scene_center is {centre}, expected 3 numbers")
+        local = {key: k for k, key in enumerate(objects)}
+        triples = []
+        for number, relation in enumerate(entry.get("relationships", ())):
+            if len(relation) != 4:
+                raise fault(graphs, f"relation {number} is {relation}, expected [subject, object, id, name]")
+            subject, object_, predicate, word = relation
+            for end in (subject, object_):
+                if str(end) not in local:
+                    raise fault(graphs, f"relation {number} {relation}: no object {end}, there are {', '.join(local)}")
+            if not isinstance(predicate, int) or not 1 <= predicate < len(self.predicates):
+                raise fault(graphs, f"relation {number} {relation}: id {predicate}, allowed are 1 to 15")
+            if self.predicates[predicate] != word:
+                told = self.predicates[predicate]
+                raise fault(graphs, f"relation {number} {relation}: id {predicate} is {told!r} in relationships.txt")
+            triples.append((local[str(subject)], predicate, local[str(object_)]))
+        values = np.array(params, float)
+        return Scan(
+            name=name,
+            instances=tuple(int(key) for key in objects),
+            fine=tuple(objects.values()),
+            model_ids=tuple(models),
+            size=values[:, :3],
+            position=values[:, 3:6] - np.array(centre, float),
+            yaw=values[:, 6],
+            centre=np.array(centre, float),
+            triples=np.array(triples, np.int64).reshape(-1, 3),
+        )
+
+
+def _normalised(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    return 2 * (values - low) / (high - low) - 1
+
+
+def read_sdf(folder: str | os.PathLike[str], model_id: str) -> np.ndarray:
+    """The grid (64, 64, 64) float32 of a 3D-FUTURE model, clamped to +-0.2 as in training (SPEC 1.3).
+
+    Raises:
+        SGFrontError: no file, or not 64^3 values; ImportError: h5py is not there.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise ImportError("reading 3D-FUTURE-SDF needs h5py: pip install 'echousd[train]'") from error
+    path = Path(folder) / model_id / "ori_sample_grid.h5"
+    if not path.exists():
+        raise SGFrontError(f"{path}: no such file")
+    with h5py.File(path, "r") as file:
+        if "pc_sdf_sample" not in file:
+            raise SGFrontError(f"{path}: no data set pc_sdf_sample, found {', '.join(file) or 'none'}")
+        values = np.asarray(file["pc_sdf_sample"], np.float32)
+    if values.size != 64**3:
+        raise SGFrontError(f"{path}: {values.size} values, expected {64**3}")
+    return values.reshape(64, 64, 64).clip(-SDF_LIMIT, SDF_LIMIT)
+
+
+def small_mapping() -> dict[str, str]:
+    """Fine class of SG-FRONT -> small class, for the classes that our vocabulary knows."""
+    fine = {entry.sgfront: entry.coarse for entry in vocabulary().categories if entry.name == entry.sgfront}
+    return {SCENE: SCENE, **dict(sorted(fine.items())), FLOOR: FLOOR}

@@ -1,0 +1,145 @@
+"""SG-FRONT files: our rooms written so come back, the published sample form, errors that name file and scan."""
+
+import json
+
+import numpy as np
+import pytest
+
+from echomodel.data.rooms import generate_rooms
+from echomodel.data.sgfront import SGFront, SGFrontError, read_sdf
+from echomodel.data.sgfront_writer import write_sdf, write_sgfront
+from echomodel.graph import GraphBatch
+from echomodel.rules import label_relations, verdicts
+from echomodel.vocabulary import vocabulary
+
+
+@pytest.fixture(scope="module")
+def rooms():
+    return generate_rooms(12, 31)
+
+
+@pytest.fixture
+def folder(tmp_path, rooms):
+    write_sgfront(tmp_path, rooms[:8], seed=2)
+    write_sgfront(tmp_path, rooms[8:], split="test", seed=3)
+    return tmp_path
+
+
+def test_rooms_come_back(folder, rooms):
+    for split, part in (("trainval", rooms[:8]), ("test", rooms[8:])):
+        read = SGFront(folder, split=split)
+        assert len(read) == len(part)
+        for scan, true in zip(read.scans, part, strict=True):
+            room = scan.room()
+            assert room.room_type == true.room_type
+            assert room.categories == tuple(vocabulary().category(c).sgfront for c in true.categories)
+            assert np.allclose(room.size, true.size)
+            assert np.allclose(room.position, true.position)
+            assert np.allclose(room.yaw, true.yaw)
+            assert room.models == true.models
+            assert np.allclose(room.floor_polygon.max(0), true.floor_polygon.max(0))
+            assert room.relations is not None
+            labels = {tuple(t) for t in label_relations(true, rules="sgfront").tolist()}
+            told = {tuple(t) for t in room.relations.tolist()}
+            assert told <= labels
+            assert 0.3 * len(labels) < len(told) < 0.7 * len(labels)
+            assert GraphBatch.from_room(room).num_nodes == len(room)
+
+
+def test_published_vocabulary_and_sample(folder, rooms):
+    small, large = SGFront(folder), SGFront(folder, large=True)
+    assert small.classes == tuple(sorted(vocabulary().coarse_categories))
+    assert small.classes.index("_scene_") == 0
+    assert small.classes.index("floor") == 6
+    assert len(small.fine_classes) == 36
+    assert large.classes == small.fine_classes
+    sample, scan = small.sample(0), small.scans[0]
+    n = len(scan.fine)
+    assert scan.fine[-1] == "floor"
+    assert sample.classes[-2:].tolist() == [6, 0]
+    assert sample.boxes.shape == (n + 1, 7)
+    assert (sample.boxes[-1] == -1).all()
+    assert np.abs(sample.boxes[:-1, :6]).max() <= 1 + 1e-5
+    low, high = small.bounds[:3], small.bounds[3:6]
+    assert np.allclose((sample.boxes[:-1, :3] + 1) / 2 * (high - low) + low, scan.size, atol=1e-5)
+    assert sample.triples[-n:].tolist() == [[i, 0, n] for i in range(n)]
+    assert len(sample.triples) == len(scan.triples) + n
+    assert large.sample(0).classes.tolist() == large.sample(0).fine.tolist()
+    # every object has its place: on the floor or above it
+    floor = scan.triples[scan.triples[:, 2] == n - 1]
+    assert set(floor[:, 1]) <= {6, 7}
+    assert len(floor) == n - 1
+
+
+def test_written_graphs_satisfy_the_published_metric(folder):
+    for scan in SGFront(folder).scans:
+        kept = verdicts(scan, scan.triples, rules="sgfront")
+        assert (kept != 0).all()
+
+
+def test_sdf_grids_come_back(tmp_path):
+    pytest.importorskip("h5py")
+    grid = np.linspace(-1, 1, 64**3, dtype=np.float32).reshape(64, 64, 64)
+    write_sdf(tmp_path, "s1_chair", grid)
+    assert np.array_equal(read_sdf(tmp_path, "s1_chair"), grid.clip(-0.2, 0.2))
+    with pytest.raises(SGFrontError, match=r"s2_chair/ori_sample_grid.h5: no such file"):
+        read_sdf(tmp_path, "s2_chair")
+    write_sdf(tmp_path, "small", grid[:, :, :2])
+    with pytest.raises(SGFrontError, match="8192 values, expected 262144"):
+        read_sdf(tmp_path, "small")
+
+
+def edited(folder, name, change):
+    path = folder / name
+    raw = json.loads(path.read_text())
+    change(raw)
+    path.write_text(json.dumps(raw))
+
+
+GRAPHS, BOXES = "relationships_all_trainval.json", "obj_boxes_all_trainval.json"
+
+
+def first(raw):
+    return raw["scans"][0] if "scans" in raw else next(iter(raw.values()))
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "text"),
+    [
+        (GRAPHS, lambda r: first(r)["relationships"].append([99, 1, 1, "left"]), r"no object 99, there are 1, 2"),
+        (GRAPHS, lambda r: first(r)["relationships"].append([1, 2, 16, "left"]), r"id 16, allowed are 1 to 15"),
+        (GRAPHS, lambda r: first(r)["relationships"].append([1, 2, 2, "left"]), r"id 2 is 'right' in relat"),
+        (GRAPHS, lambda r: first(r)["relationships"].append([1, 2]), r"expected \[subject, object, id, name\]"),
+        (GRAPHS, lambda r: first(r)["objects"].update({"1": "piano"}), r"object 1 is a 'piano', which classes_all.txt"),
+        (GRAPHS, lambda r: r["scans"].append(first(r)), r"appears twice"),
+        (GRAPHS, lambda r: r.pop("scans"), r"no list `scans`"),
+        (BOXES, lambda r: first(r).pop("2"), r"no box for object 2 \("),
+        (BOXES, lambda r: first(r)["1"]["param7"].pop(), r"object 1: param7 is .* expected 7 finite numbers"),
+        (BOXES, lambda r: first(r)["1"].update(param7=[1, -1, 1, 0, 0, 0, 0]), r"size \[1, -1, 1\] is negative"),
+        (BOXES, lambda r: first(r).pop("scene_center"), r"scene_center is None, expected 3 numbers"),
+        (BOXES, lambda r: r.pop(next(iter(r))), r"scan \w+-0: missing"),
+    ],
+)  # fmt: skip
+def test_malformed_files_name_file_and_scan(folder, file, change, text):
+    edited(folder, file, change)
+    with pytest.raises(SGFrontError, match=text) as caught:
+        SGFront(folder)
+    assert file in str(caught.value)
+    assert "scan" in str(caught.value)
+
+
+def test_other_bad_files(folder):
+    (folder / "centered_bounds_all_trainval.txt").write_text("1 2 3")
+    with pytest.raises(SGFrontError, match=r"centered_bounds_all_trainval.txt: holds 3 numbers, expected 14"):
+        SGFront(folder).sample(0)
+    (folder / "relationships.txt").write_text("left\nright\n")
+    with pytest.raises(SGFrontError, match=r"relationships.txt: holds 2 relationships, expected 15"):
+        SGFront(folder)
+    (folder / "relationships.txt").unlink()
+    with pytest.raises(SGFrontError, match=r"relationships.txt: no such file"):
+        SGFront(folder)
+    with pytest.raises(SGFrontError, match="room 'attic', split 'trainval': allowed are bedroom"):
+        SGFront(folder, "attic")
+    (folder / GRAPHS).write_text("{")
+    with pytest.raises(SGFrontError, match=r"no such file"):
+        SGFront(folder)
