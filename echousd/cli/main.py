@@ -32,8 +32,10 @@ TOPICS: tuple[str, ...] = (
     "convert",
     "doctor",
     "data",
+    "data_stage",
     "data_meshes",
     "eval",
+    "eval_shapes",
 )
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141

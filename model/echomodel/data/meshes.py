@@ -27,10 +27,11 @@ COLUMNS = ("key", "class", "use", "yaw", "name", "width", "height", "depth", "sp
 # Catalogue groups and words that are no furniture of ours although a rule below would match.
 OTHER_GROUPS = ("Vehicles", "Characters", "Doors and windows", "Staircases")
 OTHER = (
-    r"changing|high chair|pool|football|tennis|\bfan\b|wheel ?chair|lamppost|street|park |porch|outdoor|camping|stone",
-    r"flashlight|washbasin|ladder|carpet|contemporary|class ?seat|remote|abdominal|workbench|upper|hood|sink|locker",
-    r"mattress|hospital|sleeping|double vanity|railing|window|tatami|candle|fluorescent|track light|lantern|christmas",
-    r"deck|relax|beach|swing|plant box|flower box|socket|opened|tray|child hut|holder|telephone|table-?cloth$|bonsai|doll",
+    r"changing|christmas|high chair|pool|football|tennis|\bfan\b|wheel ?chair|lamppost|street|park |porch",
+    r"outdoor|stone|flashlight|washbasin|ladder|carpet|contemporary|class ?seat|remote|abdominal|workbench|upper",
+    r"hood|sink|locker|mattress|hospital|sleeping|double vanity|railing|window|tatami|candle|fluorescent",
+    r"track light|lantern|camping|deck|relax|beach|swing|plant box|flower box|socket|opened|tray|child hut",
+    r"holder|telephone|table-?cloth$|bonsai|doll",
 )
 # First match wins: pattern on the name, class; with a question mark the size decides.
 RULES: tuple[tuple[str, str], ...] = (

@@ -1,0 +1,97 @@
+"""`echousd eval shapes`: reconstruction and generation scores of a model's shapes, with a contact sheet."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to `echousd eval`."""
+    from echousd.cli.eval import eval_app
+
+    eval_app.command("shapes")(shapes)
+
+
+def shapes(
+    meshes: Annotated[Path | None, typer.Option(help="Set of real meshes, made by `echousd data meshes`.")] = None,
+    shape_set: Annotated[Path | None, typer.Option("--set", help="Shape set, made by `echousd data build`.")] = None,
+    model: Annotated[Path | None, typer.Option(help="Weights file or folder [shipped].")] = None,
+    limit: Annotated[int, typer.Option(min=1, help="Held-out shapes to reconstruct.")] = 200,
+    rooms: Annotated[
+        int, typer.Option(min=0, help="Rooms to fill with generated shapes; 0 = reconstruction only.")
+    ] = 12,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps [the model's].")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the choice, the rooms and the sampling.")] = 0,
+    sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet, eight generated shapes per class.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
+    json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
+) -> None:
+    """Reconstruct held-out shapes and generate shapes for new rooms, and score both against a set.
+
+    Example: echousd eval shapes --set data/packed/shapes --rooms 12 --sheet shapes.png
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from echomodel.data.shapeset import ShapeSet
+    from echomodel.data.sheet import contact_sheet
+    from echomodel.echo import EchoModel
+    from echomodel.metrics.shape_evaluation import ShapeEvaluation, evaluate_shapes
+
+    if (meshes is None) == (shape_set is None):
+        raise ValueError("name one set to compare with: --meshes FOLDER or --set FOLDER")
+    folder = meshes or shape_set
+    assert folder is not None
+    found = ShapeSet(folder / "shapes" if (folder / "shapes").is_dir() else folder)
+    console = Console(stderr=True, highlight=False)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        tasks: dict = {}
+
+        def progress(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = bar.add_task(what, total=total)
+            bar.update(tasks[what], completed=done)
+
+        settings = ShapeEvaluation(limit=limit, rooms=rooms, seed=seed, steps=steps)
+        result, made = evaluate_shapes(EchoModel.load(model), found, settings, progress)
+    if sheet is not None and made:
+        contact_sheet([(name, made[name][:8]) for name in sorted(made)]).save(sheet)
+    if out is not None:
+        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+    if json_out:
+        typer.echo(json.dumps(result))
+    else:
+        _print(result)
+
+
+def _print(result: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    table = Table("reconstruction", "n", "F-score", "IoU", "Chamfer", box=None)
+    rows = result["reconstruction"]
+    for name in ["all", *sorted((n for n in rows if n != "all"), key=lambda n: rows[n]["f_score"])]:
+        row = rows[name]
+        table.add_row(
+            name, f"{row['n']:.0f}", *(f"{row[key]:.3f}" for key in ("f_score", "iou")), f"{row['chamfer']:.4f}"
+        )
+    console.print(table)
+    if "generation" not in result:
+        return
+    made = result["generation"]
+    console.print(f"\n{made['objects']} generated, {made['empty']} empty, {made['watertight']:.1%} watertight")
+    if made["style"]:
+        style = made["style"]
+        console.print(
+            f"Chamfer within a style group {style['within']:.5f}, in the class {style['between']:.5f}, ratio "
+            f"{style['ratio']:.2f} ({style['within_n']:.0f} pairs)"
+        )
+    table = Table("sets", "n", "MMD", "COV", "1-NNA", box=None)
+    for name, row in made["sets"].items():
+        table.add_row(name, f"{row['n']:.0f}", f"{row['mmd']:.4f}", f"{row['cov']:.2f}", f"{row['acc']:.2f}")
+    console.print(table)

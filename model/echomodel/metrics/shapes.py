@@ -1,0 +1,156 @@
+"""Scores of shapes: reconstruction (F-score, IoU, Chamfer), sets (MMD, COV, 1-NNA), watertightness, style likeness.
+
+All distances are measured in the box frame, in which a shape fills the unit box; one voxel of the grid is 1/60 there,
+and the F-score's threshold is 1/64.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from echomodel.data.tsdf import mesh_from_tsdf
+
+THRESHOLD = 1 / 64
+SAMPLES = 8_000  # points whose distance is scored
+DENSE = 40_000  # points by which the triangles of the other surface are found
+
+
+def surface_points(mesh: trimesh.Trimesh, count: int, seed: int = 0) -> np.ndarray:
+    """Points on a surface, evenly by area: (count, 3) float32, equal for equal seeds."""
+    points, _ = trimesh.sample.sample_surface(mesh, count, seed=seed)
+    return np.asarray(points, np.float32)
+
+
+def surface_scores(ours: np.ndarray, reference: np.ndarray, threshold: float = THRESHOLD) -> dict[str, float]:
+    """How well a grid matches another one.
+
+    Arguments:
+        ours, reference: (64, 64, 64) float, signed distances, negative inside; the reference holds a surface.
+        threshold: distance in the box frame that counts as a hit.
+
+    Returns:
+        `f_score`, the harmonic mean of `precision` (our points near the reference) and `recall` (its points near ours);
+        `chamfer`, the mean distance both ways, averaged; `iou` of the insides. A grid without surface scores 0 with a
+        Chamfer distance of 1.
+    """
+    union = ((ours < 0) | (reference < 0)).sum()
+    iou = float(((ours < 0) & (reference < 0)).sum() / max(union, 1))
+    try:
+        mesh = mesh_from_tsdf(ours)
+    except ValueError:
+        return {"f_score": 0.0, "precision": 0.0, "recall": 0.0, "chamfer": 1.0, "iou": iou}
+    target = mesh_from_tsdf(reference)
+    there, back = _distances(mesh, target), _distances(target, mesh)
+    precision, recall = float((there <= threshold).mean()), float((back <= threshold).mean())
+    f_score = 2 * precision * recall / (precision + recall) if precision + recall else 0.0
+    chamfer = float(there.mean() + back.mean()) / 2
+    return {"f_score": f_score, "precision": precision, "recall": recall, "chamfer": chamfer, "iou": iou}
+
+
+def _distances(mesh: trimesh.Trimesh, target: trimesh.Trimesh) -> np.ndarray:
+    """Distances of points on one surface to the other: to the triangle on which the nearest sample lies."""
+    dense, face = trimesh.sample.sample_surface(target, DENSE, seed=0)
+    points = surface_points(mesh, SAMPLES, seed=1).astype(float)
+    found, index = cKDTree(dense).query(points)
+    closest = trimesh.triangles.closest_point(target.triangles[face[index]], points)
+    return np.minimum(found, np.linalg.norm(closest - points, axis=1))
+
+
+def reconstruction_scores(
+    grids: Callable[[int], np.ndarray],
+    labels: Sequence[str],
+    reconstruct: Callable[[np.ndarray], np.ndarray],
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, dict[str, float]]:
+    """Mean `surface_scores` of reconstructions, per label and under "all" (mean over shapes), with their number `n`.
+
+    Arguments:
+        grids: shape number -> (64, 64, 64) float32.
+        labels: a class per shape.
+        reconstruct: grid -> grid.
+        progress: called with (done, all).
+    """
+    found: dict[str, list[dict[str, float]]] = defaultdict(list)
+    for i, label in enumerate(labels):
+        grid = grids(i)
+        scores = surface_scores(reconstruct(grid), grid)
+        found[label].append(scores)
+        found["all"].append(scores)
+        if progress:
+            progress(i + 1, len(labels))
+    return {label: {**_means(rows), "n": float(len(rows))} for label, rows in sorted(found.items())}
+
+
+def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+
+
+def style_likeness(points: np.ndarray, groups: Sequence[tuple[str, object]]) -> dict[str, float]:
+    """Chamfer distance between shapes of one style group beside that between shapes of the class at large.
+
+    Arguments:
+        points: (n, p, 3) float32 surface points.
+        groups: (class, group) per shape; shapes with equal pairs belong to one style group.
+
+    Returns:
+        `within` and `between`, means over classes that have both kinds of pairs; their `ratio`; the number of pairs
+        `within_n`. Empty when no class has both.
+    """
+    import torch
+
+    from echomodel.metrics.pointsets import chamfer_matrix
+
+    members: dict[str, list[int]] = defaultdict(list)
+    for i, (label, _) in enumerate(groups):
+        members[label].append(i)
+    within, between, pairs = [], [], 0
+    for indices in members.values():
+        if len(indices) < 3:
+            continue
+        chosen = torch.as_tensor(points[indices])
+        matrix = chamfer_matrix(chosen, chosen).numpy()
+        same = np.array([[groups[i][1] == groups[j][1] for j in indices] for i in indices])
+        upper = np.triu(np.ones_like(same), 1).astype(bool)
+        if (same & upper).any() and (~same & upper).any():
+            within.append(matrix[same & upper].mean())
+            between.append(matrix[~same & upper].mean())
+            pairs += int((same & upper).sum())
+    if not within:
+        return {}
+    inside, outside = float(np.mean(within)), float(np.mean(between))
+    return {"within": inside, "between": outside, "ratio": inside / max(outside, 1e-12), "within_n": float(pairs)}
+
+
+def set_scores(
+    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4
+) -> dict[str, dict[str, float]]:
+    """MMD, COV and 1-NNA (Chamfer) of generated against reference shapes, per class and averaged over classes ("mean").
+
+    Arguments:
+        generated, references: class -> (n, p, 3) float32 surface points; both are cut to the smaller number.
+        least: classes with fewer shapes on either side are left out.
+    """
+    import torch
+
+    from echomodel.metrics.pointsets import compare_sets
+
+    scores: dict[str, dict[str, float]] = {}
+    for label in sorted(set(generated) & set(references)):
+        count = min(len(generated[label]), len(references[label]))
+        if count < least:
+            continue
+        ours, real = (torch.as_tensor(side[label][:count]) for side in (generated, references))
+        scores[label] = {**compare_sets(ours, real), "n": float(count)}
+    if scores:
+        scores["mean"] = _means(list(scores.values()))
+    return scores
+
+
+def watertight_share(meshes: Sequence[trimesh.Trimesh]) -> float:
+    """Share of meshes that are closed with consistent winding."""
+    return float(np.mean([mesh.is_watertight and mesh.is_winding_consistent for mesh in meshes]))
