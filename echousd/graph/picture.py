@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.graph.placing import HEIGHT, WIDTH, places
+from echousd.graph.placing import HEIGHT, WIDTH, distinct, places
 from echousd.graph.scene import Node, SceneGraph
 
 if TYPE_CHECKING:
@@ -58,9 +58,12 @@ def kind_of(predicate: str) -> str:
 
 
 def arrows(graph: SceneGraph) -> list[Arrow]:
-    """The relations gathered by pair and kind; relations that read the same both ways have no heads."""
+    """The relations gathered by pair and kind, those that repeat another the other way round left out.
+
+    Relations that read the same both ways have no heads.
+    """
     gathered: dict[tuple[str, str, str], list[str]] = defaultdict(list)
-    for relation in graph.relations:
+    for relation in distinct(graph.relations):
         gathered[relation.subject, relation.object, kind_of(relation.predicate)].append(relation.predicate)
     symmetric = {predicate.name for predicate in vocabulary().predicates if predicate.symmetric}
     return [
@@ -76,8 +79,13 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     from matplotlib.figure import Figure
 
     place = places(graph)
+    where = dict(zip(graph.names, place, strict=True))
+    joined = arrows(graph)
+    curves = _curves(joined, where)
+    middles = np.array([curve.middle for curve in curves]).reshape(-1, 2)
     margin = np.array([0.7 * WIDTH, 0.65])
-    low, high = place.min(0) - margin, place.max(0) + margin
+    low = np.minimum(place.min(0) - margin, middles.min(0, initial=np.inf) - 0.4)
+    high = np.maximum(place.max(0) + margin, middles.max(0, initial=-np.inf) + 0.4)
     span = np.maximum(high - low, (5.5, 2.2))
     low, high = (low + high - span) / 2, (low + high + span) / 2
     shrink = min(1.0, 40 / span.max())  # a thousand objects still make a picture that opens
@@ -87,9 +95,8 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     axes = figure.add_axes((0, 0.45 / tall, 1, 1 - 1.05 / tall))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.axis("off")
-    where = dict(zip(graph.names, place, strict=True))
-    joined = arrows(graph)
-    _draw_arrows(axes, joined, where, shrink)
+    for curve in curves:
+        _draw_curve(axes, curve, shrink, labelled=len(curves) <= LABELLED)
     for node in graph.nodes:
         _draw_node(axes, node, where[node.name], shrink)
     room = graph.room
@@ -125,32 +132,50 @@ def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None
         axes.text(across, up - 0.15, below, fontsize=7.5 * shrink, color="#4a4f57", **style)
 
 
-def _draw_arrows(axes: Axes, joined: list[Arrow], where: dict[str, np.ndarray], shrink: float) -> None:
-    from matplotlib.patches import FancyArrowPatch
+@dataclass(frozen=True)
+class Curve:
+    """An arrow on the page, from edge to edge of two boxes, with the place of its words."""
 
+    arrow: Arrow
+    start: np.ndarray
+    end: np.ndarray
+    bend: float
+    middle: np.ndarray
+
+
+def _curves(joined: list[Arrow], where: dict[str, np.ndarray]) -> list[Curve]:
+    """Arrows between the same two boxes bend apart."""
     pairs: dict[frozenset[str], list[Arrow]] = defaultdict(list)
     for arrow in joined:
         pairs[frozenset((arrow.subject, arrow.object))].append(arrow)
+    curves = []
     for together in pairs.values():
         for i, arrow in enumerate(together):
-            colour, dash, _ = KINDS[arrow.kind]
-            start, end = where[arrow.subject], where[arrow.object]
             turn = 1 if arrow.subject < arrow.object else -1  # one bend means one side, whichever way the arrow goes
             bend = turn * 0.34 * (i - (len(together) - 1) / 2)
-            start_edge, end_edge = _edge(start, end, bend), _edge(end, start, -bend)
-            patch = FancyArrowPatch(
-                tuple(start_edge), tuple(end_edge), connectionstyle=f"arc3,rad={bend}",
-                arrowstyle="-" if arrow.both_ways else "-|>", mutation_scale=13 * shrink, shrinkA=0, shrinkB=0,
-                color=colour, linestyle=dash, linewidth=1.4 * shrink, zorder=2,
-            )  # fmt: skip
-            axes.add_patch(patch)
-            if len(joined) > LABELLED:
-                continue
-            along = end_edge - start_edge
-            middle = (start_edge + end_edge) / 2 + 0.5 * bend * np.array([along[1], -along[0]])
-            box = {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
-            style: dict[str, Any] = {"ha": "center", "va": "center", "linespacing": 1.0, "zorder": 5, "bbox": box}
-            axes.text(middle[0], middle[1], "\n".join(arrow.words), fontsize=7.5 * shrink, color=colour, **style)
+            ends = where[arrow.subject], where[arrow.object]
+            start, end = _edge(*ends, bend), _edge(*ends[::-1], -bend)
+            along = end - start
+            middle = (start + end) / 2 + 0.5 * bend * np.array([along[1], -along[0]])  # of the quadratic curve
+            curves.append(Curve(arrow, start, end, bend, middle))
+    return curves
+
+
+def _draw_curve(axes: Axes, curve: Curve, shrink: float, labelled: bool) -> None:
+    from matplotlib.patches import FancyArrowPatch
+
+    colour, dash, _ = KINDS[curve.arrow.kind]
+    patch = FancyArrowPatch(
+        tuple(curve.start), tuple(curve.end), connectionstyle=f"arc3,rad={curve.bend}",
+        arrowstyle="-" if curve.arrow.both_ways else "-|>", mutation_scale=13 * shrink, shrinkA=0, shrinkB=0,
+        color=colour, linestyle=dash, linewidth=1.4 * shrink, zorder=2,
+    )  # fmt: skip
+    axes.add_patch(patch)
+    if labelled:
+        box = {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
+        style: dict[str, Any] = {"ha": "center", "va": "center", "linespacing": 1.0, "zorder": 2.5, "bbox": box}
+        words = "\n".join(curve.arrow.words)
+        axes.text(curve.middle[0], curve.middle[1], words, fontsize=7.5 * shrink, color=colour, **style)
 
 
 def _edge(start: np.ndarray, end: np.ndarray, bend: float) -> np.ndarray:

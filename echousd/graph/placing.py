@@ -5,9 +5,12 @@ The page is the room seen from above by an observer who looks along +X: up is fr
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from echousd.graph.scene import SceneGraph
+from echomodel.vocabulary import vocabulary
+from echousd.graph.scene import Relation, SceneGraph
 
 # Where the subject wants to be from its object, in steps across (right) and up (front) the page.
 DIRECTIONS = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "behind": (0, -1)}
@@ -19,27 +22,28 @@ TRIES = 16  # starts of small graphs, of which the clearest picture is kept
 def places(graph: SceneGraph) -> np.ndarray:
     """Where each node goes on the page.
 
-    Nodes that all have a position keep it; otherwise related nodes attract, all boxes repel, and left, right, front and
-    behind pull their ends to the right sides of each other.
+    Nodes that all have a position keep it, but for the room that boxes need; otherwise related nodes attract, all boxes
+    repel, and left, right, front and behind pull their ends to the right sides of each other.
 
     Returns:
         (n, 2) float, inches right and up.
     """
     fixed = [node.position for node in graph.nodes if node.position is not None]
     count = len(graph.nodes)
+    relations = distinct(graph.relations)
+    cell = CELL * np.clip(np.sqrt(len(relations) / (2.5 * count)), 1, 2.2)  # many words need room
     if len(fixed) == count:
         place = np.array([(z, x) for x, _, z in fixed], float)
-        place -= place.mean(0)
         span = max(np.ptp(place, axis=0).max(), 1e-6)
-        return _spread(place * max(1.0, 1.1 * WIDTH * np.sqrt(count) / span))
+        return _spread((place - place.mean(0)) * max(1.0, 0.6 * cell[0] * np.sqrt(count) / span), 0.9 * cell)
     import networkx
 
     index = {name: i for i, name in enumerate(graph.names)}
-    pairs = {tuple(sorted((index[r.subject], index[r.object]))) for r in graph.relations}
+    pairs = {tuple(sorted((index[r.subject], index[r.object]))) for r in relations}
     simple = networkx.Graph(pairs)
     simple.add_nodes_from(index.values())
     ends = np.array(sorted(pairs), int).reshape(-1, 2)
-    stated = [(index[r.subject], index[r.object], DIRECTIONS.get(r.predicate)) for r in graph.relations]
+    stated = [(index[r.subject], index[r.object], DIRECTIONS.get(r.predicate)) for r in relations]
     pulls = [(subject, object_, *way) for subject, object_, way in stated if way]
     directed = np.array([pull[:2] for pull in pulls], int).reshape(-1, 2)
     ways = np.array([pull[2:] for pull in pulls], float).reshape(-1, 2)
@@ -49,11 +53,21 @@ def places(graph: SceneGraph) -> np.ndarray:
         place = np.array([start[i] for i in range(count)])
         for step in np.linspace(0.5, 0.03, 250 if count <= 200 else 60):
             place = place + step * np.clip(_forces(place, ends, directed, ways), -1, 1)
-        place = _spread((place - place.mean(0)) * CELL)
+        place = _spread((place - place.mean(0)) * cell, np.array([WIDTH + 0.35, HEIGHT + 0.5]))
         muddle = _muddle(place, ends, directed, ways) if count <= 60 else 0.0
         if muddle < least:
             best, least = place, muddle
     return best
+
+
+def distinct(relations: Iterable[Relation]) -> list[Relation]:
+    """The relations without those that say what an earlier one says already, the other way round."""
+    inverse = {predicate.name: predicate.inverse for predicate in vocabulary().predicates}
+    kept: dict[tuple[str, str | None, str], Relation] = {}
+    for relation in relations:
+        if (relation.object, inverse[relation.predicate], relation.subject) not in kept:
+            kept[relation.triple] = relation
+    return list(kept.values())
 
 
 def _muddle(place: np.ndarray, ends: np.ndarray, directed: np.ndarray, ways: np.ndarray) -> float:
@@ -94,11 +108,11 @@ def _forces(place: np.ndarray, ends: np.ndarray, directed: np.ndarray, ways: np.
     return move + (0.16 * gap / near**1.5).sum(1)
 
 
-def _spread(place: np.ndarray) -> np.ndarray:
-    """Push boxes apart that still overlap, the shorter way."""
+def _spread(place: np.ndarray, apart: np.ndarray) -> np.ndarray:
+    """Push boxes aside, the shorter way, until all are `apart` (across, up)."""
     for _ in range(200 if len(place) <= 200 else 20):
         gap = place[:, None] - place[None]
-        lack = np.array([WIDTH + 0.35, HEIGHT + 0.5]) - np.abs(gap)
+        lack = apart - np.abs(gap)
         overlap = (lack > 0).all(-1)
         np.fill_diagonal(overlap, False)
         if not overlap.any():

@@ -139,3 +139,12 @@ def test_the_arrangement_lies_inside_the_room_and_nothing_collides(name):
         for other, (foot_2, low_2, high_2) in solids.items():
             if one < other and min(high, high_2) - max(low, low_2) > 1e-6:
                 assert foot.intersection(foot_2).area < 1e-6, (one, other)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_sample_stage_holds_one_room(name):
+    from echousd.stage import read_rooms
+
+    rooms = read_rooms(SAMPLES / f"{name}.usda")
+    assert list(rooms) == ["/Room"]
+    assert rooms["/Room"] == load_graph(SAMPLES / f"{name}.yaml")

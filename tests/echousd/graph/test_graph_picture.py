@@ -63,13 +63,27 @@ def test_texts_are_drawn_as_they_are(tmp_path):
 
 def test_relations_of_one_kind_share_an_arrow():
     nodes = tuple(Node(name, "chair") for name in "ab")
-    stated = ["a left b", "a front b", "a close_by b", "b close_by a", "a same_style_as b", "a bigger_than b"]
+    stated = ["a left b", "a front b", "a close_by b", "b above a", "a same_style_as b", "a bigger_than b"]
     graph = SceneGraph("study", nodes, tuple(Relation(*words.split()) for words in stated))
     found = {(arrow.subject, arrow.kind): arrow for arrow in arrows(graph)}
     assert found["a", "direction"].words == ("left", "front")
     assert not found["a", "direction"].both_ways
     assert found["a", "closeness"].both_ways
     assert len(found) == 5
+
+
+def test_what_is_said_twice_is_drawn_once():
+    nodes = tuple(Node(name, "chair") for name in "ab")
+    stated = ["a left b", "b right a", "a near b", "b near a", "a bigger b", "b smaller a", "a above b", "b shorter a"]
+    relations = [Relation(*words.split()) for words in stated]
+    drawn = arrows(SceneGraph("study", nodes, tuple(relations)))
+    assert [(arrow.subject, arrow.words) for arrow in drawn] == [
+        ("a", ("left",)),
+        ("a", ("close by",)),
+        ("a", ("bigger than",)),
+        ("a", ("above",)),
+        ("b", ("shorter than",)),
+    ]
 
 
 def test_a_large_graph_still_makes_a_picture(tmp_path):
