@@ -12,7 +12,7 @@ plugin.register()  # first act: a stage opened before the schema is registered n
 if TYPE_CHECKING:
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
     from echousd.room import Room, generate
-    from echousd.stage import read_graph, read_rooms, write_graph
+    from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
 
 __version__ = "0.1.0"
 
@@ -25,6 +25,8 @@ _HOME = {
     "SceneGraph": "echousd.graph",
     "read_graph": "echousd.stage",
     "read_rooms": "echousd.stage",
+    "relations_from_boxes": "echousd.stage",
+    "update_graph": "echousd.stage",
     "write_graph": "echousd.stage",
     "Room": "echousd.room",
     "generate": "echousd.room",
@@ -39,6 +41,8 @@ __all__ = [
     "generate",
     "read_graph",
     "read_rooms",
+    "relations_from_boxes",
+    "update_graph",
     "write_graph",
 ]
 

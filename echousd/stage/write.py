@@ -38,15 +38,15 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/
     Raises StageError for a root that is no absolute prim path, nothing authored.
     """
     path = prim_path(root)
-    stage = target if isinstance(target, Usd.Stage) else None
-    layer = stage.GetEditTarget().GetLayer() if stage else target
-    if _holds_graph(stage, layer, path):
+    if _holds_graph(target, path):
         from echousd.stage.update import update_graph
 
         update_graph(target, graph, room=root)
-        return
-    spec_path = stage.GetEditTarget().MapToSpecPath(path) if stage else path
-    author(layer, graph, spec_path)
+    elif isinstance(target, Usd.Stage):
+        edit_target = target.GetEditTarget()
+        author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))
+    else:
+        author(target, graph, path)
 
 
 def prim_path(root: str | Sdf.Path) -> Sdf.Path:
@@ -58,12 +58,13 @@ def prim_path(root: str | Sdf.Path) -> Sdf.Path:
     return Sdf.Path(text)
 
 
-def _holds_graph(stage: Usd.Stage | None, layer: Sdf.Layer, room: Sdf.Path) -> bool:
-    if stage:
-        prim = stage.GetPrimAtPath(room)
-        return bool(prim) and any(child.GetTypeName() == usd.GRAPH_TYPE for child in prim.GetChildren())
-    spec = layer.GetPrimAtPath(room)
-    return bool(spec) and any(child.typeName == usd.GRAPH_TYPE for child in spec.nameChildren)
+def _holds_graph(target: Sdf.Layer | Usd.Stage, room: Sdf.Path) -> bool:
+    if not target.GetPrimAtPath(room):
+        return False
+    from echousd.stage.read import find_rooms
+
+    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
+    return any(prims.room.GetPath() == room for prims in find_rooms(stage))
 
 
 def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:

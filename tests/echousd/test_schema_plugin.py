@@ -31,6 +31,8 @@ def python(
 
 def test_regenerating_gives_the_committed_bytes(tmp_path):
     pytest.importorskip("jinja2")
+    if importlib.util.find_spec("pxr.Usd.usdGenSchema") is None:
+        pytest.skip("this pxr comes without usdGenSchema (usd-core before 25)")
     spec = importlib.util.spec_from_file_location("regenerate", SCHEMAS / "regenerate.py")
     regenerate = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(regenerate)
@@ -170,6 +172,7 @@ def test_plugin_path_from_the_source_tree_without_an_installation():
 
 @pytest.mark.skipif(not (REPOSITORY / "setup.py").is_file(), reason="needs the source tree")
 def test_a_built_package_carries_the_plugin(tmp_path):
+    pytest.importorskip("setuptools", minversion="77")
     command = [sys.executable, "setup.py", "-q", "build", "--build-base", str(tmp_path / "build")]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=REPOSITORY)
     assert done.returncode == 0, done.stderr

@@ -12,7 +12,7 @@ import pytest
 from graph_strategies import graphs as scene_graphs
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pxr import Sdf, Usd
+from pxr import Sdf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.stage import graph_layer, read_graph, read_rooms, save_layer, write_graph
@@ -239,3 +239,48 @@ def test_every_client_can_ask_the_schema():
     assert relation.GetAttribute("echo:confidence").Get() == 1.0
     assert stage.GetPrimAtPath("/Room/Objects/bed").HasAPI("EchoNodeAPI")
     assert stage.GetPrimAtPath("/Room/Objects/bed").GetAttribute("echo:locked").Get() is False
+
+
+def test_the_graph_may_lie_beside_its_room():
+    stage = Usd.Stage.CreateInMemory()
+    bed = stage.DefinePrim("/World/Furniture/bed", "Xform")
+    bed.ApplyAPI("EchoNodeAPI")
+    bed.CreateAttribute("semantics:labels:category", Sdf.ValueTypeNames.TokenArray).Set(["king size bed"])
+    graph = stage.DefinePrim("/Graphs/bedroom", "EchoSceneGraph")
+    graph.GetAttribute("echo:roomType").Set("bedroom")
+    graph.GetRelationship("echo:room").SetTargets(["/World"])
+    found = read_rooms(stage)
+    assert found == {"/World": SceneGraph("bedroom", (Node("bed", "double_bed"),))}
+    wanted = found["/World"].add_node("stand", "nightstand").relate("stand", "left", "bed")
+    write_graph(wanted, stage, root="/World")
+    assert read_rooms(stage) == {"/World": wanted}
+    assert stage.GetPrimAtPath("/World/Furniture/stand")
+    assert stage.GetPrimAtPath("/Graphs/bedroom/stand__left__bed")
+
+
+def test_writing_into_a_stage_keeps_what_is_there():
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    stage.SetDefaultPrim(stage.DefinePrim("/World", "Scope"))
+    stage.DefinePrim("/Room/Objects/bed", "Cube").SetDocumentation("mine")
+    write_graph(BEDROOM, stage)
+    assert read_graph(stage) == BEDROOM  # lengths are metres in the room's frame, whatever the stage counts in
+    assert (UsdGeom.GetStageUpAxis(stage), UsdGeom.GetStageMetersPerUnit(stage)) == ("Z", 0.01)
+    assert stage.GetDefaultPrim().GetPath() == "/World"
+    bed = stage.GetPrimAtPath("/Room/Objects/bed")
+    assert (bed.GetTypeName(), bed.GetDocumentation()) == ("Cube", "mine")
+
+
+def test_an_edit_target_behind_a_reference():
+    source = Sdf.Layer.CreateAnonymous(".usda")
+    Sdf.CreatePrimInLayer(source, "/Asset")
+    source.defaultPrim = "Asset"
+    stage = Usd.Stage.CreateInMemory()
+    prim = stage.DefinePrim("/House/Bedroom")
+    prim.GetReferences().AddReference(source.identifier)
+    node = prim.GetPrimIndex().rootNode.children[0]
+    stage.SetEditTarget(Usd.EditTarget(source, node))
+    write_graph(BEDROOM, stage, root="/House/Bedroom")
+    assert read_rooms(stage) == {"/House/Bedroom": BEDROOM}
+    assert read_rooms(Usd.Stage.Open(source)) == {"/Asset": BEDROOM}
