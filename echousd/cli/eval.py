@@ -35,6 +35,9 @@ def layout(
     ] = False,
     steps: Annotated[int | None, typer.Option(help="Sampling steps [the model's].")] = None,
     guidance: Annotated[float, typer.Option(help="Scale of guidance towards the relations, 1 = off.")] = 1.0,
+    relation_guidance: Annotated[
+        float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off [the model's].")
+    ] = None,
     model: Annotated[str | None, typer.Option(help='Weights [shipped]; "truth" scores the true boxes.')] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
@@ -55,7 +58,7 @@ def layout(
     if model == "truth":
         sampler = _truth(found)
     else:
-        sampler = _model_sampler(None if model is None else Path(model), seed, rules, steps, guidance)
+        sampler = _model_sampler(None if model is None else Path(model), seed, rules, steps, guidance, relation_guidance)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
@@ -69,7 +72,9 @@ def layout(
         _print(result, Console(highlight=False))
 
 
-def _model_sampler(weights: Path | None, seed: int, rules: str, steps: int | None, guidance: float) -> Sampler:
+def _model_sampler(
+    weights: Path | None, seed: int, rules: str, steps: int | None, guidance: float, relation_guidance: float | None
+) -> Sampler:
     import torch
 
     from echomodel.boxes import Boxes
@@ -81,7 +86,13 @@ def _model_sampler(weights: Path | None, seed: int, rules: str, steps: int | Non
     def sample(edited: EditedGraph) -> Boxes:
         edit = None if edited.before is None else GraphEdit(before=edited.before, added=edited.added)
         return model.sample_layout(
-            edited.graph, generator=generator, steps=steps, rules=rules, guidance=guidance, edit=edit
+            edited.graph,
+            generator=generator,
+            steps=steps,
+            rules=rules,
+            guidance=guidance,
+            relation_guidance=relation_guidance,
+            edit=edit,
         )
 
     return sample
@@ -128,7 +139,8 @@ def _print(result: dict, console: Console) -> None:
         if len(modes) > 1:
             parts = [cell(result[mode][name]["total"]) if name in result[mode] else "" for mode in modes]
             table.add_row(f"total, {name}", *parts, "")
-    console.print(f"{result['rooms']} rooms, rules {result['rules']}, {result['drop']:.0%} of the relations dropped")
+    settings = result["settings"]
+    console.print(f"{result['rooms']} rooms, rules {settings['rules']}, {settings['drop']:.0%} of relations dropped")
     console.print(table)
     sizes = [row for row in result["sizes"] if row["ks"] is not None]
     if sizes:

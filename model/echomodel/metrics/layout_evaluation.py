@@ -78,7 +78,7 @@ def evaluate_layout(
         progress: called with (scenes done, in all).
 
     Returns:
-        `generation` (and `change`, `add`): shares of relations kept per predicate and group, for edits also of the
+        `rooms` scored, `settings`, `generation` (and `change`, `add`): shares of relations kept per predicate and group, for edits also of the
         triplets that touch an edited node and of the others; `sizes`: rows per class and axis; `figures` and
         `real_figures`: collisions, outside floor, pairs, walls, in the form of `room_statistics.json`.
     """
@@ -92,7 +92,7 @@ def evaluate_layout(
     ]
     modes = ["generation"] + ["change"] * settings.change + ["add"] * settings.add
     done, total = 0, len(rooms) * len(modes)
-    out: dict = {"rooms": len(rooms), **asdict(settings)}
+    out: dict = {"rooms": len(rooms), "settings": asdict(settings)}
     drawn: list[RoomBoxes] = []
     for mode in modes:
         found, scenes, edits, offset = [], [], [], 0

@@ -1,0 +1,123 @@
+"""`echousd data` and `echousd eval layout` end to end on small sets."""
+
+import json
+
+import numpy as np
+import pytest
+
+from echomodel.data.rooms import generate_rooms
+from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
+from echomodel.rules import label_relations
+from echousd.cli.data_stage import graph_of, room_of
+from echousd.cli.main import run
+
+
+@pytest.fixture(scope="module")
+def rooms_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rooms") / "rooms.json"
+    assert run(["data", "rooms", "--count", "12", "--seed", "4", "-o", str(path)]) == 0
+    return path
+
+
+def same(a: RoomBoxes, b: RoomBoxes, digits: int = 4) -> bool:
+    return (
+        a.categories == b.categories
+        and a.models == b.models
+        and a.styles == b.styles
+        and np.allclose(a.size, b.size, atol=10**-digits)
+        and np.allclose(a.position, b.position, atol=10**-digits)
+        and np.allclose(a.yaw, b.yaw, atol=10**-digits)
+        and np.allclose(a.floor_polygon, b.floor_polygon, atol=10**-digits)
+    )
+
+
+def test_rooms_are_written_and_seeded(rooms_file, tmp_path):
+    assert len(read_rooms(rooms_file)) == 12
+    run(["data", "rooms", "--count", "12", "--seed", "4", "-o", str(tmp_path / "again.json")])
+    assert (tmp_path / "again.json").read_bytes() == rooms_file.read_bytes()
+    run(["data", "rooms", "--count", "3", "--room", "lounge", "-o", str(tmp_path / "living.json")])
+    assert {room.room_type for room in read_rooms(tmp_path / "living.json")} == {"living_room"}
+
+
+def test_rooms_to_usd_and_back(rooms_file, tmp_path):
+    assert run(["data", "to-usd", str(rooms_file), "-o", str(tmp_path / "usd")]) == 0
+    assert run(["data", "from-usd", str(tmp_path / "usd"), "-o", str(tmp_path / "back.json")]) == 0
+    true, back = read_rooms(rooms_file), read_rooms(tmp_path / "back.json")
+    assert [room.id for room in back] == sorted(room.id for room in true)
+    found = {room.id: room for room in back}
+    for room in true:
+        assert same(room, found[room.id])
+        assert sorted(map(tuple, found[room.id].relations)) == sorted(map(tuple, label_relations(room)))
+
+
+def test_graph_keeps_relations_and_names_twins():
+    room = generate_rooms(1, 8, room_type="dining_room")[0]
+    some = RoomBoxes(**{**vars(room), "relations": label_relations(room)[::7]})
+    graph = graph_of(some)
+    assert len(set(graph.names)) == len(room)
+    back = room_of(graph, room.id)
+    assert same(room, back, 9)
+    assert np.array_equal(np.sort(back.relations, 0), np.sort(some.relations, 0))
+    assert len(graph_of(room, None).relations) == 0
+
+
+def test_unknown_objects_are_left_out_or_told(tmp_path, capsys):
+    room = RoomBoxes(
+        "r", "living", np.array([[-2, -2], [2, -2], [2, 2], [-2, 2.0]]), 2.6, ("piano", "sofa_3", "stool"),
+        np.ones((3, 3)), np.array([[0, 0, 0], [1, 0, 1], [-1, 0, 1.0]]), np.zeros(3),
+    )  # fmt: skip
+    path = tmp_path / "r.json"
+    write_rooms(path, [room])
+    assert run(["data", "to-usd", str(path), "-o", str(tmp_path / "usd")]) == 0
+    assert run(["data", "from-usd", str(tmp_path / "usd" / "r.usda"), "-o", str(tmp_path / "b.json")]) == 0
+    assert read_rooms(tmp_path / "b.json")[0].categories == ("multi_seat_sofa", "stool")
+    assert run(["data", "to-usd", str(path), "--no-known", "-o", str(tmp_path / "none")]) == 2
+    assert "unknown category 'piano'" in capsys.readouterr().err
+
+
+def test_sgfront_files_and_back(rooms_file, tmp_path):
+    assert run(["data", "to-sgfront", str(rooms_file), "-o", str(tmp_path)]) == 0
+    assert run(["data", "from-sgfront", str(tmp_path), "-o", str(tmp_path / "back.json")]) == 0
+    back = read_rooms(tmp_path / "back.json")
+    assert len(back) == 12
+    assert all(len(room.relations) > 0 for room in back)
+
+
+def test_plot_report_and_evaluation(rooms_file, tmp_path, capsys):
+    assert run(["data", "plot", str(rooms_file), "-o", str(tmp_path / "rooms.png"), "--columns", "4"]) == 0
+    assert (tmp_path / "rooms.png").read_bytes()[:4] == b"\x89PNG"
+    assert run(["data", "report", str(rooms_file), "--real", str(rooms_file), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["mean_distance"]["all"] == 0.0
+    assert run(["eval", "layout", "--rooms", str(rooms_file), "--model", "truth", "--change", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["generation"]["total"] == 1.0
+    assert told["change"]["total"] < 1.0
+    assert run(["eval", "layout", "--rooms", str(rooms_file), "--model", "truth"]) == 0
+    assert "left/right" in capsys.readouterr().out
+
+
+def test_a_built_set_serves_as_rooms(tmp_path, capsys):
+    from echomodel.data.roomset import build_rooms
+
+    build_rooms(tmp_path / "rooms", 6, 1, 2)
+    assert run(["eval", "layout", "--rooms", str(tmp_path), "--model", "truth", "--limit", "4", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rooms"] == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["data", "plot", "missing.json", "-o", "x.png"], "missing.json: no such file or folder"),
+        (["data", "build", "--recipe", "huge", "-o", "x"], "unknown recipe 'huge': allowed are smoke, packed, full"),
+        (["data", "rooms", "--room", "garage", "-o", "x"], "unknown room type 'garage'"),
+        (["data", "from-sgfront", "nowhere", "-o", "x"], "nowhere/classes_all.txt: no such file"),
+        (["eval", "layout", "--rooms", "nothing"], "nothing: no such file or folder"),
+    ],
+)
+def test_errors_are_one_line(arguments, text, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == 2
+    error = capsys.readouterr().err
+    assert text in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
