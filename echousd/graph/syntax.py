@@ -46,6 +46,14 @@ for _kind, (_pattern, _first) in _RESOLVERS.items():
         _class.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", re.compile(f"^(?:{_pattern})$"), first)
 
 
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.Node:
+    style = None if text.isprintable() else '"'  # only in double quotes do all characters come back
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+Dumper.add_representer(str, _text)
+
+
 @dataclass(frozen=True)
 class Located:
     """Plain data with the line (from 1) of every value, by its path of keys and positions."""
