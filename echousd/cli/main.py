@@ -6,6 +6,7 @@ import importlib
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -59,6 +60,7 @@ def _options(
 
 def main() -> None:
     """Entry point of the `echousd` command."""
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"  # no line of our source
     sys.exit(run(sys.argv[1:]))
 
 
