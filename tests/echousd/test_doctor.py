@@ -95,3 +95,21 @@ def test_an_old_usd_is_a_gap(monkeypatch):
     found = {finding.name: finding for finding in doctor.diagnose()}
     assert found["usd"].state == "gap"
     assert found["usd"].remedy.startswith("OpenUSD 24.11 or newer is needed")
+
+
+def test_warnings_are_one_line(tmp_path):
+    (tmp_path / "foreign.usda").write_text("""#usda 1.0
+def Cube "bed" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
+    token[] semantics:labels:class = ["bed"]
+}
+def Cube "harp" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
+    token[] semantics:labels:class = ["harp"]
+}
+""")
+    command = [sys.executable, "-c", "from echousd.cli.main import main; main()", "graph", "foreign.usda", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["nodes"][0]["category"] == "double_bed"
+    assert done.stderr.startswith("warning: ")
+    assert done.stderr.endswith("foreign.usda: labelled prims that became no node: unknown label 'harp' (1)\n")
+    assert done.stderr.count("\n") == 1
