@@ -58,7 +58,8 @@ def layout(
     if model == "truth":
         sampler = _truth(found)
     else:
-        sampler = _model_sampler(None if model is None else Path(model), seed, rules, steps, guidance, relation_guidance)
+        weights = None if model is None else Path(model)
+        sampler = _model_sampler(weights, seed, rules, steps, guidance, relation_guidance)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
