@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 VIEWS = ("top", "perspective")
 COLORS = ("materials", "class")
-SUPERSAMPLES = 3  # squared: rays per pixel
+FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS = 3  # per ray: rays towards the sky
 LARGEST = 4096
 
@@ -35,16 +35,16 @@ class View:
 
 
 def render_file(
-    path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials"
+    path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
 ) -> Image.Image:
     """A picture of the room in a file; see `render_stage`. Raises ValueError where it cannot be opened."""
     from echousd.stage import open_stage
 
-    return render_stage(open_stage(path), view=view, size=size, colors=colors)
+    return render_stage(open_stage(path), view=view, size=size, colors=colors, rays=rays)
 
 
 def render_stage(
-    stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials"
+    stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
 ) -> Image.Image:
     """A square picture of everything visible on a stage.
 
@@ -53,6 +53,7 @@ def render_stage(
         view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner).
         size: pixels on each side, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.
+        rays: along each side of a pixel.
 
     Raises:
         ValueError: unknown view, colours or size, nothing to see, or Embree missing.
@@ -67,7 +68,7 @@ def render_stage(
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     scenery = read_scenery(stage, by_class=colors == "class")
     camera = top_view(scenery) if view == "top" else corner_view(scenery)
-    pixels = trace(scenery, camera, size)
+    pixels = trace(scenery, camera, size, rays=rays)
     return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
 
 
@@ -85,20 +86,21 @@ def corner_view(scenery: Scenery) -> View:
     """From above a corner, the side that most objects turn their front to, the whole scene in the picture."""
     from echousd.room.cameras import APERTURE, FOCAL_LENGTH, perspective_view
 
-    points = scenery.triangles.reshape(-1, 3)[:: max(1, len(scenery.triangles) // 4000)].astype(float)
+    points = scenery.triangles.reshape(-1, 3).astype(float)
     return View(perspective_view(points, scenery.facing), APERTURE / 2 / FOCAL_LENGTH, False)
 
 
-def trace(scenery: Scenery, view: View, size: int, *, seed: int = 0) -> np.ndarray:
+def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
     """The picture as (size, size, 3) float sRGB in [0, 1].
 
-    Every pixel sends SUPERSAMPLES² rays; together they cover the sun's disc and the sky evenly, each pixel with another
+    Every pixel sends `rays`² rays; together they cover the sun's disc and the sky evenly, each pixel with another
     shift (randomised quasi-Monte Carlo), so that little noise is left.
 
     Arguments:
         scenery: triangles and their colours.
         view: the camera.
         size: pixels on each side.
+        rays: along each side of a pixel.
         seed: of the shifts; the same seed gives the same picture.
     """
     rng = np.random.default_rng(seed)
@@ -108,9 +110,9 @@ def trace(scenery: Scenery, view: View, size: int, *, seed: int = 0) -> np.ndarr
     rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
     for start in range(0, size, rows):
         block = slice(start, min(size, start + rows))
-        for sample in range(SUPERSAMPLES**2):
-            layers[block] += _shade(scene, scenery, view, size, block, sample, shift[block])
-    layers /= SUPERSAMPLES**2
+        for sample in range(rays**2):
+            layers[block] += _shade(scene, scenery, view, size, rays, block, sample, shift[block])
+    layers /= rays**2
     light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
     color = layers[..., ALBEDO] * light + layers[..., GLOW]
     return _tone(color) ** (1 / 2.2)
@@ -132,17 +134,20 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np
             other_light, other_normal, other_point = (a[there] for a in padded)
             turn = np.clip((normal * other_normal).sum(-1, keepdims=True), 0, 1)
             step = np.abs((normal * (other_point - point)).sum(-1, keepdims=True))
-            share = turn**16 * (step < 0.02)
+            for _ in range(4):  # to the 16th power
+                turn *= turn
+            share = turn * (step < 0.02)
             total += share * other_light
             weight += share
     return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
 
 
-SUN = np.array([0.38, 0.84, 0.32]) / np.linalg.norm([0.38, 0.84, 0.32])
+SUN = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
 SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
-SUN_LIGHT = np.array([1.05, 0.99, 0.90])
-SKY_LIGHT = np.array([0.80, 0.86, 0.95])
-BACKGROUND = np.array([0.90, 0.905, 0.915]) ** 2.2
+SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
+SKY_LIGHT = np.array([0.80, 0.86, 0.95], np.float32)
+BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
+R2 = np.array([0.7548776662, 0.5698402910], np.float32)
 
 
 def _embree(scenery: Scenery) -> Any:
@@ -157,20 +162,20 @@ def _embree(scenery: Scenery) -> Any:
 
 
 def _shade(
-    scene: Any, scenery: Scenery, view: View, size: int, rows: slice, sample: int, shift: np.ndarray
+    scene: Any, scenery: Scenery, view: View, size: int, rays: int, rows: slice, sample: int, shift: np.ndarray
 ) -> np.ndarray:
     """(rows, size, LAYERS) what one ray for each pixel of some rows brings back."""
-    across, down = sample % SUPERSAMPLES, sample // SUPERSAMPLES
-    x = (np.arange(size) + (across + 0.5) / SUPERSAMPLES) / size * 2 - 1
-    y = 1 - (np.arange(rows.start, rows.stop) + (down + 0.5) / SUPERSAMPLES) / size * 2
+    across, down = sample % rays, sample // rays
+    x = (np.arange(size, dtype=np.float32) + (across + 0.5) / rays) / size * 2 - 1
+    y = 1 - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
     u, v = (g.ravel() * view.half for g in np.meshgrid(x, y))
-    axes, eye = view.matrix[:3, :3], view.matrix[:3, 3]
+    axes, eye = view.matrix[:3, :3].astype(np.float32), view.matrix[:3, 3].astype(np.float32)
     if view.orthographic:
         origin = eye + u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1]
         direction = np.broadcast_to(-axes[:, 2], origin.shape)
     else:
         direction = u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1] - axes[:, 2]
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        direction = _unit(direction)
         origin = np.broadcast_to(eye, direction.shape)
     hit = scene.run(_f32(origin), _f32(direction), output=1)
     seen = np.flatnonzero(hit["primID"] >= 0)
@@ -180,11 +185,11 @@ def _shade(
         return out.reshape(-1, size, LAYERS)
     face = hit["primID"][seen]
     bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
-    point = (scenery.triangles[face] * bary[..., None]).sum(1)
-    normal = (scenery.normals[face] * bary[..., None]).sum(1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+    point = np.einsum("ncx,nc->nx", scenery.triangles[face], bary)
+    normal = np.einsum("ncx,nc->nx", scenery.normals[face], bary)
+    normal = _unit(normal)
     toward = -direction[seen]
-    normal = np.where((normal * toward).sum(1, keepdims=True) < 0, -normal, normal)
+    normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
     lifted = point + 2e-3 * normal
     light, shine = _light(scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen])
     glow = 0.5 * shine[:, None] + scenery.emissive[face]
@@ -205,16 +210,16 @@ def _light(
     """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
     count = len(point)
     sun = SUN + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
-    sun /= np.linalg.norm(sun, axis=1, keepdims=True)
-    facing = np.clip((normal * SUN).sum(1), 0, None)
-    lit = np.zeros(count)
+    sun = _unit(sun)
+    facing = np.clip(normal @ SUN, 0, None)
+    lit = np.zeros(count, np.float32)
     ask = np.flatnonzero(facing > 0)
     lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
     direct = (facing * lit)[:, None] * SUN_LIGHT
-    sky = np.zeros((count, 3))
+    sky = np.zeros((count, 3), np.float32)
     for ray in range(SKY_RAYS):
         away = normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:]))  # cosine-weighted
-        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+        away = _unit(away)
         other = scene.run(_f32(point), _f32(away), output=1)
         blocked = other["primID"] >= 0
         # What a sky ray meets sends back a little of its own colour: one crude bounce.
@@ -223,16 +228,23 @@ def _light(
         open_sky = (0.55 + 0.45 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.35 + 0.65 * near), open_sky)
     sky /= SKY_RAYS
-    half = toward + SUN
-    half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-9)
+    half = _unit(toward + SUN)
     gloss = scenery.gloss[face]
-    shine = gloss * np.clip((normal * half).sum(1), 0, None) ** (4 + 90 * gloss) * lit
+    shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
     return 0.62 * direct + 0.78 * sky, shine
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("nx,nx->n", a, b)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.sqrt(np.maximum(_dot(vectors, vectors), 1e-18))[:, None]
 
 
 def _even(number: int, shift: np.ndarray) -> np.ndarray:
     """Point `number` of the R2 sequence, which fills the unit square evenly, moved by a shift per pixel."""
-    return (shift + np.array([0.7548776662, 0.5698402910]) * (number + 1)) % 1.0
+    return (shift + R2 * (number + 1) % 1.0) % 1.0
 
 
 def _on_sphere(square: np.ndarray) -> np.ndarray:

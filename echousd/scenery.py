@@ -46,7 +46,7 @@ class Scenery:
 
     def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
         """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
-        out = self.flat_colors[face].astype(float)
+        out = self.flat_colors[face]
         for number, image in enumerate(self.images):
             here = np.flatnonzero(self.texture[face] == number)
             if len(here):

@@ -101,6 +101,8 @@ def generate(
             graph = load_graph(graph)
     with watch.stage("load"):
         echo = load_model(model)
+        if shapes == "generate":
+            require_shapes(echo)
     layouts = [sample_boxes(echo, graph, seed=seed, number=0, steps=steps, watch=watch)]
     layouts[0], notes = settled(graph, layouts[0], repair, watch)
     sized = _with_sizes(graph, layouts[0])
@@ -134,6 +136,13 @@ def load_model(model: EchoModel | str | Path | None) -> EchoModel:
     from echomodel.echo import EchoModel
 
     return EchoModel.load(model)
+
+
+def require_shapes(echo: EchoModel) -> None:
+    """Raises ValueError for a model without a shape branch."""
+    parts = getattr(getattr(echo, "model", None), "parts", ("autoencoder", "shape"))
+    if getattr(echo, "sample_shapes", None) is None or not {"autoencoder", "shape"} <= set(parts):
+        raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
 
 
 def graph_batch(graph: SceneGraph) -> GraphBatch:
@@ -180,14 +189,12 @@ def sample_shapes(
     echo: EchoModel, graph: SceneGraph, boxes: Boxes, *, seed: int, steps: int | None = None, watch: Watch | None = None
 ) -> np.ndarray:
     """(n, 64, 64, 64) float32 TSDFs from the shape branch; raises ValueError for a model without one."""
-    sample = getattr(echo, "sample_shapes", None)
-    if sample is None:
-        raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
+    require_shapes(echo)
     centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
     extra = {} if steps is None else {"steps": steps}
     with (watch or Watch()).stage("shapes") as tell:
         generator = _generator(seed, "shapes", 0)
-        return np.asarray(sample(graph_batch(graph), centred, generator=generator, progress=tell, **extra))
+        return np.asarray(echo.sample_shapes(graph_batch(graph), centred, generator=generator, progress=tell, **extra))
 
 
 def make_meshes(
