@@ -68,6 +68,8 @@ def render_stage(
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     scenery = read_scenery(stage, by_class=colors == "class")
     camera = top_view(scenery) if view == "top" else corner_view(scenery)
+    if view == "perspective":
+        scenery = scenery.without_near_walls(camera.matrix[:3, 3])
     pixels = trace(scenery, camera, size, rays=rays)
     return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
 

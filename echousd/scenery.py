@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import colorsys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pxr import Usd
@@ -26,6 +26,7 @@ class Scenery:
         texture: (f,) int, which of `images` colours the face, -1 for none.
         images: (h, w, 3) float32 linear RGB each.
         facing: (2,) float, x and z of the objects' mean front.
+        wall: (f,) int, which wall a face belongs to, -1 for none.
     """
 
     triangles: np.ndarray
@@ -37,12 +38,28 @@ class Scenery:
     texture: np.ndarray
     images: tuple[np.ndarray, ...]
     facing: np.ndarray
+    wall: np.ndarray
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner, (3,) float each."""
         corners = self.triangles.reshape(-1, 3).astype(float)
         return corners.min(0), corners.max(0)
+
+    def without_near_walls(self, eye: np.ndarray) -> Scenery:
+        """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
+        lower, upper = self.bounds
+        middle = (lower + upper) / 2
+        keep = np.ones(len(self.triangles), bool)
+        for number in range(int(self.wall.max(initial=-1)) + 1):
+            faces = self.wall == number
+            away = self.triangles[faces].reshape(-1, 3).mean(0) - middle
+            if (away * (eye - middle))[[0, 2]].sum() > 0:
+                keep &= ~faces
+        if keep.all() or not keep.any():
+            return self
+        names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+        return replace(self, **{name: getattr(self, name)[keep] for name in names})
 
     def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
         """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
@@ -83,6 +100,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     parts: list[dict[str, np.ndarray]] = []
     images: dict[str, tuple[int, np.ndarray]] = {}
     fronts = []
+    walls = 0
     for mesh in read_drawables(stage):
         count = len(mesh.triangles)
         turned = mesh.normals @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
@@ -94,7 +112,9 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "emissive": np.zeros((count, 3), np.float32),
             "gloss": np.zeros(count, np.float32),
             "texture": np.full(count, -1),
+            "wall": np.full(count, walls if mesh.category == "wall" else -1),
         }
+        walls += mesh.category == "wall"
         plain = Paint(color=class_color(mesh.category), roughness=1.0)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
+WIDE = 18.0  # mm, for a camera inside
 MARGIN = 1.06
 
 
@@ -58,8 +60,34 @@ def perspective_view(points: np.ndarray, facing: np.ndarray) -> np.ndarray:
     return view_matrix(target + direction * distance, target)
 
 
-def write_cameras(stage: Usd.Stage, volume: Volume, points: np.ndarray, facing: np.ndarray) -> None:
-    """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`."""
+def inside_view(floor: np.ndarray, facing: np.ndarray, height: float) -> np.ndarray:
+    """(4, 4) float camera to world of a view from a corner inside a room with walls, towards the furniture's fronts.
+
+    Arguments:
+        floor: (k, 2) float, x and z of the corners, metres.
+        facing: (2,) float, x and z of the furniture's mean front.
+        height: of the walls, metres.
+    """
+    room = shapely.Polygon(floor)
+    middle = np.asarray(room.representative_point().coords[0])
+    step = middle - floor
+    step = floor + 0.35 * step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
+    seen = [room.contains(shapely.LineString([corner, middle])) for corner in step]
+    reach = np.linalg.norm(floor - middle, axis=1) + (floor - middle) @ facing
+    corner = step[int(np.argmax(np.where(seen, reach, -np.inf)))] if any(seen) else middle + 0.1
+    return view_matrix(np.array([corner[0], 0.72 * height, corner[1]]), np.array([middle[0], 0.22 * height, middle[1]]))
+
+
+def write_cameras(
+    stage: Usd.Stage, volume: Volume, points: np.ndarray, facing: np.ndarray, walled: np.ndarray | None = None
+) -> None:
+    """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`.
+
+    Arguments:
+        stage: receives the cameras.
+        volume, points, facing: see `perspective_view`.
+        walled: corners of the floor of a room with walls; its perspective camera stands inside.
+    """
     UsdGeom.Scope.Define(stage, "/Room/Cameras")
     top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
     top.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
@@ -71,9 +99,10 @@ def write_cameras(stage: Usd.Stage, volume: Volume, points: np.ndarray, facing: 
     top.AddRotateXOp().Set(-90.0)
     top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
-    matrix = perspective_view(points, facing)
+    walls = walled is not None
+    matrix = inside_view(walled, facing, float(volume.upper[1])) if walls else perspective_view(points, facing)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    camera.CreateFocalLengthAttr(FOCAL_LENGTH)
+    camera.CreateFocalLengthAttr(WIDE if walls else FOCAL_LENGTH)
     camera.CreateHorizontalApertureAttr(APERTURE)
     camera.CreateVerticalApertureAttr(APERTURE)
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))

@@ -190,7 +190,8 @@ def root_layer(room: Room) -> Sdf.Layer:
     yaw, weight = np.asarray(room.boxes.yaw, float), np.asarray(room.boxes.size, float).prod(1)
     facing = np.array([(np.sin(yaw) * weight).sum(), (np.cos(yaw) * weight).sum()]) / max(float(weight.sum()), 1e-9)
     cameras.write_lights(stage, volume, room.height)
-    cameras.write_cameras(stage, volume, room_points(room), facing)
+    walled = room.floor if room.options.walls else None
+    cameras.write_cameras(stage, volume, room_points(room), facing, walled)
     return assets.without_stage(stage, _add_sublayers)
 
 

@@ -9,6 +9,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echousd.drawables import read_drawables
 from echousd.render import render_file, render_stage, smooth_light
+from echousd.room import RoomOptions
 from echousd.scenery import class_color, read_scenery
 
 
@@ -150,3 +151,25 @@ def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(ValueError, match=r'pip install "echousd\[render\]"'):
         render_file(root, size=16)
+
+
+def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
+    options = RoomOptions(walls=True)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    scenery = read_scenery(stage)
+    assert scenery.wall.max() == 3
+    outside = scenery.without_near_walls(np.array([9.0, 3.0, 8.0]))
+    assert len(set(outside.wall[outside.wall >= 0])) == 2
+    centre = outside.triangles[outside.wall >= 0].reshape(-1, 3).mean(0)
+    assert centre[0] < 0
+    assert centre[2] < 0
+    image = pixels(render_stage(stage, size=64, colors="class"))
+    colourful = np.abs(image - image.mean(-1, keepdims=True)).max(-1) > 0.08
+    assert colourful.mean() > 0.05  # the furniture is in sight
+    inside = (
+        UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0).transform.ExtractTranslation()
+    )
+    assert abs(inside[0]) < 2.0
+    assert abs(inside[2]) < 1.7
+    assert 0.5 < inside[1] < 2.8
