@@ -124,6 +124,7 @@ def fill(module: nn.Module, seed: int, gain: float = DEFAULT_GAIN) -> None:
 def close(found: Tensor, expected: Tensor, absolute: float = 0.0, relative: float = 0.0) -> None:
     """Assert that every number is within the tolerance; says the largest difference otherwise."""
     assert found.shape == expected.shape
+    found, expected = found.detach(), expected.detach()
     difference = (found.double() - expected.double()).abs()
     worst = float((difference - relative * expected.double().abs()).max()) if difference.numel() else 0.0
     assert worst <= absolute, f"off by {float(difference.max()):.3g}, allowed {absolute:g} + {relative:g} * value"

@@ -24,10 +24,11 @@ class PackedLinear:
     def __init__(self, weight: Tensor, bias: Tensor | None = None) -> None:
         self.weight = weight.detach().float().contiguous()
         self.bias = None if bias is None else bias.detach().float().contiguous()
+        self.shape = tuple(self.weight.shape)
         self.packed: Tensor | None = None
         if self.weight.device.type == "cpu" and packing_available():
             self.packed = torch.ops.mkldnn._reorder_linear_weight(self.weight, None)
-            self.weight = self.weight[:0]
+            self.weight = torch.empty(0)
 
     def __call__(self, x: Tensor) -> Tensor:
         """(..., in) float32 -> (..., out)."""

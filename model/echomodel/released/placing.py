@@ -28,7 +28,7 @@ def mesh_from_grid(grid: np.ndarray, level: float = LEVEL) -> trimesh.Trimesh:
         raise ValueError(f"distance grid of shape {grid.shape} must be three-dimensional and finite")
     if not float(grid.min()) < level < float(grid.max()):
         raise ValueError(f"distance grid spans {grid.min():.3g}..{grid.max():.3g}, it never crosses {level}")
-    vertices, faces, _, _ = measure.marching_cubes(grid, level, gradient_direction="ascent")
+    vertices, faces, _, _ = measure.marching_cubes(grid, level, gradient_direction="descent")
     return trimesh.Trimesh(vertices / grid.shape[0] - 0.5, faces, process=False)
 
 

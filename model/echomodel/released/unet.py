@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from echomodel.released.config import UNetConfig
+from echomodel.released.volumes import convolve_repeated
 
 GROUPS = 32
 
@@ -167,7 +168,7 @@ class Up(nn.Module):
     def forward(self, h: Tensor) -> Tensor:
         """(N, width, ...) -> the same with twice the height and width."""
         if h.ndim == 5:
-            h = F.interpolate(h, scale_factor=(1, 2, 2), mode="nearest")
+            return convolve_repeated(h, self.conv.weight, self.conv.bias, (False, True, True))  # type: ignore[arg-type]
         return convolve(self.conv, h)
 
 

@@ -7,6 +7,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from echomodel.released.config import VQConfig
+from echomodel.released.volumes import convolve_repeated
 
 
 def _norm(channels: int) -> nn.GroupNorm:
@@ -68,7 +69,7 @@ class _Upsample(nn.Module):
         self.conv = nn.Conv3d(channels, channels, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
-        return self.conv(F.interpolate(x, scale_factor=2.0, mode="nearest"))
+        return convolve_repeated(x, self.conv.weight, self.conv.bias, (True, True, True))
 
 
 class _Level(nn.Module):

@@ -1,0 +1,70 @@
+"""What this machine can do, measured: matrix products and reading memory; and who multiplied how much."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import torch
+
+from echomodel.released.packed import PackedLinear
+
+
+def alternate(runs: dict[str, Callable[[], object]], repeats: int, warm: bool = True) -> dict[str, float]:
+    """Best wall time in seconds of each run, taken in turns so that a busy machine slows all of them alike."""
+    best = dict.fromkeys(runs, float("inf"))
+    if warm:
+        for run in runs.values():
+            run()
+    for _ in range(repeats):
+        for name, run in runs.items():
+            start = time.perf_counter()
+            run()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
+
+
+def matmul_rate(side: int = 2048) -> float:
+    """FLOP/s of a large float32 matrix product, the better of torch's own and oneDNN's packed one."""
+    a, b = torch.randn(side, side), torch.randn(side, side)
+    packed = PackedLinear(b)
+    best = alternate({"own": lambda: a @ b, "packed": lambda: packed(a)}, repeats=5)
+    return 2 * side**3 / min(best.values())
+
+
+def read_bandwidth(megabytes: int = 512) -> float:
+    """Bytes/s of summing a tensor that fits no cache."""
+    data = torch.randn(megabytes * 250_000)
+    return data.numel() * 4 / alternate({"sum": data.sum}, repeats=5)["sum"]
+
+
+@contextmanager
+def tally() -> Iterator[dict[str, float]]:
+    """Counts FLOPs and bytes of weights of the packed products inside the block."""
+    counts = {"flops": 0.0, "bytes": 0.0}
+    plain = PackedLinear.__call__
+
+    def counted(self: PackedLinear, x: torch.Tensor) -> torch.Tensor:
+        out, width = self.shape
+        counts["flops"] += 2.0 * x.numel() * out
+        counts["bytes"] += 4.0 * out * width
+        return plain(self, x)
+
+    PackedLinear.__call__ = counted  # type: ignore[method-assign]
+    try:
+        yield counts
+    finally:
+        PackedLinear.__call__ = plain  # type: ignore[method-assign]
+
+
+def scene_graph(scenes: int, generator: torch.Generator) -> torch.Tensor:
+    """(51 scenes, 3) int64 triples: ten objects, floor and scene node each, 40 relations and 11 `in` edges."""
+    triples = []
+    for scene in range(scenes):
+        ends = torch.stack([torch.randperm(11, generator=generator)[:2] for _ in range(40)])
+        predicates = torch.randint(1, 16, (40,), generator=generator)
+        related = torch.stack([ends[:, 0], predicates, ends[:, 1]], dim=1)
+        inside = torch.stack([torch.arange(11), torch.zeros(11, dtype=torch.int64), torch.full((11,), 11)], dim=1)
+        triples.append(torch.cat([related, inside]) + torch.tensor([12 * scene, 0, 12 * scene]))
+    return torch.cat(triples)

@@ -1,0 +1,98 @@
+"""The fast paths give what the networks give as written: all taps, queries and keys computed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from literal_networks import literal_layout, literal_shape
+from parity_numbers import close, fill
+from torch.nn import functional as F
+
+from echomodel.released.config import UNetConfig, shape_unet
+from echomodel.released.frozen_layout import FrozenLayout
+from echomodel.released.frozen_shape import FrozenShape
+from echomodel.released.layout import LayoutNet
+from echomodel.released.shape import ShapeUNet
+from echomodel.released.volumes import WinogradConv, convolve_repeated
+
+LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)
+SHAPE = shape_unet(width=32, mult=(1, 2), blocks=1, attention=(2,), context=48, objects=24, hidden=32, layers=2, grid=8)
+TRIPLES = {
+    "usual": [[0, 1, 1], [1, 2, 0], [0, 1, 1], [2, 0, 3], [3, 15, 3]],
+    "no edges": [],
+    "one edge": [[4, 3, 0]],
+}
+
+
+def _graph(name: str) -> torch.Tensor:
+    return torch.tensor(TRIPLES[name], dtype=torch.int64).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("graph", TRIPLES)
+@pytest.mark.parametrize("change", [{}, {"time_in_echo": False}, {"residual": False}])
+def test_layout(graph: str, change: dict) -> None:
+    config = replace(LAYOUT, **change)
+    net = LayoutNet(config).eval()
+    fill(net, seed=3)
+    generator = torch.Generator().manual_seed(1)
+    x, objects = torch.randn(6, 8, generator=generator), torch.randn(6, config.objects, generator=generator)
+    t = torch.tensor([0, 999, 5, 5, 500, 999])
+    expected = literal_layout(net, x, objects, _graph(graph), t)
+    with torch.inference_mode():
+        close(net(x, objects, _graph(graph), t), expected, 1e-4)
+    bound = FrozenLayout(net, t).bind(objects, _graph(graph))
+    close(bound(x, t), expected, 1e-4)
+    with pytest.raises(ValueError, match="step 17 was not prepared"):
+        bound(x, torch.full((6,), 17))
+
+
+@pytest.mark.parametrize("graph", TRIPLES)
+@pytest.mark.parametrize("change", [{}, {"time_in_echo": False}, {"residual": False}])
+def test_shape(graph: str, change: dict) -> None:
+    config = replace(SHAPE, **change)
+    net = ShapeUNet(config).eval()
+    fill(net, seed=4)
+    generator = torch.Generator().manual_seed(2)
+    x = torch.randn(5, 3, 8, 8, 8, generator=generator)
+    objects, t = torch.randn(5, config.objects, generator=generator), torch.tensor([0, 999, 5, 5, 500])
+    expected = literal_shape(net, x, objects, _graph(graph), t)
+    with torch.inference_mode():
+        close(net(x, objects, _graph(graph), t), expected, 5e-5)
+    for winograd in (True, False):
+        close(FrozenShape(net, winograd).bind(objects, _graph(graph))(x, t), expected, 5e-5)
+
+
+def test_one_node_alone() -> None:
+    layout, shape = LayoutNet(LAYOUT).eval(), ShapeUNet(SHAPE).eval()
+    fill(layout, seed=3)
+    fill(shape, seed=4)
+    t, none = torch.tensor([7]), _graph("no edges")
+    x, objects = torch.randn(1, 8), torch.randn(1, LAYOUT.objects)
+    close(FrozenLayout(layout, t).bind(objects, none)(x, t), literal_layout(layout, x, objects, none, t), 1e-4)
+    x, objects = torch.randn(1, 3, 8, 8, 8), torch.randn(1, SHAPE.objects)
+    close(FrozenShape(shape).bind(objects, none)(x, t), literal_shape(shape, x, objects, none, t), 5e-5)
+
+
+@pytest.mark.parametrize("doubled", [(False, True, True), (True, True, True), (True, False, False)])
+def test_repeated_voxels(doubled: tuple[bool, bool, bool]) -> None:
+    x = torch.randn(2, 5, 3, 4, 6, dtype=torch.float64, requires_grad=True)
+    weight = torch.randn(7, 5, 3, 3, 3, dtype=torch.float64, requires_grad=True)
+    bias = torch.randn(7, dtype=torch.float64)
+    factors = tuple(2 if twice else 1 for twice in doubled)
+    expected = F.conv3d(F.interpolate(x, scale_factor=factors, mode="nearest"), weight, bias, padding=1)
+    found = convolve_repeated(x, weight, bias, doubled)
+    close(found, expected, 1e-12)
+    wanted = torch.autograd.grad(expected.square().sum(), (x, weight))
+    for gradient, other in zip(torch.autograd.grad(found.square().sum(), (x, weight)), wanted, strict=True):
+        close(gradient, other, 1e-9)
+
+
+def test_winograd() -> None:
+    x, weight, bias = torch.randn(3, 5, 4, 6, 8), torch.randn(7, 5, 3, 3, 3), torch.randn(7)
+    expected = F.conv3d(x, weight, bias, padding=1)
+    for tiles in (1, 512):
+        close(WinogradConv(weight, bias, tiles)(x), expected, 1e-4)
+    with pytest.raises(ValueError, match="must be even"):
+        WinogradConv(weight, bias)(x[..., :5])
