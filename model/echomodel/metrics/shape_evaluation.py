@@ -63,9 +63,13 @@ def evaluate_shapes(
         without any surface, the share of closed meshes, `sets` (MMD, COV, 1-NNA per class) and `style` (Chamfer within
         groups of the same style and between them); and the generated meshes by class.
 
-    Raises ValueError when the set has nothing held out.
+    Raises ValueError when the set has nothing held out or the weights lack a part.
     """
     told = progress or (lambda what, done, total: None)
+    needed = ("autoencoder", "shape", "latent") if settings.rooms else ("autoencoder",)
+    missing = [part for part in needed if not hasattr(model.model, part)]
+    if missing:
+        raise ValueError(f"the weights ({model.hash}) hold no {' and no '.join(missing)}; name weights with --model")
     held = np.flatnonzero(shapes.held_out)
     if len(held) == 0:
         raise ValueError(f"{shapes.directory}: holds out no shape to reconstruct")
