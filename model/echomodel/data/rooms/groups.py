@@ -74,16 +74,16 @@ def _vanity(room: Builder, bed: Item, style: int) -> None:
 def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -> None:
     if count == 0:
         return
-    gap = abs(room.rng.normal(0.0, 0.09)) - 0.06 if room.chance(0.85) else room.uniform(0.1, 0.4)
+    gap = abs(room.rng.normal(0.0, 0.1)) - 0.085 if room.chance(0.85) else room.uniform(0.1, 0.4)
     lateral = bed.size[0] / 2 + size[0] / 2 + gap
-    shift = room.uniform(-0.1, 0.05) if room.chance(0.75) else room.uniform(0, 0.2)
+    shift = room.uniform(-0.14, 0.02) if room.chance(0.75) else room.uniform(0, 0.2)
     forward = -bed.size[2] / 2 + size[2] / 2 + shift
     sides = [1, -1] if room.chance(0.5) else [-1, 1]
     placed = 0
     for side in sides:
         for shift in (0.0, 0.06):
             at = side * (lateral + shift + room.rng.normal(0.0, 0.02))
-            if room.beside(bed, "nightstand", size, at, forward, 0.0, style, play=0.09):
+            if room.beside(bed, "nightstand", size, at, forward, 0.0, style, play=0.12):
                 placed += 1
                 break
         if placed == count:
@@ -92,8 +92,8 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
         room.against_wall("nightstand", size=size, style=style)
 
 
-def television(room: Builder, anchor: Item, lateral: float = 0.0, nearest: float = 0.45) -> Item | None:
-    """A tv stand at the wall that the anchor (a bed or sofa) faces."""
+def television(room: Builder, anchor: Item, nearest: float = 0.15, farthest: float = 9.0) -> Item | None:
+    """A tv stand at the wall that the anchor (a bed or sofa) faces, `nearest` to `farthest` metres off."""
     size = room.size("tv_stand")
     style = room.style()
     x, z = anchor.x, anchor.z
@@ -103,11 +103,12 @@ def television(room: Builder, anchor: Item, lateral: float = 0.0, nearest: float
         nx, nz = math.sin(wall.yaw), math.cos(wall.yaw)
         distance = (x - wall.x) * nx + (z - wall.z) * nz
         along = (x - wall.x) * wall.dx + (z - wall.z) * wall.dz
-        if distance < anchor.size[2] / 2 + size[2] + nearest or not 0.0 < along < wall.length:
+        fits = anchor.size[2] / 2 + size[2] + nearest <= distance <= farthest
+        if not fits or not 0.0 < along < wall.length:
             continue
         for attempt in range(6):
             spread = 0.1 if attempt == 0 else 0.15 * attempt
-            place = along + lateral + room.rng.normal(0.0, spread)
+            place = along + room.rng.normal(0.0, spread)
             place = min(max(place, size[0] / 2), max(wall.length - size[0] / 2, size[0] / 2))
             px, pz = wall.point(place, size[2] / 2 + abs(room.rng.normal(0.02, 0.025)))
             placed = room.put("tv_stand", size, px, pz, wall.yaw, style)
@@ -151,7 +152,9 @@ def sofa_group(room: Builder, category: str) -> Item | None:
         sofa = room.somewhere(category, size=size, style=style)
     if sofa is None:
         return None
-    if room.wanted.get("tv_stand") and television(room, sofa, nearest=1.0):
+    if room.wanted.get("tv_stand") and television(
+        room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4
+    ):
         room.take("tv_stand")
     table = _coffee_table(room, sofa, style)
     _second_sofa(room, sofa, table)
@@ -226,7 +229,7 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
         side = 1 if room.chance(0.5) else -1
         for _ in range(min(count, 4)):
             for attempt in range(12):
-                if attempt < 8 or room.chance(0.5):
+                if attempt < 9 or room.chance(0.8):
                     lateral = side * max(
                         reach + size[2] / 2 + room.uniform(0.2, 0.7), sofa.size[0] / 2 + room.uniform(-0.1, 0.7)
                     )
@@ -286,6 +289,9 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
             if spot is None:
                 continue
             wall, along = spot
+            if room.chance(0.6):  # near the end of the wall, with a seat's depth between
+                end = size[2] / 2 + chair[2] * 0.8 + abs(room.rng.normal(0.0, 0.35))
+                along = end if room.chance(0.5) else wall.length - end
             gap = room.uniform(0.0, 0.12) if room.chance(0.85) else room.uniform(0.1, 0.5)
             x, z = wall.point(along, size[0] / 2 + gap)
             yaw = wall.yaw + (HALF_PI if room.chance(0.5) else -HALF_PI)
@@ -316,11 +322,11 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
 def _chairs_around(room: Builder, table: Item, category: str, size: Size, count: int, style: int) -> None:
     length, depth = table.size[0], table.size[2]
     per_side = 2 if count <= 6 else min((count - 1) // 2, 4)
-    if (count == 2 and room.chance(0.5)) or length < 0.95:
+    if (count == 2 and room.chance(0.5)) or length < 0.95 or (count == 4 and length < 1.3 and room.chance(0.6)):
         per_side = 1
     if count == 6 and length > 1.9 and room.chance(0.6):
         per_side = 3
-    tuck = room.rng.normal(0.05, 0.08)
+    tuck = room.rng.normal(0.085, 0.08)
     spacing = max(length / per_side * room.uniform(0.85, 1.0), size[0] + 0.02)
     across = depth / 2 + size[2] / 2 - tuck
     places = []
