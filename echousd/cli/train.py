@@ -22,7 +22,7 @@ def train(
 ) -> None:
     """Train a part of the echo model; a run that was stopped continues bit for bit with --resume.
 
-    Example: echousd train model/recipes/layout.toml --set rooms=rooms.safetensors --set steps=20000
+    Example: echousd train model/recipes/layout.toml --set data=data/full --set steps=20000
     """
     from rich.console import Console
 

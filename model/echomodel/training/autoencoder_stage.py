@@ -7,7 +7,8 @@ import torch
 from torch import Tensor
 
 from echomodel.compact.model import CompactModel
-from echomodel.training.shapes import ShapeGrids, crops
+from echomodel.data.shapeset import ShapeSet
+from echomodel.training.shapes import draw_grids, read
 
 NOISE = 0.1  # standard deviation added to the latent, so that the decoder forgives a denoiser's small errors
 
@@ -22,23 +23,25 @@ class AutoencoderStage:
     """What the trainer needs to know about the autoencoder.
 
     Arguments:
-        shapes, held: shape sets to train on and to validate with.
-        batch: crops per batch, per process.
-        side: side of a crop in voxels.
+        shapes: shape set; its held-out part is for validation.
+        batch: grids per batch, per process.
     """
 
     trained = saved = ("autoencoder",)
 
-    def __init__(self, shapes: ShapeGrids, held: ShapeGrids, batch: int, side: int = 64) -> None:
-        self.shapes, self.held, self.batch, self.side = shapes, held, batch, side
+    def __init__(self, shapes: ShapeSet, batch: int) -> None:
+        self.shapes, self.batch = shapes, batch
+        self.used, self.held = (~shapes.held_out).nonzero()[0], shapes.held_out.nonzero()[0]
+        if not len(self.held):
+            self.held = self.used
 
     def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
-        """Start from the PCA of patches with a surface."""
-        model.autoencoder.initialise(crops(self.shapes, 512, self.side, generator))
+        """Start from the PCA of patches."""
+        model.autoencoder.initialise(draw_grids(self.shapes, self.used, 64, generator))
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
-        grids = crops(self.shapes, self.batch, self.side, generator)
+        grids = draw_grids(self.shapes, self.used, self.batch, generator)
         latent = model.autoencoder.encode(grids)
         noise = NOISE * torch.randn(latent.shape, generator=generator)
         error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
@@ -47,18 +50,18 @@ class AutoencoderStage:
     @torch.no_grad()
     def validate(self, model: CompactModel, count: int = 46) -> dict[str, float]:
         """Mean absolute error, intersection over union and one-voxel F-score on held-out shapes."""
-        picked = np.linspace(0, len(self.held) - 1, min(count, len(self.held))).astype(int)
+        picked = self.held[np.linspace(0, len(self.held) - 1, min(count, len(self.held))).astype(int)]
         errors: list[Tensor] = []
         unions: list[float] = []
         scores: list[float] = []
         for start in range(0, len(picked), 8):
-            grids = self.held.read(picked[start : start + 8])
+            grids = read(self.shapes, picked[start : start + 8])
             rebuilt = model.autoencoder(grids)
             errors.append((grids - rebuilt).abs().mean())
             unions.extend(overlap(grids, rebuilt).tolist())
             scores.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
-        means = {"l1": float(torch.stack(errors).mean()), "iou": np.mean(unions), "fscore": np.mean(scores)}
-        return {f"held/{name}": float(value) for name, value in means.items()}
+        l1 = float(torch.stack(errors).mean())
+        return {"held/l1": l1, "held/iou": float(np.mean(unions)), "held/fscore": float(np.mean(scores))}
 
 
 def overlap(a: Tensor, b: Tensor) -> Tensor:

@@ -18,8 +18,14 @@ EMPHASIS = {5: 4.0, 6: 2.0, 7: 4.0, 12: 8.0}  # rare relations that must hit a s
 SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
 
 
+def edited_latent(model: CompactModel, batch: LayoutBatch) -> Tensor:
+    """The latent graph by the inverse strategy: pseudo graph into the encoder, true graph out of the manipulator."""
+    edit = {"before": batch.before, "added": batch.added, "touched": batch.touched}
+    return model.latent(batch.graph.category, batch.pairs, **edit)
+
+
 def layout_loss(
-    model: CompactModel, batch: LayoutBatch, generator: torch.Generator, relation_weight: float
+    model: CompactModel, batch: LayoutBatch, latent: Tensor, generator: torch.Generator, relation_weight: float
 ) -> tuple[Tensor, dict[str, Tensor]]:
     """Denoising loss of the unknown nodes plus the weighted relation hinge, and both apart."""
     objective = model.config.layout.objective
@@ -28,9 +34,7 @@ def layout_loss(
     level = draw_levels(batch.graph.num_scenes, generator)[batch.graph.scene] * ~known
     noise = torch.randn(clean.shape, generator=generator)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
-    graph = batch.graph
-    latent = model.latent(graph.category, batch.pairs, before=batch.before, added=batch.added, touched=batch.touched)
-    context = model.layout.context(graph, batch.pairs, latent, batch.rules)
+    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules)
     output = model.layout(noisy, level, context)
     free = (~known).float()
     error = (output - target(clean, noise, level, objective)).square().mean(1)
@@ -104,7 +108,8 @@ class LayoutStage:
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
-        return layout_loss(model, draw_batch(self.rooms, self.nodes, generator), generator, self.relation_weight)
+        batch = draw_batch(self.rooms, self.nodes, generator)
+        return layout_loss(model, batch, edited_latent(model, batch), generator, self.relation_weight)
 
     @torch.no_grad()
     def validate(self, model: CompactModel, rooms: int = 96) -> dict[str, float]:

@@ -13,12 +13,12 @@ class RunLog:
 
     Arguments:
         folder: the run's folder.
-        start: first step of this process; older rows at or beyond it (of a run cut off) are dropped.
+        start: steps done before this process; later rows (of a run that was cut off) are dropped.
     """
 
     def __init__(self, folder: Path, start: int = 0) -> None:
         self.path = folder / "log.csv"
-        rows = [row for row in read_log(self.path) if row[0] < start]
+        rows = [row for row in read_log(self.path) if row[0] <= start]
         with self.path.open("w", newline="") as handle:
             writer = csv.writer(handle)
             writer.writerow(["step", "name", "value"])

@@ -54,9 +54,7 @@ class Recipe:
         stage: `vqvae` (autoencoder), `layout`, `shape` or `joint` (both branches on one latent graph).
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.
-        rooms: packed rooms, a file that `echousd train` makes from a rooms file (see `training.rooms`).
-        held_rooms: packed rooms for validation.
-        shapes, held_shapes: shape sets.
+        data: folder that `echousd data build` made; its held-out part is for validation.
         start: weights files to start from.
         frozen: parts that the stage would train but that stay as they are.
         nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
@@ -71,10 +69,7 @@ class Recipe:
     stage: Stage
     steps: int
     seed: int = 0
-    rooms: str = ""
-    held_rooms: str = ""
-    shapes: str = ""
-    held_shapes: str = ""
+    data: str = ""
     start: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
     nodes: int = 512

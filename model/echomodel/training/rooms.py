@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path
 
+import numpy as np
 import torch
-from safetensors.torch import load_file, save_file
 from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
+from echomodel.data.roomset import RoomSet
 from echomodel.graph import GraphBatch
 from echomodel.roomboxes import RoomBoxes
 
@@ -47,8 +47,8 @@ class PackedRooms:
         return len(self.count)
 
     @classmethod
-    def build(cls, rooms: Sequence[RoomBoxes], rules: Sequence[int]) -> PackedRooms:
-        """Pack rooms whose `relations` are filled in; `rules` says by which rule set each was labelled."""
+    def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> PackedRooms:
+        """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled."""
         graphs = [GraphBatch.from_room(room) for room in rooms]
         boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
         return cls(
@@ -60,27 +60,26 @@ class PackedRooms:
             count=torch.tensor([len(room) for room in rooms]),
             room_type=torch.cat([g.room_type for g in graphs]),
             floor=torch.cat([g.floor for g in graphs]),
-            rules=torch.tensor(list(rules)),
+            rules=torch.full((len(rooms),), rules),
             bits=torch.cat([_bits(g) for g in graphs]),
         )
+
+    @classmethod
+    def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> PackedRooms:
+        """One part of a room set, every room once per rule set; the last twentieth where nothing is held out."""
+        mask = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
+        numbers = (mask == held).nonzero()[0]
+        parts = [
+            cls.build([rooms.room(int(n), rules=name) for n in numbers[start : start + 500]], number)
+            for number, name in enumerate(rules)
+            for start in range(0, len(numbers), 500)
+        ]
+        return cls(**{f.name: torch.cat([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
     @property
     def boxes(self) -> Boxes:
         """All boxes."""
         return Boxes(self.size, self.position, self.yaw)
-
-    def save(self, path: Path) -> None:
-        """Write a safetensors file."""
-        save_file({f.name: getattr(self, f.name).contiguous() for f in fields(self)}, path)
-
-    @classmethod
-    def load(cls, path: Path) -> PackedRooms:
-        """Read what `save` wrote; raises ValueError when a tensor is missing."""
-        tensors = load_file(path)
-        missing = [f.name for f in fields(cls) if f.name not in tensors]
-        if missing:
-            raise ValueError(f"{path}: not packed rooms, missing {', '.join(missing)}")
-        return cls(**{f.name: tensors[f.name] for f in fields(cls)})
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,15 @@ import torch
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import PARTS, CompactModel, load_weights
+from echomodel.data.roomset import RoomSet
+from echomodel.data.shapeset import ShapeSet
 from echomodel.training.autoencoder_stage import AutoencoderStage
+from echomodel.training.joint_stage import JointStage
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 from echomodel.training.shape_stage import ShapeStage
-from echomodel.training.shapes import ShapeGrids, encoded_set
+from echomodel.training.shapes import encoded_set
 from echomodel.training.trainer import Report, Trainer, TrainingStage
 
 _NO_BOXES = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
@@ -52,22 +55,33 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
 
 def _stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> TrainingStage:
     if recipe.stage == "layout":
-        rooms, held_rooms = (PackedRooms.load(_file(recipe, name)) for name in ("rooms", "held_rooms"))
-        if "layout" not in started:
-            model.statistics = BoxStatistics.from_boxes(rooms.boxes)
-        return LayoutStage(rooms, held_rooms, recipe.nodes, recipe.relation_weight, recipe.frozen)
-    shapes, held = (ShapeGrids.open(_file(recipe, name), recipe.model.categories) for name in ("shapes", "held_shapes"))
+        return _layout_stage(recipe, model, started)
+    shapes = ShapeSet(_folder(recipe, "shapes"))
     if recipe.stage == "vqvae":
-        stage = AutoencoderStage(shapes, held, recipe.shapes_per_batch)
+        stage = AutoencoderStage(shapes, recipe.shapes_per_batch)
         if "autoencoder" not in started:
             stage.initialise(model, torch.Generator().manual_seed(recipe.seed))
         return stage
-    missing = [part for part in ("latent", "autoencoder") if part not in started]
+    needed = ("autoencoder",) if recipe.stage == "joint" else ("latent", "autoencoder")
+    missing = [part for part in needed if part not in started]
     if missing:
-        raise ValueError(f"recipe field 'start': stage 'shape' needs weights with {' and '.join(missing)}")
-    rooms = PackedRooms.load(_file(recipe, "rooms"))
-    coded, held_coded = (encoded_set(model.autoencoder, grids) for grids in (shapes, held))
-    return ShapeStage(rooms, coded, held_coded, recipe.shapes_per_batch)
+        raise ValueError(f"recipe field 'start': stage {recipe.stage!r} needs weights with {' and '.join(missing)}")
+    coded = encoded_set(model.autoencoder, shapes)
+    if recipe.stage == "joint":
+        layout = _layout_stage(recipe, model, started)
+        return JointStage(layout, ShapeStage(layout.rooms, coded, recipe.shapes_per_batch))
+    return ShapeStage(_rooms(recipe, model, held=False), coded, recipe.shapes_per_batch)
+
+
+def _layout_stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> LayoutStage:
+    rooms, held = (_rooms(recipe, model, held=held) for held in (False, True))
+    if "layout" not in started:
+        model.statistics = BoxStatistics.from_boxes(rooms.boxes)
+    return LayoutStage(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen)
+
+
+def _rooms(recipe: Recipe, model: CompactModel, *, held: bool) -> PackedRooms:
+    return PackedRooms.from_set(RoomSet(_folder(recipe, "rooms")), model.config.rules, held=held)
 
 
 _PARTS = {
@@ -78,11 +92,7 @@ _PARTS = {
 }
 
 
-def _file(recipe: Recipe, field: str) -> Path:
-    name = getattr(recipe, field)
-    if not name:
-        raise ValueError(f"recipe field {field!r} is empty, stage {recipe.stage!r} needs a file")
-    path = Path(name)
-    if not path.exists():
-        raise ValueError(f"recipe field {field!r}: {path} does not exist")
-    return path
+def _folder(recipe: Recipe, part: str) -> Path:
+    if not recipe.data:
+        raise ValueError(f"recipe field 'data' is empty, stage {recipe.stage!r} needs a folder of `echousd data build`")
+    return Path(recipe.data) / part

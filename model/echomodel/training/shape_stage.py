@@ -86,8 +86,8 @@ def first_of_group(batch: ShapeBatch) -> Tensor:
     return same.int().argmax(1)
 
 
-def draw_suites(count: int, styles: int, generator: torch.Generator) -> ShapeBatch:
-    """Suites: `BUNDLE` objects of random categories and at most two styles, told which belong together.
+def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> ShapeBatch:
+    """Suites: `BUNDLE` objects of random categories and at most two of the `styles` (K,), told which belong together.
 
     Rooms hold few of the rare categories; suites hold all alike.
     """
@@ -97,7 +97,7 @@ def draw_suites(count: int, styles: int, generator: torch.Generator) -> ShapeBat
     category = torch.randint(len(coarse), (nodes,), generator=generator)
     repeat = torch.rand(nodes, generator=generator) < 0.25
     category = torch.where(repeat, category[scene * BUNDLE], category)
-    two = torch.randint(styles, (count, 2), generator=generator)
+    two = styles[torch.randint(len(styles), (count, 2), generator=generator)]
     style = two[scene, (torch.rand(nodes, generator=generator) < 0.3).long()]
     at, to = ((scene[:, None] == scene) & ~torch.eye(nodes, dtype=torch.bool)).nonzero(as_tuple=True)
     same_style, same_coarse = style[at] == style[to], coarse[category[at]] == coarse[category[to]]
@@ -121,14 +121,14 @@ class ShapeStage:
 
     Arguments:
         rooms: packed rooms, whose styles and categories name the shapes.
-        shapes, held: shape sets to train on and to validate with.
+        shapes: the shape set in latent space.
         batch: objects per batch, per process.
     """
 
     trained = saved = ("shape",)
 
-    def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, held: EncodedShapes, batch: int) -> None:
-        self.rooms, self.shapes, self.held, self.batch = rooms, shapes, held, batch
+    def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, batch: int) -> None:
+        self.rooms, self.shapes, self.batch = rooms, shapes, batch
 
     def draw(self, generator: torch.Generator) -> ShapeBatch:
         """Rooms on even draws, suites on odd ones."""
@@ -148,13 +148,13 @@ class ShapeStage:
         generator = torch.Generator().manual_seed(0)
         losses = []
         for _ in range(4):
-            batch = draw_suites(8, self.held.styles, generator)
-            clean, size = self.held.latents[batch.shape].float(), self.held.sizes[batch.shape]
+            batch = draw_suites(8, self.shapes.held, generator)
+            clean, size = self.shapes.latents[batch.shape].float(), self.shapes.sizes[batch.shape]
             losses.append(shape_loss(model, batch, clean, size, generator)[0])
         return {"held/shape": float(torch.stack(losses).mean())}
 
 
 def room_shapes(room: LayoutBatch, shapes: EncodedShapes) -> ShapeBatch:
-    """The shapes of a batch of rooms; rooms that know more styles than the set share the set's."""
-    style = room.style % shapes.styles
+    """The shapes of a batch of rooms; their styles are mapped onto those that are trained on."""
+    style = shapes.styles[room.style % len(shapes.styles)]
     return ShapeBatch(room.graph, room.pairs, style * shapes.categories + room.graph.category, room)

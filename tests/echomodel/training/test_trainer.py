@@ -1,0 +1,208 @@
+"""Recipes, batches, every stage end to end on tiny data, and runs that resume bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.compact.model import WeightsError, load_weights
+from echomodel.compact.pairs import pairs_of
+from echomodel.data.build import build_data
+from echomodel.data.roomset import RoomSet
+from echomodel.echo import EchoModel
+from echomodel.graph import GraphBatch
+from echomodel.rules import verdicts
+from echomodel.training.logs import read_log
+from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
+from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
+from echomodel.training.run import open_run
+from echomodel.training.trainer import step_generator
+
+RECIPES = Path(__file__).parents[3] / "model" / "recipes"
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    build_data(folder, "smoke", seed=3)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def packed(data: Path) -> PackedRooms:
+    return PackedRooms.from_set(RoomSet(data / "rooms"), ("sgfront", "strict"), held=False)
+
+
+def told_triplets(batch: LayoutBatch) -> torch.Tensor:
+    pair, predicate = batch.predicates.nonzero(as_tuple=True)
+    return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
+
+
+def smoke(stage: str, data: Path, *settings: str) -> Recipe:
+    return read_recipe(RECIPES / "smoke.toml", [f"stage={stage}", f"data={data}", *settings])
+
+
+def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
+    seen = 0
+    for seed in range(4):
+        batch = draw_batch(packed, 200, torch.Generator().manual_seed(seed))
+        triplets = told_triplets(batch)
+        for number, rules in enumerate(("sgfront", "strict")):
+            mine = triplets[batch.rules[batch.graph.scene[triplets[:, 0]]] == number]
+            kept = verdicts(batch.boxes, mine, rules=rules)
+            seen += int((kept >= 0).sum())
+            assert not (kept == 0).any()
+    assert seen > 1000
+
+
+def test_batches_keep_the_node_budget_and_merge_like_graphs(packed: PackedRooms) -> None:
+    batch = draw_batch(packed, 100, torch.Generator().manual_seed(0))
+    assert 80 < batch.graph.num_nodes <= 100
+    triplets = told_triplets(batch)
+    assert torch.equal(pairs_of(batch.graph.with_triplets(triplets)).told, batch.pairs.told)
+
+
+def test_densities_range_from_hand_written_to_dense(packed: PackedRooms) -> None:
+    per_object = []
+    for seed in range(30):
+        batch = draw_batch(packed, 60, torch.Generator().manual_seed(seed))
+        owner = batch.graph.scene[batch.pairs.receiver]
+        told = torch.zeros(batch.graph.num_scenes).index_add_(0, owner, batch.predicates.sum(1).float())
+        per_object.append(told / batch.graph.node_counts)
+    shares = torch.cat(per_object)
+    assert (shares < 3).float().mean() > 0.2
+    assert (shares > 8).float().mean() > 0.2
+
+
+def test_pseudo_edits_leave_out_added_nodes(packed: PackedRooms) -> None:
+    batch = make_batch(packed, torch.arange(40), torch.Generator().manual_seed(1))
+    assert 5 < int(batch.added.sum()) < 25
+    assert not batch.added[batch.before.receiver].any()
+    assert not batch.added[batch.before.sender].any()
+    assert bool((batch.touched | ~batch.added).all())
+
+
+def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path) -> None:
+    """Autoencoder, layout, shapes and both branches together; losses fall and a room with shapes can be sampled."""
+    weights = {name: str(tmp_path / name / "weights.safetensors") for name in ("vqvae", "layout", "shape", "joint")}
+    starts = {
+        "vqvae": [],
+        "layout": [],
+        "shape": [weights["layout"], weights["vqvae"]],
+        "joint": [weights["layout"], weights["vqvae"], weights["shape"]],
+    }
+    for stage, start in starts.items():
+        names = ",".join(f'"{path}"' for path in start)
+        trainer = open_run(smoke(stage, data, f"start=[{names}]"), tmp_path / stage)
+        trainer.run()
+        losses = [value for _, name, value in read_log(tmp_path / stage / "log.csv") if name == "loss"]
+        assert (tmp_path / stage / "curves.png").stat().st_size > 5000
+        if stage != "joint":  # starts from trained parts
+            assert np.mean(losses[-2:]) < 0.97 * losses[0], stage
+    model = EchoModel(*load_weights([Path(weights["vqvae"]), Path(weights["joint"])]))
+    graph = GraphBatch.single([14, 23], [[1, 5, 0]], floor=(4.0, 3.0))
+    boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(0), steps=3)
+    grids = model.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(0), steps=2)
+    assert grids.shape == (2, 64, 64, 64)
+    assert torch.isfinite(grids).all()
+
+
+@pytest.mark.parametrize("stage", ["layout", "vqvae"])
+def test_resumed_run_is_bit_equal(stage: str, data: Path, tmp_path: Path) -> None:
+    recipe = smoke(stage, data, "steps=6", "log_every=1", "validate_every=100")
+    whole = open_run(recipe, tmp_path / "whole")
+    whole.run()
+    open_run(recipe, tmp_path / "parts").run(until=2)
+    middle = open_run(recipe, tmp_path / "parts", resume=True)
+    middle.run(until=4)
+    last = open_run(recipe, tmp_path / "parts", resume=True)
+    assert last.step == 4
+    last.run()
+    for one, other in ((whole.model, last.model), (whole.average, last.average)):
+        for (name, a), b in zip(one.state_dict().items(), other.state_dict().values(), strict=True):
+            assert torch.equal(a, b), name
+    rows = [[row for row in read_log(tmp_path / run / "log.csv") if row[1] == "loss"] for run in ("whole", "parts")]
+    assert rows[0] == rows[1]
+    assert [step for step, _, _ in rows[0]] == [1, 2, 3, 4, 5, 6]
+
+
+def test_shape_stage_needs_its_start(data: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="stage 'shape' needs weights with latent and autoencoder"):
+        open_run(smoke("shape", data), tmp_path)
+
+
+def test_weights_files_are_checked(data: Path, tmp_path: Path) -> None:
+    open_run(smoke("layout", data, "steps=1"), tmp_path).run()
+    path = tmp_path / "weights.safetensors"
+    content = path.read_bytes()
+    (tmp_path / "cut.safetensors").write_bytes(content[: len(content) // 2])
+    with pytest.raises(WeightsError, match="cut.safetensors: not a readable safetensors file"):
+        load_weights([tmp_path / "cut.safetensors"])
+    with pytest.raises(WeightsError, match="no weights files found"):
+        load_weights([])
+    from safetensors.torch import save_file
+
+    save_file({"a": torch.zeros(1)}, tmp_path / "other.safetensors")
+    with pytest.raises(WeightsError, match="format is None, expected 'echousd-compact-1'"):
+        load_weights([tmp_path / "other.safetensors"])
+    from safetensors import safe_open
+
+    with safe_open(path, "pt") as handle:
+        tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
+        metadata = handle.metadata()
+    tensors["layout.head.weight"] = tensors["layout.head.weight"][:, :3].contiguous()
+    del tensors["latent.mix.bias"]
+    save_file(tensors, tmp_path / "bad.safetensors", metadata=metadata)
+    text = r"1 missing \(latent.mix.bias\); 1 misshapen \(layout.head.weight\)"
+    with pytest.raises(WeightsError, match=text):
+        load_weights([tmp_path / "bad.safetensors"])
+
+
+def test_recipes_name_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no such recipe"):
+        read_recipe(tmp_path / "none.toml")
+    (tmp_path / "a.toml").write_text('stage = "layout"\n')
+    with pytest.raises(ValueError, match=r"a.toml: field 'steps' is missing"):
+        read_recipe(tmp_path / "a.toml")
+    (tmp_path / "b.toml").write_text('stage = "layout"\nsteps = 5\n[optimizer]\nspeed = 3\n')
+    with pytest.raises(ValueError, match="unknown field 'optimizer.speed', allowed: rate"):
+        read_recipe(tmp_path / "b.toml")
+    with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, joint"):
+        read_recipe(RECIPES / "layout.toml", ["stage=layouts"])
+    with pytest.raises(ValueError, match="setting 'steps' has no '='"):
+        read_recipe(RECIPES / "layout.toml", ["steps"])
+
+
+@pytest.mark.parametrize("path", sorted(RECIPES.glob("*.toml")), ids=lambda path: path.stem)
+def test_committed_recipes_are_valid(path: Path) -> None:
+    assert read_recipe(path).steps > 0
+
+
+def test_schedules() -> None:
+    paper = OptimizerConfig(rate=1e-4, schedule="paper")
+    rates = [paper.rate_at(step, 200_000) for step in (0, 35_000, 70_000, 140_000)]
+    assert rates == pytest.approx([1e-4, 5e-5, 1e-5, 5e-6])
+    cosine = OptimizerConfig(rate=1.0, schedule="cosine", warmup=10)
+    assert cosine.rate_at(0, 100) == pytest.approx(0.1)
+    assert cosine.rate_at(50, 100) == pytest.approx(0.5)
+    trapezoid = OptimizerConfig(rate=1.0, schedule="trapezoid", warmup=10, cooldown=20)
+    assert [trapezoid.rate_at(step, 100) for step in (50, 90)] == pytest.approx([1.0, 0.5])
+
+
+def test_steps_and_ranks_draw_differently() -> None:
+    draws = [
+        float(torch.rand(1, generator=step_generator(*key))) for key in ((0, 1, 0), (0, 2, 0), (0, 1, 1), (1, 1, 0))
+    ]
+    assert len(set(draws)) == 4
+    assert draws[0] == float(torch.rand(1, generator=step_generator(0, 1, 0)))
+
+
+def test_boxes_of_a_room_set_survive_packing(data: Path, packed: PackedRooms) -> None:
+    rooms = RoomSet(data / "rooms")
+    first = int((~rooms.held_out).nonzero()[0][0])
+    boxes = Boxes.from_room(rooms.room(first))
+    torch.testing.assert_close(packed.position[: len(boxes)], boxes.position)
