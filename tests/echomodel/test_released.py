@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,10 @@ from echomodel.released.gcn import TripletGCN
 from echomodel.released.model import GraphChange, ReleasedModel
 from echomodel.released.placing import fit_to_box, mesh_from_grid
 from echomodel.released.sampling import node_budget
+from echomodel.released.scene import published_scene
 from echomodel.released.shape import ShapeUNet
+from echomodel.released.tables import LayoutTables
+from echomodel.vocabulary import vocabulary
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
@@ -46,6 +50,7 @@ def _model(config: ReleasedConfig = CONFIG) -> ReleasedModel:
     with torch.no_grad():
         for parameter in model.parameters():
             parameter.add_(0.02 * torch.randn_like(parameter))
+    model.layout_tables = LayoutTables.linear(1e-3, 0.2, 60)  # the published 1,000 steps are for tests/parity
     return model.eval()
 
 
@@ -240,6 +245,35 @@ def test_bad_conditions_are_named() -> None:
         model.sample_layout(BED, generator=torch.Generator())
     with pytest.raises(ValueError, match="one node has no batch statistics"):
         TripletGCN(4, 4, 8, 2, 4).train()(torch.zeros(1, 4), torch.zeros(0, 4), torch.zeros(0, 2, dtype=torch.int64))
+
+
+class _Text:
+    name, width = "lengths", 12
+
+    def __call__(self, texts: Sequence[str]) -> torch.Tensor:
+        return torch.tensor([[float(len(text))] * 12 for text in texts]).reshape(-1, 12)
+
+
+def test_a_labelled_graph_gets_floor_scene_and_texts() -> None:
+    classes = vocabulary().coarse_categories
+    triples = torch.tensor([[1, 5, 0], [0, 1, 2]])
+    scene = published_scene(["bed", "nightstand"], triples, classes=classes, text=_Text(), edges=True)
+    assert scene.classes.tolist() == [1, 8, 6, 0]
+    assert scene.triples.tolist() == [[1, 5, 0], [0, 1, 2], [0, 0, 3], [1, 0, 3], [2, 0, 3]]
+    assert scene.node_text[:, 0].tolist() == [len(word) for word in ("bed", "nightstand", "floor", "room")]
+    assert scene.edge_text[0, 0] == len("nightstand close by bed")
+    assert scene.edge_text[4, 0] == len("floor in room")
+    _model().conditions(scene)
+    alone = published_scene(["bed"], torch.zeros(0, 3), classes=classes, text=_Text())
+    assert alone.triples.tolist() == [[0, 0, 2], [1, 0, 2]]
+    for labels, related, message in (
+        (["bed", "spaceship"], [[0, 1, 1]], r"label of node 1 is 'spaceship', allowed: bed, bookshelf"),
+        (["floor"], [], r"label of node 0 is 'floor'"),
+        (["bed"], [[0, 99, 1]], r"predicate of triplet 0 is 99, allowed: 0\.\.15"),
+        (["bed"], [[0, 1, 2]], r"triplet 0 joins nodes 0 and 2, allowed: 0\.\.1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            published_scene(labels, torch.tensor(related), classes=classes, text=_Text())
 
 
 def test_bounds_file(tmp_path) -> None:

@@ -13,8 +13,9 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.released.config import ReleasedConfig
 from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
 from echomodel.released.frozen_layout import FrozenLayout
+from echomodel.released.frozen_shape import FrozenShape
 from echomodel.released.layout import LayoutNet
-from echomodel.released.sampling import ancestral, ddim, last, layout_loss, node_budget, shape_loss
+from echomodel.released.sampling import Denoiser, ancestral, ddim, last, layout_loss, node_budget, shape_loss
 from echomodel.released.shape import ShapeNet
 from echomodel.released.tables import DDIMGrid, LayoutTables, ShapeTables
 from echomodel.released.vqvae import VQVAE
@@ -165,13 +166,14 @@ class ReleasedModel(GraphEncoder):
         steps: int = 100,
         shared_noise: bool = True,
         change: GraphChange | None = None,
+        winograd: bool = True,
     ) -> Tensor:
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
 
         Arguments:
             graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
             shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
-            change: as `conditions`.
+            change: as `conditions`. winograd: as `FrozenShape`: faster, at the cost of memory.
 
         Returns:
             (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
@@ -188,9 +190,13 @@ class ReleasedModel(GraphEncoder):
         )
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
-        def denoise(x: Tensor, t: Tensor) -> Tensor:
+        def as_trained(x: Tensor, t: Tensor) -> Tensor:
             return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edges)
 
+        denoise: Denoiser = as_trained
+        if self.config.shape.conditioning == "crossattn" and conditions.shape is not None:
+            net = self.shape_df.diffusion_net
+            denoise = FrozenShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
         return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)))
 
     def training_losses(
