@@ -140,7 +140,7 @@ def test_weights_files_are_checked(data: Path, tmp_path: Path) -> None:
     path = tmp_path / "weights.safetensors"
     content = path.read_bytes()
     (tmp_path / "cut.safetensors").write_bytes(content[: len(content) // 2])
-    with pytest.raises(WeightsError, match="cut.safetensors: not a readable safetensors file"):
+    with pytest.raises(WeightsError, match=r"cut.safetensors: not a readable safetensors file"):
         load_weights([tmp_path / "cut.safetensors"])
     with pytest.raises(WeightsError, match="no weights files found"):
         load_weights([])
@@ -169,7 +169,7 @@ def test_recipes_name_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"a.toml: field 'steps' is missing"):
         read_recipe(tmp_path / "a.toml")
     (tmp_path / "b.toml").write_text('stage = "layout"\nsteps = 5\n[optimizer]\nspeed = 3\n')
-    with pytest.raises(ValueError, match="unknown field 'optimizer.speed', allowed: rate"):
+    with pytest.raises(ValueError, match=r"unknown field 'optimizer.speed', allowed: rate"):
         read_recipe(tmp_path / "b.toml")
     with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, joint"):
         read_recipe(RECIPES / "layout.toml", ["stage=layouts"])
@@ -194,9 +194,8 @@ def test_schedules() -> None:
 
 
 def test_steps_and_ranks_draw_differently() -> None:
-    draws = [
-        float(torch.rand(1, generator=step_generator(*key))) for key in ((0, 1, 0), (0, 2, 0), (0, 1, 1), (1, 1, 0))
-    ]
+    keys = ((0, 1, 0), (0, 2, 0), (0, 1, 1), (1, 1, 0))
+    draws = [float(torch.rand(1, generator=step_generator(*key))) for key in keys]
     assert len(set(draws)) == 4
     assert draws[0] == float(torch.rand(1, generator=step_generator(0, 1, 0)))
 
