@@ -27,7 +27,7 @@ class Predicate:
     """A relation with its SG-FRONT id and spelling and its logic.
 
     `inverse` is None where no predicate says the same of the swapped pair. `order` names the order that the predicate
-    belongs to (left and right share one) and `rank` is 1 where the subject comes after the object in it, -1 where before.
+    belongs to (left and right share one) and `rank` is 1 where the subject comes after the object, -1 where before.
     `swapped` are words that mean this predicate with subject and object exchanged; they are named in errors only.
     """
 
