@@ -18,8 +18,10 @@ def armchair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     foot = min(style.leg_height * 0.9, 0.16) if style.legs not in ("plinth", "bun") else 0.05
     seat = 0.43 if h > 0.6 else h * 0.6
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled") else "tapered"
-    parts: list[Solid] = base(style, w * 0.86, d * 0.86, foot, 0.045 * style.bulk, kind)
-    if style.arms == "shell" or style.back == "shell":
+    curved = style.arms == "shell" or style.back == "shell"
+    inside = 0.72 if curved else 0.86
+    parts: list[Solid] = base(style, w * inside, d * inside, foot, 0.045 * style.bulk, kind)
+    if curved:
         wall = 0.09 + 0.05 * style.softness
         arms = foot + (h - foot) * (0.6 + 0.3 * style.arm_height)
         power = 2.2 + 3 * style.corner

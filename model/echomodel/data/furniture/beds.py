@@ -155,8 +155,11 @@ def kids_bed(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         return _cot(size, style)
     if h > 1.55:
         return _bunk(size, style, rng)
-    parts = _bed(np.array([w, min(h, 1.0), d]), style, rng, 1)
-    if h > 1.1:
+    if h > 1.2 and rng.random() < 0.45:
+        return _loft(size)
+    house = h > 1.1 and rng.random() < 0.7
+    parts = _bed(np.array([w, min(h, 1.0) if house else h, d]), style, rng, 1)
+    if house:
         return parts + _house(w, h, d)
     y0, y1 = 0.3, min(h * 0.85, 0.72)
     side = -1 if rng.random() < 0.5 else 1
@@ -185,6 +188,28 @@ def _house(w: float, h: float, d: float) -> list[Solid]:
                 replace(rafter, centre=np.array([s * w / 4, (eaves + h) / 2 - t, z]), turn=rotation(z=-s * slope))
             )
     parts.append(box((-t, h - 2 * t, -d / 2), (t, h, d / 2)))
+    return parts
+
+
+def _loft(size: Size) -> list[Solid]:
+    """One high deck on four posts with a rail round it, a ladder in front, and a chest of shelves below."""
+    w, h, d = size
+    t, deck = 0.035, h - 0.45
+    posts = [(sx * (w / 2 - t), sz * (d / 2 - t)) for sx in (-1, 1) for sz in (-1, 1)]
+    parts: list[Solid] = [box((x - t, 0, z - t), (x + t, h - 0.05, z + t)) for x, z in posts]
+    parts.append(box((-w / 2, deck, -d / 2), (w / 2, deck + 0.1, d / 2)))
+    parts.append(
+        box((-w / 2 + 0.05, deck + 0.08, -d / 2 + 0.05), (w / 2 - 0.05, deck + 0.22, d / 2 - 0.05), "fabric", 0.04)
+    )
+    for y in (deck + 0.26, h - 0.09):
+        parts += [box((s * w / 2 - 0.018, y, -d / 2), (s * w / 2 + 0.018, y + 0.07, d / 2)) for s in (-1, 1)]
+        parts.append(box((-w / 2, y, -d / 2), (w / 2, y + 0.07, -d / 2 + 0.03)))
+        parts.append(box((-w / 2, y, d / 2 - 0.03), (w * 0.1, y + 0.07, d / 2)))
+    parts += [box((x - 0.02, 0, d / 2 - 0.03), (x + 0.02, h - 0.05, d / 2 + 0.01)) for x in (w * 0.14, w * 0.42)]
+    steps = np.linspace(0.2, deck, 4)
+    parts += [box((w * 0.14, y, d / 2 - 0.03), (w * 0.42, y + 0.035, d / 2 + 0.01)) for y in steps]
+    parts += [box((-w * 0.45, y, -d * 0.45), (-w * 0.1, y + 0.02, d * 0.2)) for y in (0.03, deck * 0.5)]
+    parts += [box((x - 0.01, 0, -d * 0.45), (x + 0.01, deck, d * 0.2)) for x in (-w * 0.45, -w * 0.1)]
     return parts
 
 

@@ -27,7 +27,7 @@ def carcass(
     w, h, d = size
     t = BOARD * (0.8 + 0.6 * style.bulk)
     kind = kind or style.legs
-    if kind in ("trestle", "hairpin") and foot < 0.08:
+    if kind == "trestle" or (kind == "hairpin" and foot < 0.08):
         kind = "straight"
     thick = float(np.clip(0.045 * style.bulk, 0.03, 0.07)) if foot > 0.08 else 0.05
     parts = base(style, w * 0.96, d * 0.9, foot, thick, kind) if foot > 0 else []

@@ -11,7 +11,7 @@ FAMILIES: dict[str, dict[str, dict[str, float]]] = {
     "modern": {
         "legs": {"straight": 3, "tapered": 2, "sled": 2, "plinth": 3, "hairpin": 1},
         "profile": {"square": 3, "round": 2},
-        "back": {"panel": 4, "cushion": 3, "shell": 3, "frame": 1},
+        "back": {"panel": 3, "cushion": 3, "shell": 4, "frame": 1},
         "arms": {"box": 4, "slim": 3, "shell": 2, "none": 1},
         "headboard": {"panel": 4, "channels": 3, "low": 2, "cushions": 2},
         "fronts": {"flat": 5, "recessed": 2, "open": 2},
@@ -21,7 +21,7 @@ FAMILIES: dict[str, dict[str, dict[str, float]]] = {
     "scandinavian": {
         "legs": {"splayed": 5, "tapered": 4, "straight": 1},
         "profile": {"round": 5, "square": 1},
-        "back": {"spindles": 3, "frame": 2, "shell": 3, "panel": 2, "rails": 2},
+        "back": {"spindles": 3, "frame": 2, "shell": 4, "panel": 2, "rails": 2},
         "arms": {"slim": 5, "none": 2, "box": 1},
         "headboard": {"panel": 3, "slats": 3, "low": 2, "cushions": 1},
         "fronts": {"flat": 5, "open": 3},
