@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -89,9 +88,7 @@ def test_what_is_said_twice_is_drawn_once():
 def test_a_large_graph_still_makes_a_picture(tmp_path):
     nodes = tuple(Node(f"n{i}", "chair") for i in range(100))
     relations = tuple(Relation(f"n{i}", "left", f"n{j}") for i in range(100) for j in (i + 1, i + 7) if j < 100)
-    started = time.perf_counter()
     draw_graph(SceneGraph("study", nodes, relations), tmp_path / "g.png")
-    assert time.perf_counter() - started < 60
     with Image.open(tmp_path / "g.png") as image:
         assert max(image.size) <= 42 * 160
 
