@@ -14,15 +14,15 @@ from echomodel.rules import label_relations, verdicts
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("rooms")
-    build_rooms(path, 60, 3, 5)
+    build_rooms(path, 40, 3, 5)
     return path
 
 
 def test_rooms_come_back(folder):
     rooms = RoomSet(folder)
-    assert len(rooms) == 60
-    assert rooms.held_out.sum() == 3
-    for number, true in enumerate(generate_rooms(60, 3, styles=5)):
+    assert len(rooms) == 40
+    assert rooms.held_out.sum() == 2
+    for number, true in enumerate(generate_rooms(40, 3, styles=5)):
         read = rooms.room(number)
         assert read.categories == true.categories
         assert read.models == true.models
@@ -56,33 +56,33 @@ def test_passes_are_seeded_and_leave_out_what_is_held_out(folder):
     first, second = next(rooms.batches(16, seed=4)), next(rooms.batches(16, seed=5))
     assert torch.equal(first.graph.triplets, again[0].graph.triplets)
     assert not np.array_equal(first.rooms, second.rooms)
-    assert sum(len(b.rooms) for b in rooms.batches(16, held_out=True)) == 3
+    assert sum(len(b.rooms) for b in rooms.batches(16, held_out=True)) == 2
 
 
 def test_equal_seeds_give_equal_bytes_also_after_an_interruption(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(roomset, "ROOMS_PER_SHARD", 20)
+    monkeypatch.setattr(roomset, "ROOMS_PER_SHARD", 8)
 
     def stop(done, total):
-        if done > 20:
+        if done > 8:
             raise KeyboardInterrupt
 
-    build_rooms(tmp_path / "whole", 60, 3, 5)
+    build_rooms(tmp_path / "whole", 24, 3, 5)
     with pytest.raises(KeyboardInterrupt):
-        build_rooms(tmp_path / "broken", 60, 3, 5, stop)
+        build_rooms(tmp_path / "broken", 24, 3, 5, stop)
     with pytest.raises(ValueError, match="not a room set \\(unfinished set, run the build again\\)"):
         RoomSet(tmp_path / "broken")
     assert [p.name for p in sorted((tmp_path / "broken").glob("*.bin"))] == ["rooms-0000.bin"]
-    build_rooms(tmp_path / "broken", 60, 3, 5)
+    build_rooms(tmp_path / "broken", 24, 3, 5)
     for path in (tmp_path / "whole").iterdir():
         assert path.read_bytes() == (tmp_path / "broken" / path.name).read_bytes()
-    build_rooms(tmp_path / "other", 60, 4, 5)
+    build_rooms(tmp_path / "other", 24, 4, 5)
     name = "rooms-0000.bin"
     assert (tmp_path / "other" / name).read_bytes() != (tmp_path / "whole" / name).read_bytes()
 
 
 def test_bad_folders_are_told(folder, tmp_path):
     with pytest.raises(ValueError, match=r"was begun with seed 3; choose another folder or remove it"):
-        build_rooms(folder, 60, 9, 5)
+        build_rooms(folder, 40, 9, 5)
     with pytest.raises(ValueError, match=r"no rooms\.json"):
         RoomSet(tmp_path)
     build_rooms(tmp_path, 5, 1, 2)
@@ -94,3 +94,19 @@ def test_bad_folders_are_told(folder, tmp_path):
         RoomSet(folder).relations(0, rules="x")
     with pytest.raises(ValueError, match="unknown recipe 'huge': allowed are smoke, packed, full"):
         build_data(tmp_path, "huge", 1)
+
+
+def test_the_smoke_recipe_makes_rooms_that_refer_to_its_shapes(tmp_path):
+    told = []
+    rooms, shapes = build_data(tmp_path, "smoke", 7, lambda part, done, total: told.append((part, done, total)))
+    assert (len(rooms), len(shapes)) == (64, 92)
+    assert told[-1] == ("shapes", 92, 92)
+    for number in range(len(rooms)):
+        room = rooms.room(number)
+        for model, category in zip(room.models, room.categories, strict=True):
+            assert shapes.categories[shapes.category[shapes.index_of(model)]] == category
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.bin")}
+    build_data(tmp_path, "smoke", 7)
+    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.bin")}
+    with pytest.raises(ValueError, match="was begun with seed 7"):
+        build_data(tmp_path, "smoke", 8)
