@@ -25,6 +25,8 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     Raises `GraphError` (text) or `echousd.stage.StageError` (stage), both ValueError, naming the file and the fault.
     """
     path = Path(path)
+    if path.is_dir():
+        raise GraphError(f"{path}: is a directory, allowed: a {', '.join((*TEXT_FORMS, *STAGE_FORMS))} file")
     if path.suffix.lower() in STAGE_FORMS:
         return SceneGraph.from_stage(path, room=room)
     if path.suffix.lower() not in TEXT_FORMS:

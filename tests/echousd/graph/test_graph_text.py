@@ -224,7 +224,7 @@ def test_files_that_cannot_be_read(tmp_path):
         "gone.yaml": "gone.yaml: no such file or directory",
         "graph.txt": "graph.txt: extension '.txt', allowed: .yaml, .yml, .json, .usda, .usdc, .usd, .usdz",
         "latin.yaml": "latin.yaml: no text in UTF-8 (byte 19)",
-        "folder.yaml": "folder.yaml: is a directory",
+        "folder.yaml": "folder.yaml: is a directory, allowed: a .yaml, .yml, .json, .usda, .usdc, .usd, .usdz file",
         "big.json": "big.json: 65 MiB, allowed: 64 MiB for a scene graph",
     }.items():
         with pytest.raises(GraphError) as error:
