@@ -1,4 +1,4 @@
-"""The one thing pyproject.toml cannot say: three source folders make up the two packages (see DESIGN of the tree in README)."""
+"""The one thing pyproject.toml cannot say: three source folders make up the two packages."""
 
 from setuptools import find_packages, setup
 

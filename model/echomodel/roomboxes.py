@@ -100,7 +100,8 @@ def read_rooms(path: str | os.PathLike[str]) -> list[RoomBoxes]:
         raw = json.loads(path.read_text("utf-8"))
         entries: Sequence[dict] = raw["rooms"]
     except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError) as error:
-        raise ValueError(f'{path}: not a rooms file, expected {{"convention": ..., "rooms": [...]}} ({error})') from None
+        form = '{"convention": ..., "rooms": [...]}'
+        raise ValueError(f"{path}: not a rooms file, expected {form} ({error})") from None
     rooms = []
     for number, entry in enumerate(entries):
         try:

@@ -122,8 +122,12 @@ class Vocabulary:
         raise UnknownWord(f"unknown {kind} {word!r}{known}: {hint}")
 
     def _names(self, kind: str) -> list[str]:
-        entries = {"category": self.categories, "predicate": self.predicates, "room type": self.room_types}[kind]
-        return [entry.name for entry in entries]
+        words: dict[str, tuple[Category, ...] | tuple[Predicate, ...] | tuple[RoomType, ...]] = {
+            "category": self.categories,
+            "predicate": self.predicates,
+            "room type": self.room_types,
+        }
+        return [entry.name for entry in words[kind]]
 
     def _name(self, kind: str, position: int) -> str:
         return self._names(kind)[position]
