@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from echousd.drawables import Drawable, Paint, read_drawables, read_image
 from echousd.stage import open_stage
@@ -78,6 +78,7 @@ def flat_layer(
                 _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
             elif attribute.GetTypeName() == Sdf.ValueTypeNames.Asset and attribute.Get():
                 _take_along(attribute, textures)
+    _drop_unused_materials(stage)
     if layouts is not None and len(layouts.layouts) > 1:
         place_layouts(stage, layouts)
     return layer
@@ -143,6 +144,24 @@ def _take_along(attribute: Usd.Attribute, textures: Path | None) -> None:
             color.Set(tuple(fallback)[:3] if fallback else (0.5, 0.5, 0.5))
     attribute.GetPrim().SetActive(False)
     attribute.Clear()
+
+
+def _drop_unused_materials(stage: Usd.Stage) -> None:
+    """Looks of assets that the room's own looks replace."""
+    bound = {
+        target
+        for prim in stage.TraverseAll()
+        for target in (
+            prim.GetRelationship("material:binding").GetTargets() if prim.HasRelationship("material:binding") else ()
+        )
+    }
+    unused = [p for p in stage.TraverseAll() if p.IsA(UsdShade.Material) and p.GetPath() not in bound]
+    scopes = {prim.GetParent().GetPath() for prim in unused}
+    for path in [prim.GetPath() for prim in unused]:
+        stage.RemovePrim(path)
+    for path in scopes:
+        if not stage.GetPrimAtPath(path).GetAllChildren():
+            stage.RemovePrim(path)
 
 
 def _own_faces(mesh: Drawable) -> list[tuple[Paint, np.ndarray]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ import numpy as np
 import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
-from echousd.room.looks import kind_of
+from echousd.room.looks import kind_of, look, palette_for
+from echousd.room.materials import write_looks
 from echousd.room.surface import Surface, surface
 
 LICENCE = "Apache-2.0"
@@ -102,8 +103,17 @@ def geometry_layer(name: str, form: Surface, collision: trimesh.Trimesh, data: M
     return stage.GetRootLayer()
 
 
-def component_layer(name: str, category: str, extent: np.ndarray, data: Mapping[str, Any]) -> Sdf.Layer:
-    """`<name>.usda`: kind, extentsHint, asset info and the payload `./<name>_geo.usdc`."""
+def component_layer(
+    name: str, category: str, style: str, extent: np.ndarray, groups: Sequence[str], data: Mapping[str, Any]
+) -> Sdf.Layer:
+    """`<name>.usda`: kind, extentsHint, asset info, looks of its own and the payload `./<name>_geo.usdc`.
+
+    Arguments:
+        name, category, style: words; the style chooses the looks, which a room's materials layer overrides.
+        extent: (2, 3) float, metres.
+        groups: material groups of the mesh.
+        data: customLayerData.
+    """
     stage = new_stage(name, ".usda", data)
     prim = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
     model = Usd.ModelAPI(prim)
@@ -112,6 +122,9 @@ def component_layer(name: str, category: str, extent: np.ndarray, data: Mapping[
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
+    mesh, palette = f"/{name}/{name}_mesh", palette_for(style)
+    bindings = {f"{mesh}/{group}" if len(groups) > 1 else mesh: group for group in groups}
+    write_looks(stage, {group: look(palette, group) for group in groups}, bindings, f"/{name}/Looks")
     return without_stage(stage, lambda layer: _add_payload(layer, name))
 
 

@@ -234,7 +234,8 @@ def _asset(room: Room, name: str, user: str) -> Asset:
     data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
     folder = f"assets/{name}/{name}"
     geometry = assets.geometry_layer(name, form, collision, data)
-    component = assets.component_layer(name, category, form.extent, data)
+    style = style_groups(room.graph)[user]
+    component = assets.component_layer(name, category, style, form.extent, tuple(form.groups), data)
     files = {
         f"{folder}_geo.usdc": assets.layer_bytes(geometry, ".usdc"),
         f"{folder}.usda": assets.layer_bytes(component, ".usda"),

@@ -31,7 +31,7 @@ PALETTES: Mapping[str, tuple[str, str, str, str, str, str, str]] = {
     "walnut": ("77502f", "8a6240", "b9803a", "efe8da", "b06a43", "b08d57", "b9623f"),
     "ash": ("d3b88f", "f0ece3", "a9b39c", "f3efe7", "8fa08a", "d0cfca", "8d9a92"),
     "smoke": ("7d6b5b", "9a8c7f", "5d7088", "dfdcd6", "3f4f66", "9ea3a8", "3c4046"),
-    "cherry": ("8f4f34", "a4623f", "c9b594", "f0e9de", "93443a", "c2a15f", "e4ddd0"),
+    "cherry": ("83523a", "9a6446", "c9b594", "f0e9de", "93443a", "c2a15f", "e4ddd0"),
     "birch": ("dcc39a", "cfd8d3", "c48f85", "f5f0ea", "d5a79c", "8e9498", "c9b8a6"),
 }
 

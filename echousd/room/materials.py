@@ -46,20 +46,21 @@ def define_material(stage: Usd.Stage, path: str, look: Look) -> UsdShade.Materia
     return material
 
 
-def write_looks(stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[str, str]) -> None:
-    """Define every look below `/Room/Looks` and bind it.
+def write_looks(stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[str, str], scope: str = LOOKS) -> None:
+    """Define every look that is bound, and bind it.
 
     Arguments:
         stage: receives the opinions, as overs on whatever is bound.
         looks: material name -> look.
         bindings: prim path of a mesh or subset -> material name.
+        scope: path of the prim that the materials stand below.
     """
-    UsdGeom.Scope.Define(stage, LOOKS)
+    UsdGeom.Scope.Define(stage, scope)
     for name in sorted(set(bindings.values())):
-        define_material(stage, f"{LOOKS}/{name}", looks[name])
+        define_material(stage, f"{scope}/{name}", looks[name])
     for path, name in bindings.items():
         prim = stage.OverridePrim(path)
-        UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([Sdf.Path(f"{LOOKS}/{name}")])
+        UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([Sdf.Path(f"{scope}/{name}")])
 
 
 def planks(color: Sequence[float], *, seed: int = 0, size: int = 512, rows: int = 8) -> bytes:

@@ -39,6 +39,9 @@ def test_usdz_for_the_web_is_one_flat_text_layer(root, tmp_path):
     assert stage.GetCompositionErrors() == []
     meshes = [prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
     assert len(meshes) == len(OBJECTS) + 1  # no colliders
+    materials = [str(prim.GetPath()) for prim in stage.Traverse() if prim.IsA(UsdShade.Material)]
+    assert materials
+    assert all(path.startswith("/Room/Looks/") for path in materials)
     box, wanted = world_bounds(stage), world_bounds(Usd.Stage.Open(str(root)))
     np.testing.assert_allclose([box.GetMin(), box.GetMax()], [wanted.GetMin(), wanted.GetMax()], atol=1e-4)
 

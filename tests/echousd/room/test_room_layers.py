@@ -119,6 +119,14 @@ def test_meshes_have_normals_uvs_and_materials(stage):
             assert material.ComputeSurfaceSource()[0].GetIdAttr().Get() == "UsdPreviewSurface"
 
 
+def test_asset_opened_alone_has_looks_of_its_own(root):
+    stage = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    for group in ("wood", "linen", "blanket"):
+        subset = stage.GetPrimAtPath(f"/bed/bed_mesh/{group}")
+        material = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()[0]
+        assert material.GetPath() == f"/bed/Looks/{group}"
+
+
 def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
     def bound(path):
         return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
