@@ -120,7 +120,7 @@ class EchoModel:
         if strength:
             conditional = relation_guided(
                 conditional, graph.triplets, self.model.statistics,
-                rules=rules, strength=strength, rounds=config.layout.guidance_rounds,
+                rules=rules, strength=strength, rounds=config.layout.guidance_rounds, floor=graph.floor[graph.scene],
             )  # fmt: skip
         x = self._noise((graph.num_nodes, 8), generator, noise)
         vectors = sample(

@@ -1,4 +1,4 @@
-"""Relation guidance: the denoiser's clean boxes are nudged towards the relations at every sampling step."""
+"""Relation guidance: the denoised boxes are nudged towards the relations, and onto the floor, at every step."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ def relation_guided(
     rules: str,
     strength: float,
     rounds: int = 2,
+    floor: Tensor | None = None,
 ) -> Predict:
     """Follow `predict` by gradient steps on the missed margins of the relations, in the normalised box space.
 
@@ -33,10 +34,11 @@ def relation_guided(
         rules: name of the rule set.
         strength: length of a step, 0.1 is a good start.
         rounds: steps after each call of the denoiser.
+        floor: (N, 2) float32, x and z extent of the floor under each node, NaN = unknown; None = all unknown.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
     wanted = triplets[torch.isin(triplets[:, 1], known)]
-    if not len(wanted):
+    if not len(wanted) and floor is None:
         return predict
 
     def guided(x: Tensor, level: Tensor) -> Tensor:
@@ -45,7 +47,10 @@ def relation_guided(
         for _ in range(rounds):
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()
-                missed = (SLACK - margins(Boxes.decode(free, statistics), wanted, rules=rules)).clamp(min=0)
+                boxes = Boxes.decode(free, statistics)
+                missed = (SLACK - margins(boxes, wanted, rules=rules)).clamp(min=0)
+                if floor is not None:
+                    missed = torch.cat([missed, outside(boxes, floor).flatten()])
                 # the logarithm bounds the pull of a relation that is missed by far
                 (slope,) = torch.autograd.grad(torch.log1p(missed / SLACK).sum() * SLACK, free)
             norm = slope.norm(dim=1, keepdim=True).clamp_min(1e-6)
@@ -53,3 +58,16 @@ def relation_guided(
         return clean
 
     return guided
+
+
+def outside(boxes: Boxes, floor: Tensor) -> Tensor:
+    """How far boxes reach beyond the floor's bounding box, whose centre is the origin: (N, 2) metres, 0 where unknown.
+
+    A box larger than the floor is asked to stand in the middle.
+    """
+    sin, cos = boxes.yaw.sin().abs(), boxes.yaw.cos().abs()
+    width, depth = boxes.size[:, 0], boxes.size[:, 2]
+    reach = torch.stack([cos * width + sin * depth, sin * width + cos * depth], dim=1) / 2
+    room = (floor / 2 - reach).clamp_min(0)
+    beyond = (boxes.position[:, [0, 2]].abs() - room).clamp_min(0)
+    return torch.where(torch.isfinite(floor), beyond, torch.zeros_like(beyond))
