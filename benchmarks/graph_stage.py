@@ -112,20 +112,26 @@ def seconds(action: Callable[[], object], repeats: int) -> float:
 def compare(title: str, graphs: list[SceneGraph], extension: str, folder: Path, repeats: int) -> list[float]:
     """Write and read `graphs` both ways; prints a line each and returns the three ratios: write, read, both."""
     paths = [folder / f"{number}{extension}" for number in range(len(graphs))]
-    pairs = list(zip(graphs, paths, strict=True))
-    bare = [
-        seconds(lambda: [floor_write(graph, path) for graph, path in pairs], repeats),
-        seconds(lambda: [floor_read(path) for path in paths], repeats),
-    ]
+
+    def each(action: Callable[..., object], *inputs: list) -> float:
+        """Seconds for `action` on every item, its results dropped."""
+
+        def run() -> None:
+            for item in zip(*inputs, strict=True):
+                action(*item)
+
+        return seconds(run, repeats)
+
+    bare = [each(floor_write, graphs, paths), each(floor_read, paths)]
     full = [
-        seconds(lambda: [save_layer(graph_layer(graph, identifier=extension), path) for graph, path in pairs], repeats),
-        seconds(lambda: [read_graph(path) for path in paths], repeats),
+        each(lambda graph, path: save_layer(graph_layer(graph, identifier=extension), path), graphs, paths),
+        each(read_graph, paths),
     ]
     assert read_graph(paths[-1]) == graphs[-1]
     ratios = []
     for name, ours, floor in zip(("write", "read", "both"), (*full, sum(full)), (*bare, sum(bare)), strict=True):
-        each = f"{ours / len(graphs) * 1e3:8.2f} ms against {floor / len(graphs) * 1e3:8.2f} ms"
-        print(f"{title:34} {extension[1:]:5} {name:6} {each}   ratio {ours / floor:.2f}", flush=True)
+        times = f"{ours / len(graphs) * 1e3:8.2f} ms against {floor / len(graphs) * 1e3:8.2f} ms"
+        print(f"{title:34} {extension[1:]:5} {name:6} {times}   ratio {ours / floor:.2f}", flush=True)
         ratios.append(ours / floor)
     return ratios
 
