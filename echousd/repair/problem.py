@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, pa
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
+NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
 
 
@@ -31,7 +32,7 @@ class Problem:
         wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
         pairs: (p, 2) int, pairs that must not collide.
         order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
-        lift: (p,) bool, pairs that may pass over one another.
+        handicap: (p, 5) float, metres by which a separating axis must be better to be chosen.
     """
 
     categories: tuple[str, ...]
@@ -44,7 +45,7 @@ class Problem:
     wall: np.ndarray
     pairs: np.ndarray
     order: np.ndarray
-    lift: np.ndarray
+    handicap: np.ndarray
 
 
 def pose(
@@ -93,10 +94,25 @@ def pose(
         wall,
         pairs,
         required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
-        np.zeros(len(pairs), bool),
+        axis_handicap(size, position, yaw, pairs, wall),
     )
-    vertical = pair_gaps(size, position, yaw, pairs)[0][:, 4] if len(pairs) else np.zeros(0)
-    return replace(problem, lift=vertical > -0.02), position, yaw
+    return problem, position, yaw
+
+
+def axis_handicap(
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, pairs: np.ndarray, wall: np.ndarray
+) -> np.ndarray:
+    """(p, 5) float: pairs pass over one another only where they do already; neighbours at one wall part along it."""
+    out = np.zeros((len(pairs), 5))
+    if not len(pairs):
+        return out
+    gap, direction, _ = pair_gaps(size, position, yaw, pairs)
+    out[:, 4] = np.where(gap[:, 4] > -0.02, 0.0, np.inf)
+    first, second = wall[pairs[:, 0]], wall[pairs[:, 1]]
+    neighbours = (np.abs(first - second) < 1e-6).all((1, 2))
+    across = np.abs(np.einsum("pad,pd->pa", direction, np.nan_to_num(first[:, 1]))) > 0.7
+    out[:, :4] += np.where(neighbours[:, None] & across, NEIGHBOURS, 0.0)
+    return out
 
 
 def canonical(word: str) -> str:

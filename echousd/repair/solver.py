@@ -90,8 +90,7 @@ def solve(
         size, position: (n, 3) float, metres, boxes to start from; yaw: (n,) float, radians.
         rules, centre: as `constraints.relation_margins`.
     """
-    handicap = np.zeros((len(problem.pairs), 5))
-    handicap[:, 4] = np.where(problem.lift, 0.0, np.inf)
+    handicap = problem.handicap.copy()
     best: Solution | None = None
     through = 0
     spent = 0
