@@ -19,12 +19,12 @@ def register(app: typer.Typer) -> None:
 def shapes(
     meshes: Annotated[Path | None, typer.Option(help="Set of real meshes, made by `echousd data meshes`.")] = None,
     shape_set: Annotated[Path | None, typer.Option("--set", help="Shape set, made by `echousd data build`.")] = None,
-    model: Annotated[Path | None, typer.Option(help="Weights file or folder [shipped].")] = None,
+    model: Annotated[Path | None, typer.Option(help="Weights file or folder; default the shipped ones.")] = None,
     limit: Annotated[int, typer.Option(min=1, help="Held-out shapes to reconstruct.")] = 200,
     rooms: Annotated[
         int, typer.Option(min=0, help="Rooms to fill with generated shapes; 0 = reconstruction only.")
     ] = 12,
-    steps: Annotated[int | None, typer.Option(help="Sampling steps [the model's].")] = None,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps; default the model's.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the choice, the rooms and the sampling.")] = 0,
     sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet, eight generated shapes per class.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
