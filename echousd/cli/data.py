@@ -22,8 +22,11 @@ def register(app: typer.Typer) -> None:
     app.add_typer(data_app, name="data")
 
 
-def load_rooms(path: Path, limit: int | None = None) -> list[RoomBoxes]:
-    """Rooms of a rooms file, or of the folder that `echousd data build` made; raises ValueError for anything else."""
+def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
+    """Rooms of a rooms file, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
+
+    Raises ValueError for anything else.
+    """
     from echomodel.roomboxes import read_rooms
 
     if not path.exists():
@@ -32,7 +35,10 @@ def load_rooms(path: Path, limit: int | None = None) -> list[RoomBoxes]:
         from echomodel.data.roomset import RoomSet
 
         rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
-        return [rooms.room(k) for k in range(min(len(rooms), limit or len(rooms)))]
+        numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
+        return [rooms.room(int(k)) for k in numbers[:limit]]
+    if held_out:
+        raise ValueError(f"{path}: a rooms file holds nothing out, allowed with --held-out: a folder of a room set")
     return read_rooms(path)[:limit]
 
 

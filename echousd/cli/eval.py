@@ -30,6 +30,7 @@ def layout(
     seed: Annotated[int, typer.Option(help="Seed of the dropping, the edits and the sampling.")] = 0,
     drop: Annotated[float, typer.Option(help="Share of the relations that the graph does not tell.")] = 0.5,
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
+    held_out: Annotated[bool, typer.Option("--held-out", help="Of a room set, what training does not see.")] = False,
     contradictions: Annotated[
         bool, typer.Option("--contradictions", help="Keep what contradicts a changed relation, as published.")
     ] = False,
@@ -52,7 +53,7 @@ def layout(
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
     from echousd.cli.data import load_rooms
 
-    found = load_rooms(rooms, limit)
+    found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(rules, drop, seed, change, add, contradictions)
     console = Console(stderr=True, highlight=False)
     if model == "truth":

@@ -15,7 +15,7 @@ from echousd.cli.main import run
 @pytest.fixture(scope="module")
 def rooms_file(tmp_path_factory):
     path = tmp_path_factory.mktemp("rooms") / "rooms.json"
-    assert run(["data", "rooms", "--count", "12", "--seed", "4", "-o", str(path)]) == 0
+    assert run(["data", "rooms", "--count", "8", "--seed", "4", "-o", str(path)]) == 0
     return path
 
 
@@ -32,8 +32,8 @@ def same(a: RoomBoxes, b: RoomBoxes, digits: int = 4) -> bool:
 
 
 def test_rooms_are_written_and_seeded(rooms_file, tmp_path):
-    assert len(read_rooms(rooms_file)) == 12
-    run(["data", "rooms", "--count", "12", "--seed", "4", "-o", str(tmp_path / "again.json")])
+    assert len(read_rooms(rooms_file)) == 8
+    run(["data", "rooms", "--count", "8", "--seed", "4", "-o", str(tmp_path / "again.json")])
     assert (tmp_path / "again.json").read_bytes() == rooms_file.read_bytes()
     run(["data", "rooms", "--count", "3", "--room", "lounge", "-o", str(tmp_path / "living.json")])
     assert {room.room_type for room in read_rooms(tmp_path / "living.json")} == {"living_room"}
@@ -79,7 +79,7 @@ def test_sgfront_files_and_back(rooms_file, tmp_path):
     assert run(["data", "to-sgfront", str(rooms_file), "-o", str(tmp_path)]) == 0
     assert run(["data", "from-sgfront", str(tmp_path), "-o", str(tmp_path / "back.json")]) == 0
     back = read_rooms(tmp_path / "back.json")
-    assert len(back) == 12
+    assert len(back) == 8
     assert all(len(room.relations) > 0 for room in back)
 
 
@@ -99,9 +99,12 @@ def test_plot_report_and_evaluation(rooms_file, tmp_path, capsys):
 def test_a_built_set_serves_as_rooms(tmp_path, capsys):
     from echomodel.data.roomset import build_rooms
 
-    build_rooms(tmp_path / "rooms", 6, 1, 2)
-    assert run(["eval", "layout", "--rooms", str(tmp_path), "--model", "truth", "--limit", "4", "--json"]) == 0
+    build_rooms(tmp_path / "rooms", 22, 1, 2)
+    arguments = ["eval", "layout", "--rooms", str(tmp_path), "--model", "truth", "--json"]
+    assert run([*arguments, "--limit", "4"]) == 0
     assert json.loads(capsys.readouterr().out)["rooms"] == 4
+    assert run([*arguments, "--held-out"]) == 0
+    assert json.loads(capsys.readouterr().out)["rooms"] == 1
 
 
 @pytest.mark.parametrize(
@@ -111,6 +114,7 @@ def test_a_built_set_serves_as_rooms(tmp_path, capsys):
         (["data", "build", "--recipe", "huge", "-o", "x"], "unknown recipe 'huge': allowed are smoke, packed, full"),
         (["data", "rooms", "--room", "garage", "-o", "x"], "unknown room type 'garage'"),
         (["data", "from-sgfront", "nowhere", "-o", "x"], "nowhere/classes_all.txt: no such file"),
+        (["eval", "layout", "--rooms", __file__, "--held-out"], "a rooms file holds nothing out"),
         (["eval", "layout", "--rooms", "nothing"], "nothing: no such file or folder"),
     ],
 )
