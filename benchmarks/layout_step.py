@@ -1,6 +1,6 @@
 """One layout denoising step at the published sizes: the network as written against the fast path, in one run.
 
-    python benchmarks/layout_step.py [--repeats 5] [--threads 2]
+    python benchmarks/layout_step.py [--repeats 5] [--threads 2] [--clock wall|cpu]
 
 Wanted: at least 2.5x for one scene of 12 nodes and 51 edges, at least 4x for 32 such scenes.
 """
@@ -15,8 +15,9 @@ import torch
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "parity"))
 
+import machine
 from literal_networks import literal_layout
-from machine import alternate, matmul_rate, read_bandwidth, scene_graph, tally
+from machine import alternate, report_machine, scene_graph, tally
 
 from echomodel.released.config import UNetConfig
 from echomodel.released.frozen_layout import FrozenLayout
@@ -28,10 +29,11 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--repeats", type=int, default=5)
     arguments.add_argument("--threads", type=int, default=2)
+    arguments.add_argument("--clock", choices=machine.CLOCKS, default="wall", help="cpu: for one thread, busy machine")
     options = arguments.parse_args()
+    machine.clock = options.clock
     torch.set_num_threads(options.threads)
-    rate, bandwidth = matmul_rate(), read_bandwidth()
-    print(f"machine: {rate / 1e9:.0f} GFLOP/s in matrix products, reads {bandwidth / 1e9:.1f} GB/s")
+    rate, bandwidth = report_machine(options.threads)
     generator = torch.Generator().manual_seed(0)
     net = LayoutNet(UNetConfig()).eval()
     with torch.no_grad():  # the last layers start at zero: fill everything, so that outputs can be compared

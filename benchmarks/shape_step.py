@@ -1,6 +1,6 @@
 """One shape denoising step of ten objects at the published sizes: the network as written against the fast path.
 
-    python benchmarks/shape_step.py [--objects 10] [--repeats 1] [--threads 2] [--no-winograd]
+    python benchmarks/shape_step.py [--objects 10] [--repeats 1] [--threads 2] [--no-winograd] [--clock wall|cpu]
 
 Wanted: at least 1.3x. The step as written takes about a minute on two cores; memory peaks near 9 GB.
 """
@@ -17,8 +17,9 @@ from torch.utils.flop_counter import FlopCounterMode
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "parity"))
 
+import machine
 from literal_networks import literal_shape
-from machine import alternate, matmul_rate, read_bandwidth
+from machine import alternate, report_machine
 
 from echomodel.released.config import shape_unet
 from echomodel.released.frozen_shape import FrozenShape
@@ -32,10 +33,11 @@ def main() -> int:
     arguments.add_argument("--repeats", type=int, default=1)
     arguments.add_argument("--threads", type=int, default=2)
     arguments.add_argument("--no-winograd", action="store_true")
+    arguments.add_argument("--clock", choices=machine.CLOCKS, default="wall", help="cpu: for one thread, busy machine")
     options = arguments.parse_args()
+    machine.clock = options.clock
     torch.set_num_threads(options.threads)
-    rate, bandwidth = matmul_rate(), read_bandwidth()
-    print(f"machine: {rate / 1e9:.0f} GFLOP/s in matrix products, reads {bandwidth / 1e9:.1f} GB/s", flush=True)
+    rate, bandwidth = report_machine(options.threads)
     config, count = shape_unet(), options.objects
     with torch.device("meta"), FlopCounterMode(display=False) as counter:
         embedding, token = torch.zeros(1, 4 * config.width), torch.zeros(1, config.context)
