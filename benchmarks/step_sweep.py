@@ -1,0 +1,87 @@
+"""Quality against cost of sampling steps, per sampler: python benchmarks/step_sweep.py ROOMS.json [--shapes]."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.echo import EchoModel
+from echomodel.graph import GraphBatch
+from echomodel.metrics.room_figures import with_known_words
+from echomodel.roomboxes import RoomBoxes, read_rooms
+from echomodel.rules import label_rooms, verdicts
+from echomodel.samplers import SAMPLERS
+
+RULES = "sgfront"
+
+
+def layout_row(model: EchoModel, graph: GraphBatch, truth: Boxes, steps: int, sampler: str, pull: float) -> str:
+    """Share of relations kept, size and position error, seconds per room."""
+    started = time.perf_counter()
+    generator = torch.Generator().manual_seed(0)
+    boxes = model.sample_layout(
+        graph, generator=generator, steps=steps, sampler=sampler, rules=RULES, relation_guidance=pull
+    )
+    seconds = (time.perf_counter() - started) / graph.num_scenes
+    kept = verdicts(boxes, graph.triplets, rules=RULES)
+    close = kept[(graph.triplets[:, 1] == 5) & (kept >= 0)].float().mean()
+    wrong = float((boxes.size.log() - truth.size.log()).abs().mean())
+    total = float(kept[kept >= 0].float().mean())
+    return (
+        f"{sampler:10} {steps:5d} {pull:5.2f}  kept {total:.3f}  close_by {float(close):.3f}"
+        f"  log size error {wrong:.3f}  {seconds * 1000:7.1f} ms per room"
+    )
+
+
+def shape_row(model: EchoModel, graph: GraphBatch, boxes: Boxes, steps: int, sampler: str, fine: torch.Tensor) -> str:
+    """Distance to the same noise sampled in very many steps, seconds per object."""
+    started = time.perf_counter()
+    grids = model.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(0), steps=steps, sampler=sampler)
+    seconds = (time.perf_counter() - started) / graph.num_nodes
+    inside, other = grids < 0, fine < 0
+    union = (inside | other).flatten(1).sum(1).clamp_min(1)
+    iou = ((inside & other).flatten(1).sum(1) / union).mean()
+    return f"{sampler:10} {steps:5d}  IoU with 200 Euler steps {float(iou):.3f}  {seconds:6.2f} s per object"
+
+
+def graphs_of(rooms: list[RoomBoxes]) -> tuple[GraphBatch, Boxes]:
+    """Rooms as graphs with half of their relations, and their true boxes."""
+    relations = label_rooms(rooms, rules=RULES, drop=0.5, rng=np.random.default_rng(0))
+    graphs = [GraphBatch.from_room(room, triplets=rows) for room, rows in zip(rooms, relations, strict=True)]
+    return GraphBatch.pack(graphs), Boxes.cat([Boxes.from_room(room) for room in rooms])
+
+
+def main() -> None:
+    """Read the arguments and print one line per setting."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rooms", type=Path)
+    parser.add_argument("--steps", default="5,10,20,50,100,1000")
+    parser.add_argument("--limit", type=int, default=60)
+    parser.add_argument("--model", type=Path)
+    parser.add_argument("--shapes", action="store_true")
+    options = parser.parse_args()
+    steps = [int(word) for word in options.steps.split(",")]
+    model = EchoModel.load(options.model)
+    rooms = [room for room in with_known_words(read_rooms(options.rooms)) if len(room) > 1][: options.limit]
+    graph, truth = graphs_of(rooms[:3] if options.shapes else rooms)
+    if options.shapes:
+        generator = torch.Generator().manual_seed(0)
+        fine = model.sample_shapes(graph, truth, generator=generator, steps=200, sampler="euler")
+    for sampler in SAMPLERS:
+        for count in steps:
+            if sampler == "ddim":  # the same as Euler for rectified flow
+                continue
+            if options.shapes:
+                print(shape_row(model, graph, truth, count, sampler, fine), flush=True)
+            else:
+                for pull in (0.0, 0.1):
+                    print(layout_row(model, graph, truth, count, sampler, pull), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""EchoModel: seeds, known boxes and shapes, edits, shared furniture, and bad input named."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.compact.model import CompactModel
+from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
+from echomodel.echo import EchoModel, GraphEdit, equal_furniture, touched_nodes
+from echomodel.graph import GraphBatch
+
+STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
+SIZES = {
+    "latent": {"width": 16},
+    "layout": {"width": 32, "layers": 2, "steps": 3},
+    "autoencoder": {"width": 8},
+    "shape": {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "steps": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def model() -> EchoModel:
+    torch.manual_seed(0)
+    net = CompactModel(from_dict(CompactConfig, SIZES), STATISTICS)
+    for parameter in net.parameters():
+        if not parameter.any():
+            torch.nn.init.normal_(parameter, std=0.1)
+    net.autoencoder.initialise(torch.rand(4, 16, 16, 16) * 2 - 1)
+    return EchoModel(net)
+
+
+def bedroom() -> GraphBatch:
+    return GraphBatch.single([14, 23, 23], [[1, 1, 0], [2, 2, 0], [1, 13, 2]], floor=(4.0, 3.0))
+
+
+def seeded(seed: int = 0) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+def boxes(count: int = 3) -> Boxes:
+    return Boxes(torch.ones(count, 3), torch.zeros(count, 3), torch.zeros(count))
+
+
+def test_equal_seeds_give_equal_bits(model: EchoModel) -> None:
+    runs = [model.sample_layout(bedroom(), generator=seeded(seed)) for seed in (1, 1, 2)]
+    assert torch.equal(runs[0].position, runs[1].position)
+    assert not torch.equal(runs[0].position, runs[2].position)
+    grids = [model.sample_shapes(bedroom(), boxes(), generator=seeded(seed)) for seed in (1, 1)]
+    assert torch.equal(*grids)
+
+
+def test_known_boxes_and_shapes_come_back_unchanged(model: EchoModel) -> None:
+    mask = torch.tensor([True, False, False])
+    given = Boxes(torch.tensor([[2.0, 1, 2], [torch.nan] * 3, [0, 0, 0]]), torch.ones(3, 3), torch.tensor([0.3, 0, 0]))
+    found = model.sample_layout(bedroom(), generator=seeded(), known=given, known_mask=mask)
+    assert torch.equal(found.size[0], given.size[0])
+    assert torch.equal(found.position[0], given.position[0])
+    assert found.yaw[0] == given.yaw[0]
+    assert torch.isfinite(found.size).all()
+    grid = torch.rand(3, 64, 64, 64) * 2 - 1
+    shapes = model.sample_shapes(bedroom(), boxes(), generator=seeded(), known=grid, known_mask=mask)
+    assert torch.equal(shapes[0], grid[0])
+    assert not torch.equal(shapes[1], grid[1])
+
+
+def test_what_is_known_shapes_the_rest(model: EchoModel) -> None:
+    mask, noise = torch.tensor([True, False, False]), torch.randn(3, 8, generator=seeded())
+    results = []
+    for shift in (0.0, 1.5):
+        given = Boxes(torch.ones(3, 3), torch.full((3, 3), shift), torch.zeros(3))
+        results.append(
+            model.sample_layout(bedroom(), generator=seeded(), known=given, known_mask=mask, noise=noise).position[1:]
+        )
+    assert not torch.allclose(*results)
+
+
+def test_an_edit_changes_the_result(model: EchoModel) -> None:
+    graph, noise = bedroom(), torch.randn(3, 8, generator=seeded())
+    edit = GraphEdit(before=graph.triplets[1:], added=torch.zeros(3, dtype=torch.bool))
+    assert touched_nodes(graph, edit).tolist() == [True, True, False]
+    plain = model.sample_layout(graph, generator=seeded(), noise=noise)
+    edited = model.sample_layout(graph, generator=seeded(), noise=noise, edit=edit)
+    assert not torch.equal(plain.position, edited.position)
+
+
+def test_equal_furniture_starts_from_equal_noise() -> None:
+    graph = GraphBatch.single([12, 12, 12, 13, 12], [[0, 13, 1], [2, 15, 1], [3, 13, 0], [4, 5, 0]])
+    assert equal_furniture(graph).tolist() == [0, 0, 0, 3, 4]
+
+
+@pytest.mark.parametrize(
+    "graph",
+    [
+        GraphBatch.single([3]),
+        GraphBatch.single([3, 4]),
+        GraphBatch.single([i % 46 for i in range(200)], [[0, 1, 1]]),
+        GraphBatch.pack([GraphBatch.single([1]), GraphBatch.single([2, 3], [[0, 5, 1]], floor=(3.0, 3.0))]),
+    ],
+    ids=["one node", "no edges", "200 nodes", "two scenes"],
+)
+def test_unusual_graphs_work(model: EchoModel, graph: GraphBatch) -> None:
+    for guidance in (1.0, 2.0):
+        found = model.sample_layout(graph, generator=seeded(), guidance=guidance)
+        found.check()
+        assert len(found) == graph.num_nodes
+
+
+def test_bad_input_is_named(model: EchoModel) -> None:
+    graph, mask = bedroom(), torch.tensor([True, False, False])
+    zero = Boxes(torch.zeros(3, 3), torch.zeros(3, 3), torch.zeros(3))
+    with pytest.raises(ValueError, match="box 0 has an extent that is not positive"):
+        model.sample_layout(graph, generator=seeded(), known=zero, known_mask=mask)
+    with pytest.raises(ValueError, match="known_mask belong together"):
+        model.sample_layout(graph, generator=seeded(), known=zero)
+    with pytest.raises(ValueError, match=r"known: 2 values and a \(3,\) torch.bool mask for a graph of 3 nodes"):
+        model.sample_layout(graph, generator=seeded(), known=boxes(2), known_mask=mask)
+    with pytest.raises(ValueError, match="rules is 'loose', allowed: sgfront, strict"):
+        model.sample_layout(graph, generator=seeded(), rules="loose")
+    with pytest.raises(ValueError, match="2 boxes for a graph of 3 nodes"):
+        model.sample_shapes(graph, boxes(2), generator=seeded())
+    bad = Boxes(torch.full((3, 3), torch.nan), torch.zeros(3, 3), torch.zeros(3))
+    with pytest.raises(ValueError, match="box 0 is not finite"):
+        model.sample_shapes(graph, bad, generator=seeded())
+    grid = torch.full((3, 64, 64, 64), torch.nan)
+    with pytest.raises(ValueError, match="known shape of node 0 holds values that are not finite"):
+        model.sample_shapes(graph, boxes(), generator=seeded(), known=grid, known_mask=mask)
+    with pytest.raises(ValueError, match="category of node 0 is 99"):
+        model.sample_layout(GraphBatch.single([99]), generator=seeded())
+
+
+def test_configurations_survive_json_and_settings() -> None:
+    config = with_settings(CompactConfig(), ["layout.steps=7", "shape.objective=velocity", 'rules=["strict"]'])
+    assert (config.layout.steps, config.shape.objective, config.rules) == (7, "velocity", ("strict",))
+    assert from_json(CompactConfig, to_json(config)) == config
+    with pytest.raises(ValueError, match=r"layout.steps is 'many', expected int"):
+        with_settings(CompactConfig(), ["layout.steps=many"])
+    with pytest.raises(ValueError, match=r"shape.objective is 'v', allowed: noise, velocity, flow"):
+        with_settings(CompactConfig(), ["shape.objective=v"])
