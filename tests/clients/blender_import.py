@@ -27,7 +27,11 @@ for thing in bpy.data.objects:
                 "faces": len(mesh.polygons) if mesh else 0,
                 "uv_layers": [layer.name for layer in mesh.uv_layers] if mesh else [],
                 "uv_spread": [
-                    round(max(uv.vector[i] for uv in mesh.uv_layers[0].uv) - min(uv.vector[i] for uv in mesh.uv_layers[0].uv), 4)
+                    round(
+                        max(uv.vector[i] for uv in mesh.uv_layers[0].uv)
+                        - min(uv.vector[i] for uv in mesh.uv_layers[0].uv),
+                        4,
+                    )
                     for i in range(2)
                 ]
                 if mesh and mesh.uv_layers and len(mesh.uv_layers[0].uv)

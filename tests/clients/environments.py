@@ -1,0 +1,55 @@
+"""One virtual environment for each client, made once in a cache folder (default `.clients/`, or $ECHOUSD_CLIENTS)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+PYTHON_CLIENTS = {
+    "blender": ("bpy==5.0.1",),
+    "nvidia": ("usd-validation-nvidia==1.22.0", "usd-core==26.11", "numpy>=2"),
+    "usd2411": ("usd-core==24.11",),
+    "usd2551": ("usd-core==25.5.1",),
+}
+THREE = "three@0.187.0"
+
+
+def cache() -> Path:
+    """The folder that holds the environments."""
+    default = Path(__file__).parents[2] / ".clients"
+    return Path(os.environ.get("ECHOUSD_CLIENTS", default)).resolve()
+
+
+def python_of(client: str) -> Path:
+    """The interpreter of a client's environment, which is installed at first; raises CalledProcessError."""
+    folder = cache() / client
+    python, ready = folder / "bin" / "python", folder / ".ready"
+    wanted = " ".join(PYTHON_CLIENTS[client])
+    if not ready.is_file() or ready.read_text("utf-8") != wanted:
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+        subprocess.run([*install, *PYTHON_CLIENTS[client]], check=True)
+        ready.write_text(wanted, "utf-8")
+    return python
+
+
+def three() -> Path:
+    """The folder whose `node_modules` holds three.js, installed with npm at first; raises CalledProcessError."""
+    folder = cache() / "three"
+    if not (folder / "node_modules" / "three").is_dir():
+        folder.mkdir(parents=True, exist_ok=True)
+        install = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), THREE]
+        subprocess.run(install, check=True, capture_output=True)
+    return folder
+
+
+def run(*command: str | Path, timeout: float = 300.0) -> str:
+    """Standard output of a command without our own Python path; fails with both streams in the message."""
+    environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "PXR_PLUGINPATH_NAME")}
+    done = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, timeout=timeout, env=environment, check=False
+    )
+    assert done.returncode == 0, f"{command[0]} ended with {done.returncode}:\n{done.stdout}\n{done.stderr}"
+    return done.stdout
