@@ -14,6 +14,7 @@ from echomodel.data.tsdf import mesh_from_tsdf
 SMALLEST = 0.02  # solids below this share of the largest one are noise
 PASS_BAND, SHRINK, SWELL = 6, 0.5, -0.53  # Taubin (1995): rounds, lambda, mu; low frequencies such as thin legs stay
 FACES = 5000
+NOISY = 200_000  # faces of a raw mesh that is noise more than shape: one try is enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +86,7 @@ def decimate(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
 
     points, triangles = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
     tried: list[trimesh.Trimesh] = []
-    for aggression in (3, 5, 4, 6):
+    for aggression in (3, 5, 4, 6) if len(triangles) <= NOISY else (6,):
         p, t = fast_simplification.simplify(points, triangles, target_count=faces, agg=aggression)
         reduced = trimesh.Trimesh(p, t, process=False)
         reduced.merge_vertices()
