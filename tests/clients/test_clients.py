@@ -28,9 +28,8 @@ def bounds(room: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-def visible_meshes(room: Path) -> dict[str, list[UsdGeom.Mesh]]:
+def visible_meshes(stage: Usd.Stage) -> dict[str, list[UsdGeom.Mesh]]:
     """Visible meshes below each object and part of the shell."""
-    stage = Usd.Stage.Open(str(room))
     found: dict[str, list[UsdGeom.Mesh]] = {}
     for prim in stage.Traverse():
         if prim.IsA(UsdGeom.Mesh) and UsdGeom.Imageable(prim).ComputePurpose() != UsdGeom.Tokens.guide:
@@ -72,7 +71,8 @@ def test_blender_imports_names_places_uvs_and_materials(rooms: list[Path]) -> No
         meshes = [thing for thing in things if thing["type"] == "MESH"]
         assert {"Room", "Objects", "Shell"} <= set(by_name)
         assert by_name["Objects"]["parent"] == "Room"
-        wanted = visible_meshes(room)
+        stage = Usd.Stage.Open(str(room))
+        wanted = visible_meshes(stage)
         assert len(meshes) == sum(map(len, wanted.values()))
         for name, (low, high) in bounds(room).items():
             # Y up in USD is Z up in Blender: (x, y, z) -> (x, -z, y).
@@ -101,13 +101,13 @@ def test_three_loads_the_package_for_the_web(rooms: list[Path], tmp_path: Path) 
     for number, room in enumerate(rooms):
         package = export(room, tmp_path / f"{number}.usdz")
         there = json.loads(run("node", HERE / "three_load.mjs", three(), package))
-        wanted = visible_meshes(room)
+        stage = Usd.Stage.Open(str(room))
+        wanted = visible_meshes(stage)
         meshes = [mesh for parts in wanted.values() for mesh in parts]
         assert there["triangles"] == sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes)
         assert there["meshes"] >= len(meshes)
         assert there["withoutUv"] == []
         assert set(wanted) <= set(there["objects"])
-        stage = Usd.Stage.Open(str(room))
         cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render])
         box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
         # three.js grows each mesh's own box with it when it is turned: never smaller, a little larger at most.
