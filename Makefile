@@ -1,4 +1,5 @@
-# make room: set up, author a sample and show it.   make test: set up, lint, types, tests.
+# make room: sets up, generates the sample bedroom, says where its picture is.
+# make test: sets up, lint, types, tests.
 PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -16,8 +17,7 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 	touch $@
 
 room: $(STAMP)
-	$(BIN)/echousd new out/bedroom.usda --from samples/bedroom.yaml --force
-	$(BIN)/echousd graph out/bedroom.usda
+	$(BIN)/echousd generate samples/bedroom.usda -o out/bedroom --seed 7
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
@@ -26,7 +26,19 @@ types: $(STAMP)
 	$(BIN)/mypy
 
 test: lint types
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not clients"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not clients"
+
+# make clients: opens generated rooms in Blender, three.js, NVIDIA's validator and older OpenUSDs.
+clients: $(STAMP)
+	$(BIN)/python -m pytest tests/clients -m clients
+
+# make benchmarks: ratios, each printed with what was asked; wants an idle machine and some minutes.
+benchmarks: $(STAMP)
+	cd benchmarks && for script in compact_budget graph_stage rooms layout_step; do ../$(BIN)/python $$script.py; done
+
+# make schema: the plugin's files, made anew from schemas/schema.usda.
+schema: $(STAMP)
+	$(BIN)/python -m echousd.schemas.regenerate
 
 clean:
 	rm -rf $(VENV) out build *.egg-info

@@ -174,7 +174,7 @@ def _shade(
     axes, eye = view.matrix[:3, :3].astype(np.float32), view.matrix[:3, 3].astype(np.float32)
     if view.orthographic:
         origin = eye + u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1]
-        direction = np.broadcast_to(-axes[:, 2], origin.shape)
+        direction: np.ndarray = np.broadcast_to(-axes[:, 2], origin.shape)
     else:
         direction = u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1] - axes[:, 2]
         direction = _unit(direction)

@@ -99,13 +99,13 @@ def conflicts(
         )
         for _, members in groups
     )
+    relations, pairs, outside = failures
     return tuple(
         conflict
         for conflict in every
-        if any(
-            set(met) & failed
-            for met, failed in zip((conflict.relations, conflict.pairs, conflict.outside), failures, strict=True)
-        )
+        if not relations.isdisjoint(conflict.relations)
+        or not pairs.isdisjoint(conflict.pairs)
+        or not outside.isdisjoint(conflict.outside)
     )
 
 

@@ -99,10 +99,12 @@ def write_cameras(
     top.AddRotateXOp().Set(-90.0)
     top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
-    walls = walled is not None
-    matrix = inside_view(walled, facing, float(volume.upper[1])) if walls else perspective_view(points, facing)
+    if walled is not None:
+        matrix = inside_view(walled, facing, float(volume.upper[1]))
+    else:
+        matrix = perspective_view(points, facing)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    camera.CreateFocalLengthAttr(WIDE if walls else FOCAL_LENGTH)
+    camera.CreateFocalLengthAttr(WIDE if walled is not None else FOCAL_LENGTH)
     camera.CreateHorizontalApertureAttr(APERTURE)
     camera.CreateVerticalApertureAttr(APERTURE)
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))

@@ -191,10 +191,10 @@ def sample_shapes(
     """(n, 64, 64, 64) float32 TSDFs from the shape branch; raises ValueError for a model without one."""
     require_shapes(echo)
     centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
-    extra = {} if steps is None else {"steps": steps}
     with (watch or Watch()).stage("shapes") as tell:
         generator = _generator(seed, "shapes", 0)
-        return np.asarray(echo.sample_shapes(graph_batch(graph), centred, generator=generator, progress=tell, **extra))
+        grids = echo.sample_shapes(graph_batch(graph), centred, generator=generator, steps=steps, progress=tell)
+        return np.asarray(grids)
 
 
 def make_meshes(

@@ -1,1 +1,1 @@
-"""The echo model: tensors in, tensors out. Imports neither pxr nor echousd; importing the package alone loads no torch."""
+"""The echo model: tensors in, tensors out. Knows neither pxr nor echousd; importing the package loads no torch."""
