@@ -31,6 +31,7 @@ scene.cycles.device = "CPU"
 scene.cycles.samples = arguments.samples
 scene.cycles.use_denoising = True
 scene.cycles.max_bounces = 6
+scene.view_settings.view_transform = "Standard"  # the looks' own colours; AgX greys them
 scene.render.resolution_x = scene.render.resolution_y = arguments.size
 scene.render.resolution_percentage = 100
 scene.render.image_settings.file_format = "PNG"
