@@ -48,7 +48,8 @@ def budget() -> dict[str, float]:
     layout = model.layout.context(graph, pairs, latent, torch.zeros(1, dtype=torch.int64))
     shape = model.shape.context(graph, torch.ones(nodes, 3), pairs, latent)
     coder = model.autoencoder
-    level, codes = torch.ones(nodes), torch.randn(nodes, coder.channels, coder.cells, coder.cells, coder.cells)
+    level, codes = torch.ones(nodes), torch.randn(nodes, config.shape.components)
+    cells = torch.randn(1, coder.channels, coder.cells, coder.cells, coder.cells)
     noisy = torch.randn(nodes, 8)
     room = dense_graph(8)
     boxes = Boxes(torch.ones(8, 3), torch.zeros(8, 3), torch.zeros(8))
@@ -62,8 +63,8 @@ def budget() -> dict[str, float]:
     return {
         "layout MFLOP per node and step": flops(lambda: model.layout(noisy, level, layout)) / nodes / 1e6,
         "shape GFLOP per object and step": flops(lambda: model.shape(codes, level, shape)) / nodes / 1e9,
-        "decode GFLOP per object": flops(lambda: model.autoencoder.decode(codes[:1])) / 1e9,
-        "million parameters": sum(p.numel() for part in PARTS for p in getattr(model, part).parameters()) / 1e6,
+        "decode GFLOP per object": flops(lambda: model.autoencoder.decode(cells)) / 1e9,
+        "million parameters": sum(t.numel() for t in model.state_dict().values()) / 1e6,
         "room of 8 with shapes, TFLOP": flops(whole_room) / 1e12,
     }
 

@@ -77,7 +77,8 @@ class ShapeConfig:
         width: channels of a token.
         layers: transformer blocks.
         heads: attention heads.
-        patch: side, in latent cells, of the patch that makes one token.
+        components: principal components of whole latents that the denoiser works in.
+        tokens: tokens that share the components, the strongest first.
         echo_width: channels of a node in the shape echo.
         echo_layers: triplet-GCN layers of the shape echo.
         echo: exchange information between the objects at every step (Table 4: off = no shape echo).
@@ -87,9 +88,10 @@ class ShapeConfig:
     """
 
     width: int = 256
-    layers: int = 6
+    layers: int = 4
     heads: int = 4
-    patch: int = 4
+    components: int = 256
+    tokens: int = 8
     echo_width: int = 128
     echo_layers: int = 2
     echo: bool = True

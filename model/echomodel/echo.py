@@ -172,7 +172,7 @@ class EchoModel:
             boxes: N boxes, whose sizes the shapes will fill.
             known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
                 back unchanged.
-            noise: (N, C, G, G, G) starting noise in place of the generator's.
+            noise: (N, K) starting noise in place of the generator's.
             generator, steps, sampler, edit, progress: as for `sample_layout`.
 
         Returns:
@@ -188,17 +188,17 @@ class EchoModel:
         boxes = boxes.to(self.device)
         boxes.check()
         known, known_mask = self._known(graph, known, known_mask)
-        given = None if known is None else coder.encode(known)
+        given = None if known is None else self.model.shape.codes(coder.encode(known))
         pairs, latent = pairs_of(graph, self.config.predicates), self.graph_latent(graph, edit)
         predict = shape_predictor(self.model, graph, boxes.size, pairs, latent)
-        x = self._noise((graph.num_nodes, coder.channels, *[coder.cells] * 3), generator, noise)
+        x = self._noise((graph.num_nodes, settings.components), generator, noise)
         if noise is None:
             x = x[equal_furniture(graph)]
         codes = sample(
             sampler or settings.sampler, predict, x, steps or settings.steps, settings.objective,
             known=given, known_mask=known_mask, generator=generator, progress=progress,
         )  # fmt: skip
-        grids = torch.cat([coder.decode(part) for part in codes.split(4)])
+        grids = torch.cat([coder.decode(self.model.shape.latents(part)) for part in codes.split(4)])
         if known is None or known_mask is None:
             return grids
         return torch.where(known_mask[:, None, None, None], known, grids)

@@ -16,7 +16,7 @@ SIZES = {
     "latent": {"width": 16},
     "layout": {"width": 32, "layers": 2, "steps": 3},
     "autoencoder": {"width": 8},
-    "shape": {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "steps": 2},
+    "shape": {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "steps": 2, "components": 8, "tokens": 2},
 }
 
 
@@ -28,6 +28,7 @@ def model() -> EchoModel:
         if not parameter.any():
             torch.nn.init.normal_(parameter, std=0.1)
     net.autoencoder.initialise(torch.rand(4, 16, 16, 16) * 2 - 1)
+    net.shape.initialise(torch.randn(12, 6, 16, 16, 16), torch.Generator().manual_seed(0))
     return EchoModel(net)
 
 

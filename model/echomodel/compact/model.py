@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import torch
@@ -20,6 +21,7 @@ from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig, from_dict, to_json
 from echomodel.vocabulary import vocabulary
 
+_SHARED = ("categories", "predicates", "room_types", "rules")
 FORMAT = "echousd-compact-1"
 _MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser}
 PARTS = tuple(_MADE)
@@ -96,8 +98,7 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
             raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
         metadata[path] = header
     first = next(iter(metadata))
-    _agree(metadata, first)
-    config = _config(metadata[first])
+    config = _joined_config(metadata)
     parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
     # only a file with the layout branch knows the boxes
     own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
@@ -106,17 +107,22 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
     return model.to(device).eval(), digest.hexdigest()[:12]
 
 
-def _agree(metadata: dict[Path, dict[str, str]], first: Path) -> None:
-    words = json.dumps(_words())
+def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
+    """Each part's settings from the file that holds the part; what all parts share must be equal."""
+    words, joined, first = json.dumps(_words()), None, None
     for path, header in metadata.items():
-        if _config(header) != _config(metadata[first]):
-            raise WeightsError(f"{path}: config differs from that of {first}, they are not one model")
         if header.get("vocabulary") != words:
             raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
-
-
-def _config(header: dict[str, str]) -> CompactConfig:
-    return from_dict(CompactConfig, json.loads(header["config"]))
+        raw, parts = json.loads(header["config"]), json.loads(header["parts"])
+        own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
+        if joined is None:
+            joined, first = own, path
+        for shared in _SHARED:
+            if getattr(own, shared) != getattr(joined, shared):
+                raise WeightsError(f"{path}: {shared} differs from that of {first}, they are not one model")
+        joined = replace(joined, **{part: getattr(own, part) for part in parts})
+    assert joined is not None
+    return joined
 
 
 def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:

@@ -22,7 +22,7 @@ def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, laten
 
 
 def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> Predict:
-    """Clean latents (N, C, G, G, G) in noisy ones; arguments as for `ShapeDenoiser.context`."""
+    """Clean codes (N, K) in noisy ones; arguments as for `ShapeDenoiser.context`."""
     context = model.shape.context(graph, size, pairs, latent)
     settings = model.config.shape
 

@@ -1,4 +1,4 @@
-"""Shape denoiser: a small transformer per object on latent patches, joined by an echo at every step (EchoScene 3.4)."""
+"""Shape denoiser: a small transformer per object on principal components, joined by an echo (EchoScene 3.4)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from echomodel.compact.autoencoder import GRID, from_patches, to_patches
+from echomodel.compact.autoencoder import GRID
 from echomodel.compact.echo import EchoLayer, level_features
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
-
-POOL = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,27 +24,36 @@ class ShapeContext:
 
 
 class ShapeDenoiser(nn.Module):
-    """Predicts the objective's target, or the clean latent, of every object; each has its own level, 0 = known.
+    """Predicts the objective's target, or the clean codes, of every object; each has its own level, 0 = known.
+
+    A code holds the K principal components of a latent grid over the whole training set. Furniture on the
+    box-normalised grid lies close to so few directions that noise in all others would only have to be learnt away.
 
     Shapes:
-        latents (N, C, G, G, G), level (N,) in [0, 1], `ShapeContext` -> (N, C, G, G, G)
+        codes (N, K), level (N,) in [0, 1], `ShapeContext` -> (N, K)
     """
 
     def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         shape, width, channels = config.shape, config.shape.width, config.autoencoder.channels
+        if shape.components % shape.tokens:
+            raise ValueError(f"shape.components {shape.components} is no multiple of shape.tokens {shape.tokens}")
         self.settings = shape
         cells = GRID // config.autoencoder.patch
-        tokens, values = (cells // shape.patch) ** 3, channels * shape.patch**3
+        self.grid = (channels, cells, cells, cells)
+        self.register_buffer("mean", torch.zeros(channels * cells**3))
+        self.register_buffer("basis", torch.zeros(shape.components, channels * cells**3))
+        self.register_buffer("scale", torch.ones(shape.components))
+        values = shape.components // shape.tokens
         self.category = nn.Embedding(config.categories, width)
         self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
         self.latent = nn.Linear(config.latent.width, width)
         self.level = nn.Sequential(nn.Linear(64, width), nn.SiLU(), nn.Linear(width, width))
-        self.token = nn.Linear(values, width)
-        self.place = nn.Parameter(torch.randn(tokens, width) * 0.02)
+        self.token = nn.Parameter(torch.randn(shape.tokens, values, width) * values**-0.5)
+        self.place = nn.Parameter(torch.randn(shape.tokens, width) * 0.02)
         echo = shape.echo_width
         self.echo_node = nn.Linear(width, echo)
-        self.echo_code = nn.Linear(channels * POOL**3, echo)
+        self.echo_code = nn.Linear(shape.components, echo)
         self.echo_level = nn.Linear(64, echo) if shape.echo_time else None
         self.echo_layers = nn.ModuleList(EchoLayer(echo, config.predicates) for _ in range(shape.echo_layers))
         self.echo_out = nn.Sequential(nn.LayerNorm(echo), nn.Linear(echo, width))
@@ -56,11 +63,49 @@ class ShapeDenoiser(nn.Module):
         )
         self.norm = nn.LayerNorm(width, elementwise_affine=False)
         self.scale_shift = nn.Linear(width, 2 * width)
-        self.head = nn.Linear(width, values)
+        self.head = nn.Parameter(torch.zeros(shape.tokens, width, values))
         nn.init.normal_(self.category.weight, std=0.3)
-        for layer in (self.scale_shift, self.head):
-            nn.init.zeros_(layer.weight)
-            nn.init.zeros_(layer.bias)
+        nn.init.zeros_(self.scale_shift.weight)
+        nn.init.zeros_(self.scale_shift.bias)
+
+    mean: Tensor
+    basis: Tensor
+    scale: Tensor
+
+    @torch.no_grad()
+    def initialise(self, latents: Tensor, generator: torch.Generator) -> None:
+        """Fit the principal components of latents (M, C, G, G, G) by a randomised range finder (Halko et al. 2011).
+
+        Codes keep the square root of each component's spread, so that weak ones are not drowned by the noise at once;
+        their mean power is one. Fewer shapes than components leave the last ones empty.
+        """
+        rows = latents.flatten(1).float()
+        mean = rows.mean(0)
+        rows = rows - mean
+        count = min(len(self.basis), len(rows), rows.shape[1])
+        wide = min(count + 60, len(rows))
+        sketch = rows @ torch.randn(rows.shape[1], wide, generator=generator)
+        for _ in range(2):
+            left = torch.linalg.qr(sketch)[0]
+            sketch = rows @ torch.linalg.qr((left.T @ rows).T)[0]
+        left = torch.linalg.qr(sketch)[0]
+        _, values, directions = torch.linalg.svd(left.T @ rows, full_matrices=False)
+        spread = (values[:count] / len(rows) ** 0.5).clamp_min(1e-4)
+        scale = spread.sqrt()
+        scale = scale * (spread / scale).square().mean().sqrt()
+        self.mean.copy_(mean)
+        self.basis.zero_()
+        self.basis[:count] = directions[:count]
+        self.scale.fill_(1.0)
+        self.scale[:count] = scale
+
+    def codes(self, latents: Tensor) -> Tensor:
+        """Codes of latent grids: (N, C, G, G, G) -> (N, K)."""
+        return (latents.flatten(1) - self.mean) @ self.basis.T / self.scale
+
+    def latents(self, codes: Tensor) -> Tensor:
+        """Latent grids of codes: (N, K) -> (N, C, G, G, G)."""
+        return (self.mean + (codes * self.scale) @ self.basis).reshape(-1, *self.grid)
 
     def context(self, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> ShapeContext:
         """Everything that does not depend on the step.
@@ -75,29 +120,21 @@ class ShapeDenoiser(nn.Module):
         return ShapeContext(nodes, self.echo_node(nodes), pairs)
 
     def forward(self, x: Tensor, level: Tensor, context: ShapeContext) -> Tensor:
-        n, channels, cells = x.shape[0], x.shape[1], x.shape[2]
-        patch = self.settings.patch
         sinusoids = level_features(level)
         condition = nn.functional.silu(context.nodes + self.level(sinusoids))
         heard = self._echo(x, sinusoids, context) if self.settings.echo else torch.zeros_like(context.nodes)
-        cut = to_patches(x.reshape(n * channels, cells, cells, cells), patch)
-        tokens = cut.reshape(n, channels * patch**3, -1).transpose(1, 2)
-        h = self.token(tokens) + self.place
+        h = torch.einsum("ntv,tvw->ntw", x.reshape(len(x), self.settings.tokens, -1), self.token) + self.place
         if self.concat is not None:
             h = self.concat(torch.cat([h, heard[:, None].expand_as(h)], dim=2))
         told = torch.stack([heard, context.nodes, condition], dim=1)
         for block in self.blocks:
             h = block(h, condition, told)
         scale, shift = self.scale_shift(condition)[:, None].chunk(2, dim=2)
-        out = self.head(self.norm(h) * (1 + scale) + shift)
-        side = cells // patch
-        out = out.transpose(1, 2).reshape(n * channels, patch**3, side, side, side)
-        return from_patches(out, patch).reshape(x.shape)
+        return torch.einsum("ntw,twv->ntv", self.norm(h) * (1 + scale) + shift, self.head).flatten(1)
 
     def _echo(self, x: Tensor, sinusoids: Tensor, context: ShapeContext) -> Tensor:
         """What each object hears of the others' current shapes: (N, width)."""
-        code = nn.functional.adaptive_avg_pool3d(x, POOL).flatten(1)
-        nodes = context.echo_nodes + self.echo_code(code)
+        nodes = context.echo_nodes + self.echo_code(x)
         if self.echo_level is not None:
             nodes = nodes + self.echo_level(sinusoids)
         for layer in self.echo_layers:

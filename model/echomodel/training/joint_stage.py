@@ -32,7 +32,7 @@ class JointStage:
         layout, parts = layout_loss(model, batch, edited_latent(model, batch), generator, self.layout.relation_weight)
         few = draw_batch(self.layout.rooms, self.shape.batch, generator)
         objects = room_shapes(few, self.shape.shapes)
-        clean = self.shape.shapes.latents[objects.shape].float()
+        clean = self.shape.codes(model)[objects.shape]
         sizes = self.shape.shapes.sizes[objects.shape]
         shape, more = shape_loss(model, objects, clean, sizes, generator, edited_latent(model, few))
         return layout + shape, {**parts, **more}

@@ -49,11 +49,11 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
             getattr(model, part).load_state_dict(getattr(given, part).state_dict())
         if "layout" in given.parts:
             model.statistics = given.statistics
-    stage = _stage(recipe, model, started)
+    stage = _stage(recipe, model, started, resume)
     return Trainer(recipe, model, stage, folder, resume=resume, report=report)
 
 
-def _stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> TrainingStage:
+def _stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...], resume: bool) -> TrainingStage:
     if recipe.stage == "layout":
         return _layout_stage(recipe, model, started)
     shapes = ShapeSet(_folder(recipe, "shapes"))
@@ -66,11 +66,12 @@ def _stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> Tra
     missing = [part for part in needed if part not in started]
     if missing:
         raise ValueError(f"recipe field 'start': stage {recipe.stage!r} needs weights with {' and '.join(missing)}")
-    coded = encoded_set(model.autoencoder, shapes)
-    if recipe.stage == "joint":
-        layout = _layout_stage(recipe, model, started)
-        return JointStage(layout, ShapeStage(layout.rooms, coded, recipe.shapes_per_batch))
-    return ShapeStage(_rooms(recipe, model, held=False), coded, recipe.shapes_per_batch)
+    layout = _layout_stage(recipe, model, started) if recipe.stage == "joint" else None
+    rooms = _rooms(recipe, model, held=False) if layout is None else layout.rooms
+    shape = ShapeStage(rooms, encoded_set(model.autoencoder, shapes), recipe.shapes_per_batch)
+    if "shape" not in started and not resume:
+        shape.initialise(model, torch.Generator().manual_seed(recipe.seed))
+    return shape if layout is None else JointStage(layout, shape)
 
 
 def _layout_stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> LayoutStage:

@@ -1,4 +1,4 @@
-"""The shape stage: denoising latents of all objects of a scene, joined by their echoes (EchoScene 3.4)."""
+"""The shape stage: denoising codes of all objects of a scene, joined by their echoes (EchoScene 3.4)."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def shape_loss(
     generator: torch.Generator,
     graph_latent: Tensor | None = None,
 ) -> tuple[Tensor, dict[str, Tensor]]:
-    """Denoising loss of the unknown objects' latents.
+    """Denoising loss of the unknown objects' codes.
 
     Arguments:
-        clean: (N, C, G, G, G) float32 latents.
+        clean: (N, K) float32 codes.
         size: (N, 3) float32, metres.
         graph_latent: (N, latent width) shared with the layout branch, None = encode the graph here.
     """
@@ -75,8 +75,8 @@ def shape_loss(
 
 
 def shifted(level: Tensor) -> Tensor:
-    """Uniform levels moved towards noise: neighbouring cells say much of each other, so little noise hides little."""
-    normal = 0.6 + math.sqrt(2) * 1.1 * torch.erfinv((2 * level - 1).clamp(-0.9999, 0.9999))
+    """Uniform levels moved towards the middle, where there is most to learn (Esser et al. 2024)."""
+    normal = 0.2 + math.sqrt(2) * 1.2 * torch.erfinv((2 * level - 1).clamp(-0.9999, 0.9999))
     return torch.sigmoid(normal).clamp(0.02, 1.0)
 
 
@@ -129,6 +129,19 @@ class ShapeStage:
 
     def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, batch: int) -> None:
         self.rooms, self.shapes, self.batch = rooms, shapes, batch
+        self._codes: Tensor | None = None
+
+    def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
+        """Fit the denoiser's components to the styles that are trained on."""
+        used = self.shapes.styles[:, None] * self.shapes.categories + torch.arange(self.shapes.categories)
+        model.shape.initialise(self.shapes.latents[used.flatten()], generator)
+
+    @torch.no_grad()
+    def codes(self, model: CompactModel) -> Tensor:
+        """(M, K) codes of the whole set, computed at first use, when a resumed run has its components back."""
+        if self._codes is None:
+            self._codes = torch.cat([model.shape.codes(part.float()) for part in self.shapes.latents.split(256)])
+        return self._codes
 
     def draw(self, generator: torch.Generator) -> ShapeBatch:
         """Rooms on even draws, suites on odd ones."""
@@ -139,7 +152,7 @@ class ShapeStage:
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
         batch = self.draw(generator)
-        clean = self.shapes.latents[batch.shape].float()
+        clean = self.codes(model)[batch.shape]
         return shape_loss(model, batch, clean, self.shapes.sizes[batch.shape], generator)
 
     @torch.no_grad()
@@ -149,7 +162,7 @@ class ShapeStage:
         losses = []
         for _ in range(4):
             batch = draw_suites(8, self.shapes.held, generator)
-            clean, size = self.shapes.latents[batch.shape].float(), self.shapes.sizes[batch.shape]
+            clean, size = self.codes(model)[batch.shape], self.shapes.sizes[batch.shape]
             losses.append(shape_loss(model, batch, clean, size, generator)[0])
         return {"held/shape": float(torch.stack(losses).mean())}
 

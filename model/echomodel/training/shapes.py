@@ -44,7 +44,8 @@ def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet, batch: int = 16) -> 
     if bool(held.all()) or not bool(held.any()):
         held = torch.arange(len(held)) == len(held) - 1  # a tiny set: its last style is kept out
     sizes = torch.from_numpy(np.asarray(shapes.size, np.float32))
-    return EncodedShapes(torch.cat(out), sizes, categories, (~held).nonzero()[:, 0], held.nonzero()[:, 0])
+    used, kept = (~held).nonzero()[:, 0], held.nonzero()[:, 0]
+    return EncodedShapes(torch.cat(out), sizes, categories, used, kept)
 
 
 def read(shapes: ShapeSet, numbers: np.ndarray) -> Tensor:

@@ -14,7 +14,7 @@ from echomodel.config import CompactConfig, from_dict
 from echomodel.graph import GraphBatch
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
-SHAPE = {"width": 16, "layers": 1, "heads": 2, "echo_width": 16}
+SHAPE = {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "components": 24, "tokens": 3}
 
 
 def small_model(**shape: object) -> CompactModel:
@@ -76,9 +76,26 @@ def test_quantised_latents_take_few_values() -> None:
     assert free.grad.abs().min() > 0
 
 
+def test_codes_are_the_principal_components_of_latents() -> None:
+    """Latents that vary in few directions come back exactly; codes have unit power and fall in spread."""
+    model = small_model()
+    g = torch.Generator().manual_seed(0)
+    directions = torch.randn(5, 6 * 16**3, generator=g)
+    mixed = torch.randn(40, 5, generator=g) * torch.tensor([9.0, 4.0, 2.0, 1.0, 0.5])
+    latents = (mixed @ directions / 50 + 0.3).reshape(40, 6, 16, 16, 16)
+    model.shape.initialise(latents, g)
+    codes = model.shape.codes(latents)
+    torch.testing.assert_close(model.shape.latents(codes), latents, rtol=1e-3, atol=1e-3)
+    spread = codes.std(0)
+    assert bool((spread[:4] > spread[1:5]).all())
+    assert spread[5:].max() < 0.05 * spread[0]
+    basis = model.shape.basis[:5]
+    torch.testing.assert_close(basis @ basis.T, torch.eye(5), rtol=0, atol=1e-3)
+
+
 def test_objects_hear_of_each_other_only_with_echoes() -> None:
     graph = GraphBatch.single([4, 4, 8], [[0, 13, 1]])
-    x = torch.randn(3, 6, 16, 16, 16)
+    x = torch.randn(3, 24)
     other = x.clone()
     other[1] += 1.0
     for echo, heard in ((True, True), (False, False)):
@@ -89,7 +106,7 @@ def test_objects_hear_of_each_other_only_with_echoes() -> None:
 
 
 def test_time_reaches_the_echo_unless_switched_off() -> None:
-    graph, x = GraphBatch.single([4, 8], [[0, 13, 1]]), torch.randn(2, 6, 16, 16, 16)
+    graph, x = GraphBatch.single([4, 8], [[0, 13, 1]]), torch.randn(2, 24)
     for echo_time, heard in ((True, True), (False, False)):
         with torch.no_grad():
             model = small_model(echo_time=echo_time)
@@ -102,14 +119,14 @@ def test_concatenation_in_place_of_cross_attention() -> None:
     assert concat.shape.concat is not None
     assert not [key for key, _ in concat.shape.named_parameters() if "cross_" in key]
     assert cross.shape.concat is None
-    graph, x = GraphBatch.single([4, 8]), torch.randn(2, 6, 16, 16, 16)
+    graph, x = GraphBatch.single([4, 8]), torch.randn(2, 24)
     assert torch.isfinite(denoise(concat, x, torch.ones(2), graph)).all()
 
 
 def test_a_batch_is_its_single_runs() -> None:
     model = small_model()
     graphs = [GraphBatch.single([4, 8, 9], [[0, 13, 1], [1, 8, 2]]), GraphBatch.single([3]), GraphBatch.single([1, 1])]
-    x, level = torch.randn(6, 6, 16, 16, 16), torch.rand(6)
+    x, level = torch.randn(6, 24), torch.rand(6)
     with torch.no_grad():
         together = denoise(model, x, level, GraphBatch.pack(graphs))
         start = 0
@@ -122,7 +139,7 @@ def test_a_batch_is_its_single_runs() -> None:
 
 def test_gradients_reach_the_latent_graph() -> None:
     model, graph = small_model(), GraphBatch.single([4, 8, 9], [[0, 13, 1]])
-    denoise(model, torch.randn(3, 6, 16, 16, 16), torch.ones(3), graph).square().sum().backward()
+    denoise(model, torch.randn(3, 24), torch.ones(3), graph).square().sum().backward()
     assert all(
         parameter.grad is not None and parameter.grad.abs().sum() > 0
         for name, parameter in model.latent.named_parameters()
