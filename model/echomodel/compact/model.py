@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,6 +116,10 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
             raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
+        for other in set(PARTS) - set(parts):
+            # settings of a part that lies in another file; an older version's may hold fields that are gone
+            with suppress(ValueError):
+                own = replace(own, **{other: getattr(from_dict(CompactConfig, {other: raw[other]}), other)})
         if joined is None:
             joined, first = own, path
         for shared in _SHARED:
