@@ -80,7 +80,8 @@ def evaluate_layout(
     Returns:
         `rooms` scored, `settings`, `generation` (and `change`, `add`): shares of relations kept per predicate and
         group, for edits also of the triplets that touch an edited node and of the others; `sizes`: rows per class and
-        axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the form of `room_statistics.json`.
+        axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the form of
+        `room_statistics.json`.
     """
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     if not rooms:

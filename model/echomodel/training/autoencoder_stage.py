@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from echomodel.compact.model import CompactModel
+from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
 from echomodel.training.shapes import draw_grids, read
 
@@ -25,12 +26,15 @@ class AutoencoderStage:
     Arguments:
         shapes: shape set; its held-out part is for validation.
         batch: grids per batch, per process.
+        components: a shape branch whose principal components the decoder also learns to read: half of each batch is
+            whole latents projected on them, which is all that a denoiser working in them can say. The decoder puts
+            back what the projection blurs (thin legs, edges).
     """
 
     trained = saved = ("autoencoder",)
 
-    def __init__(self, shapes: ShapeSet, batch: int) -> None:
-        self.shapes, self.batch = shapes, batch
+    def __init__(self, shapes: ShapeSet, batch: int, components: ShapeDenoiser | None = None) -> None:
+        self.shapes, self.batch, self.components = shapes, batch, components
         self.used, self.held = (~shapes.held_out).nonzero()[0], shapes.held_out.nonzero()[0]
         if not len(self.held):
             self.held = self.used
@@ -45,7 +49,22 @@ class AutoencoderStage:
         latent = model.autoencoder.encode(grids)
         noise = NOISE * torch.randn(latent.shape, generator=generator)
         error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
-        return error, {"reconstruction": error}
+        if self.components is None:
+            return error, {"reconstruction": error}
+        picked = torch.randint(len(self.used), (max(self.batch // 2, 1),), generator=generator)
+        whole = read(self.shapes, self.used[picked.numpy()])
+        blurred = self.projected(model.autoencoder.encode(whole), generator)
+        projected = reconstruction_loss(whole, model.autoencoder.decode(blurred).float())
+        return error + projected, {"reconstruction": error, "projected": projected}
+
+    @torch.no_grad()
+    def projected(self, latent: Tensor, generator: torch.Generator | None = None) -> Tensor:
+        """Whole latents (N, C, G, G, G) as far as the components carry them, with the noise of a denoiser's errors."""
+        assert self.components is not None
+        codes = self.components.codes(latent.float())
+        if generator is not None:
+            codes = codes + NOISE * torch.randn(codes.shape, generator=generator)
+        return self.components.latents(codes)
 
     @torch.no_grad()
     def validate(self, model: CompactModel, count: int = 46) -> dict[str, float]:
@@ -54,14 +73,19 @@ class AutoencoderStage:
         errors: list[Tensor] = []
         unions: list[float] = []
         scores: list[float] = []
+        through: list[float] = []
         for start in range(0, len(picked), 8):
             grids = read(self.shapes, picked[start : start + 8])
             rebuilt = model.autoencoder(grids)
             errors.append((grids - rebuilt).abs().mean())
             unions.extend(overlap(grids, rebuilt).tolist())
             scores.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
+            if self.components is not None:
+                rebuilt = model.autoencoder.decode(self.projected(model.autoencoder.encode(grids)))
+                through.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
         l1 = float(torch.stack(errors).mean())
-        return {"held/l1": l1, "held/iou": float(np.mean(unions)), "held/fscore": float(np.mean(scores))}
+        found = {"held/l1": l1, "held/iou": float(np.mean(unions)), "held/fscore": float(np.mean(scores))}
+        return found | {"held/fscore_projected": float(np.mean(through))} if through else found
 
 
 def overlap(a: Tensor, b: Tensor) -> Tensor:

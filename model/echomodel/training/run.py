@@ -9,6 +9,7 @@ import torch
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import PARTS, CompactModel, load_weights
+from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.training.autoencoder_stage import AutoencoderStage
@@ -42,23 +43,27 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     torch.manual_seed(recipe.seed)
     model = CompactModel(recipe.model, _NO_BOXES, _PARTS[recipe.stage])
     started: tuple[str, ...] = ()
+    components = None
     for path in recipe.start:
         given, _ = load_weights([Path(path)])
         started += given.parts
+        components = given.shape if "shape" in given.parts else components
         for part in set(given.parts) & set(model.parts):
             getattr(model, part).load_state_dict(getattr(given, part).state_dict())
         if "layout" in given.parts:
             model.statistics = given.statistics
-    stage = _stage(recipe, model, started, resume)
+    stage = _stage(recipe, model, started, resume, components)
     return Trainer(recipe, model, stage, folder, resume=resume, report=report)
 
 
-def _stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...], resume: bool) -> TrainingStage:
+def _stage(
+    recipe: Recipe, model: CompactModel, started: tuple[str, ...], resume: bool, components: ShapeDenoiser | None
+) -> TrainingStage:
     if recipe.stage == "layout":
         return _layout_stage(recipe, model, started)
     shapes = ShapeSet(_folder(recipe, "shapes"))
     if recipe.stage == "vqvae":
-        stage = AutoencoderStage(shapes, recipe.shapes_per_batch)
+        stage = AutoencoderStage(shapes, recipe.shapes_per_batch, components)
         if "autoencoder" not in started:
             stage.initialise(model, torch.Generator().manual_seed(recipe.seed))
         return stage
