@@ -103,6 +103,14 @@ def test_smoke_recipe_trains_everything(data: Path, tmp_path: Path) -> None:
         assert (tmp_path / stage / "curves.png").stat().st_size > 5000
         if stage != "joint":  # starts from trained parts
             assert np.mean(losses[-2:]) < 0.97 * losses[0], stage
+    names = ",".join(f'"{weights[stage]}"' for stage in ("vqvae", "shape"))  # the decoder, on what the denoiser can say
+    decoder = open_run(smoke("vqvae", data, f"start=[{names}]", "steps=6", "validate_every=6"), tmp_path / "decoder")
+    basis = decoder.model.autoencoder.basis.clone()
+    decoder.run()
+    logged = {name: value for _, name, value in read_log(tmp_path / "decoder" / "log.csv")}
+    assert 0 < logged["held/fscore_projected"] <= 1
+    assert logged["loss"] == pytest.approx(logged["reconstruction"] + logged["projected"], rel=1e-3)
+    assert torch.equal(decoder.model.autoencoder.basis, basis)
     model = EchoModel(*load_weights([Path(weights["vqvae"]), Path(weights["joint"])]))
     graph = GraphBatch.single([14, 23], [[1, 5, 0]], floor=(4.0, 3.0))
     boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(0), steps=3)
