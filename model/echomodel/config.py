@@ -84,6 +84,7 @@ class ShapeConfig:
         echo: exchange information between the objects at every step (Table 4: off = no shape echo).
         echo_time: give the echo the noise level (Table 4: off = no time embedding).
         conditioning: how the echo reaches the tokens, `cross` attention or `concat` (Table 4).
+        temperature: scale of the starting noise; below one, fewer stray pieces and less variety.
         objective, steps, sampler: as in `LayoutConfig`.
     """
 
@@ -99,6 +100,7 @@ class ShapeConfig:
     conditioning: Literal["cross", "concat"] = "cross"
     objective: Objective = "flow"
     prediction: Prediction = "sample"
+    temperature: float = 0.75
     steps: int = 25
     sampler: Sampler = "euler"
 

@@ -172,7 +172,7 @@ class EchoModel:
             boxes: N boxes, whose sizes the shapes will fill.
             known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
                 back unchanged.
-            noise: (N, K) starting noise in place of the generator's.
+            noise: (N, K) starting noise in place of the generator's, taken as it is (without the temperature).
             generator, steps, sampler, edit, progress: as for `sample_layout`.
 
         Returns:
@@ -193,7 +193,7 @@ class EchoModel:
         predict = shape_predictor(self.model, graph, boxes.size, pairs, latent)
         x = self._noise((graph.num_nodes, settings.components), generator, noise)
         if noise is None:
-            x = x[equal_furniture(graph)]
+            x = settings.temperature * x[equal_furniture(graph)]
         codes = sample(
             sampler or settings.sampler, predict, x, steps or settings.steps, settings.objective,
             known=given, known_mask=known_mask, generator=generator, progress=progress,
