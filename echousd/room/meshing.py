@@ -11,7 +11,7 @@ from scipy import ndimage, sparse
 
 from echomodel.data.tsdf import mesh_from_tsdf
 
-SMALLEST = 0.02  # solids below this share of the largest one are noise
+SMALLEST = 0.004  # solids below this share of the largest one are noise
 PASS_BAND, SHRINK, SWELL = 6, 0.5, -0.53  # Taubin (1995): rounds, lambda, mu; low frequencies such as thin legs stay
 FACES = 5000
 NOISY = 200_000  # faces of a raw mesh that is noise more than shape: one try is enough

@@ -85,6 +85,7 @@ class ShapeConfig:
         echo_time: give the echo the noise level (Table 4: off = no time embedding).
         conditioning: how the echo reaches the tokens, `cross` attention or `concat` (Table 4).
         temperature: scale of the starting noise; below one, fewer stray pieces and less variety.
+        candidates: draws per object, of which the most whole is kept.
         objective, steps, sampler: as in `LayoutConfig`.
     """
 
@@ -101,6 +102,7 @@ class ShapeConfig:
     objective: Objective = "flow"
     prediction: Prediction = "sample"
     temperature: float = 0.75
+    candidates: int = 8
     steps: int = 25
     sampler: Sampler = "euler"
 

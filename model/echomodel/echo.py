@@ -15,6 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor, shape_predictor
+from echomodel.compact.wholeness import group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
@@ -163,6 +164,7 @@ class EchoModel:
         known_mask: Tensor | None = None,
         edit: GraphEdit | None = None,
         noise: Tensor | None = None,
+        candidates: int | None = None,
         progress: Progress | None = None,
     ) -> Tensor:
         """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style start from equal noise.
@@ -172,7 +174,8 @@ class EchoModel:
             boxes: N boxes, whose sizes the shapes will fill.
             known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
                 back unchanged.
-            noise: (N, K) starting noise in place of the generator's, taken as it is (without the temperature).
+            noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
+            candidates: draws per object, of which the most whole is kept (pieces of one class and style together).
             generator, steps, sampler, edit, progress: as for `sample_layout`.
 
         Returns:
@@ -191,14 +194,24 @@ class EchoModel:
         given = None if known is None else self.model.shape.codes(coder.encode(known))
         pairs, latent = pairs_of(graph, self.config.predicates), self.graph_latent(graph, edit)
         predict = shape_predictor(self.model, graph, boxes.size, pairs, latent)
-        x = self._noise((graph.num_nodes, settings.components), generator, noise)
-        if noise is None:
-            x = settings.temperature * x[equal_furniture(graph)]
-        codes = sample(
-            sampler or settings.sampler, predict, x, steps or settings.steps, settings.objective,
-            known=given, known_mask=known_mask, generator=generator, progress=progress,
-        )  # fmt: skip
-        grids = torch.cat([coder.decode(self.model.shape.latents(part)) for part in codes.split(4)])
+        equal, steps = equal_furniture(graph), steps or settings.steps
+        tries = 1 if noise is not None else candidates or settings.candidates
+        grids, best = torch.empty(0), torch.empty(0)
+        for attempt in range(tries):
+            x = self._noise((graph.num_nodes, settings.components), generator, noise)
+            if noise is None:
+                x = settings.temperature * x[equal]
+            codes = sample(
+                sampler or settings.sampler, predict, x, steps, settings.objective, known=given,
+                known_mask=known_mask, generator=generator, progress=_part_of(progress, attempt, tries),
+            )  # fmt: skip
+            drawn = torch.cat([coder.decode(self.model.shape.latents(part)) for part in codes.split(4)])
+            whole = group_means(wholeness(drawn), equal) if tries > 1 else best
+            if attempt == 0:
+                grids, best = drawn, whole
+                continue
+            better = whole > best
+            grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
         if known is None or known_mask is None:
             return grids
         return torch.where(known_mask[:, None, None, None], known, grids)
@@ -273,3 +286,10 @@ def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
         touched[subject] = True
         touched[target] = True
     return touched
+
+
+def _part_of(progress: Progress | None, attempt: int, tries: int) -> Progress | None:
+    """Progress of one of several draws as progress of all."""
+    if progress is None:
+        return None
+    return lambda done, steps: progress(attempt * steps + done, tries * steps)
