@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,9 @@ def test_older_openusd_reads_the_same_room(client: str, rooms: list[Path]) -> No
 def test_nvidia_validator_reports_no_failures(rooms: list[Path]) -> None:
     command = python_of("nvidia").with_name("nvidia_usd_validate")
     for room in rooms:
-        said = run(command, room)
-        assert "No issues found" in said or ("Failure" not in said and "Error" not in said), said
+        said = run(command, room, accepted=(0, 1))  # 1 with warnings too
+        counts = [int(number) for number in re.findall(r"(?:Failures|Errors): (\d+)", said)]
+        assert "No issues found" in said or (counts and not any(counts)), said
 
 
 def test_blender_imports_names_places_uvs_and_materials(rooms: list[Path]) -> None:
@@ -74,10 +76,15 @@ def test_blender_imports_names_places_uvs_and_materials(rooms: list[Path]) -> No
         stage = Usd.Stage.Open(str(room))
         wanted = visible_meshes(stage)
         assert len(meshes) == sum(map(len, wanted.values()))
-        for name, (low, high) in bounds(room).items():
+        placed = UsdGeom.XformCache()
+        for name in bounds(room):
+            (mesh,) = wanted[name]
+            # Exact corners: the bounds of a turned object's local box are wider than the object.
+            turn = np.array(placed.GetLocalToWorldTransform(mesh.GetPrim()))
+            points = np.array(mesh.GetPointsAttr().Get(), float) @ turn[:3, :3] + turn[3, :3]
+            low, high = points.min(0), points.max(0)
             # Y up in USD is Z up in Blender: (x, y, z) -> (x, -z, y).
             lower, upper = (low[0], -high[2], low[1]), (high[0], -low[2], high[1])
-            (mesh,) = wanted[name]
             same = [
                 thing
                 for thing in meshes
