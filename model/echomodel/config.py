@@ -93,7 +93,7 @@ class ShapeConfig:
     layers: int = 4
     heads: int = 4
     components: int = 256
-    tokens: int = 8
+    tokens: int = 4
     echo_width: int = 128
     echo_layers: int = 2
     echo: bool = True

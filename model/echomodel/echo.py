@@ -14,7 +14,7 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.predictors import layout_predictor, shape_predictor
+from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
 from echomodel.compact.wholeness import group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
@@ -167,7 +167,7 @@ class EchoModel:
         candidates: int | None = None,
         progress: Progress | None = None,
     ) -> Tensor:
-        """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style start from equal noise.
+        """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style become equal.
 
         Arguments:
             graph: S scenes, N nodes.
@@ -193,8 +193,8 @@ class EchoModel:
         known, known_mask = self._known(graph, known, known_mask)
         given = None if known is None else self.model.shape.codes(coder.encode(known))
         pairs, latent = pairs_of(graph, self.config.predicates), self.graph_latent(graph, edit)
-        predict = shape_predictor(self.model, graph, boxes.size, pairs, latent)
         equal, steps = equal_furniture(graph), steps or settings.steps
+        predict = agreeing(shape_predictor(self.model, graph, boxes.size, pairs, latent), equal)
         tries = 1 if noise is not None else candidates or settings.candidates
         grids, best = torch.empty(0), torch.empty(0)
         for attempt in range(tries):

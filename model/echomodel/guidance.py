@@ -48,7 +48,7 @@ def relation_guided(
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()
                 boxes = Boxes.decode(free, statistics)
-                missed = (SLACK - margins(boxes, wanted, rules=rules)).clamp(min=0)
+                missed = (SLACK - margins(boxes, wanted, rules=rules, rigid=True)).clamp(min=0)
                 if floor is not None:
                     missed = torch.cat([missed, outside(boxes, floor).flatten()])
                 # the logarithm bounds the pull of a relation that is missed by far
@@ -63,10 +63,10 @@ def relation_guided(
 def outside(boxes: Boxes, floor: Tensor) -> Tensor:
     """How far boxes reach beyond the floor's bounding box, whose centre is the origin: (N, 2) metres, 0 where unknown.
 
-    A box larger than the floor is asked to stand in the middle.
+    A box larger than the floor is asked to stand in the middle; none is asked to shrink.
     """
     sin, cos = boxes.yaw.sin().abs(), boxes.yaw.cos().abs()
-    width, depth = boxes.size[:, 0], boxes.size[:, 2]
+    width, depth = boxes.size[:, 0].detach(), boxes.size[:, 2].detach()
     reach = torch.stack([cos * width + sin * depth, sin * width + cos * depth], dim=1) / 2
     room = (floor / 2 - reach).clamp_min(0)
     beyond = (boxes.position[:, [0, 2]].abs() - room).clamp_min(0)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 import torch
+from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
+from echomodel.compact.predictors import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
 from echomodel.echo import EchoModel, GraphEdit, equal_furniture, touched_nodes
 from echomodel.graph import GraphBatch
@@ -89,6 +91,23 @@ def test_an_edit_changes_the_result(model: EchoModel) -> None:
 def test_equal_furniture_starts_from_equal_noise() -> None:
     graph = GraphBatch.single([12, 12, 12, 13, 12], [[0, 13, 1], [2, 15, 1], [3, 13, 0], [4, 5, 0]])
     assert equal_furniture(graph).tolist() == [0, 0, 0, 3, 4]
+
+
+def test_equal_furniture_gets_one_shape_that_a_known_piece_dictates(model: EchoModel) -> None:
+    graph = GraphBatch.single([12, 12, 12, 13], [[0, 13, 1], [3, 13, 0]])
+    boxes = Boxes(torch.rand(4, 3) + 0.3, torch.zeros(4, 3), torch.zeros(4))
+    grids = model.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(0), steps=2)
+    assert torch.equal(grids[0], grids[1])
+    assert not torch.equal(grids[0], grids[2])
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        return x
+
+    x = torch.tensor([[1.0], [3.0], [5.0], [9.0]])
+    agreed = agreeing(predict, torch.tensor([0, 0, 2, 2]))
+    torch.testing.assert_close(agreed(x, torch.ones(4)), torch.tensor([[2.0], [2.0], [7.0], [7.0]]))
+    told = agreed(x, torch.tensor([1.0, 0.0, 1.0, 1.0]))
+    torch.testing.assert_close(told[:2], torch.tensor([[3.0], [3.0]]), rtol=0, atol=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,13 @@ def test_broken_relations_become_kept() -> None:
     assert verdicts(guide(boxes, torch.full((2,), 0.1)), TRIPLETS).tolist() == [1, 1, 1, -1]
 
 
+def test_furniture_moves_aside_and_does_not_shrink() -> None:
+    boxes = start()
+    guided = guide(boxes, torch.full((2,), 0.1), TRIPLETS[:2], torch.full((2, 2), 1.2))
+    assert verdicts(guided, TRIPLETS[:2]).tolist() == [1, 1]
+    torch.testing.assert_close(guided.size, boxes.size)
+
+
 def test_known_boxes_stay() -> None:
     boxes = start()
     guided = guide(boxes, torch.tensor([0.1, 0.0]))

@@ -215,3 +215,24 @@ def test_errors_name_what_is_allowed():
         label_relations(room, drop=1.5)
     with pytest.raises(ValueError, match="needs rng"):
         label_relations(room, drop=0.5)
+
+
+@pytest.mark.parametrize("rules", ["strict", "sgfront"])
+def test_rigid_margins_pull_at_sizes_for_sizes_alone(rules):
+    boxes = random_boxes(6, 3)
+    triplets = all_triplets(6, sorted(measured(rules)))
+    whole, rigid = (margins(boxes, triplets, rules=rules, rigid=flag) for flag in (False, True))
+    assert torch.equal(whole, rigid)
+    boxes.size.requires_grad_()
+    boxes.position.requires_grad_()
+    of_size = torch.tensor([P[f"{word}_than"] for word in ("bigger", "smaller", "taller", "shorter")])
+    of_size = torch.isin(triplets[:, 1], of_size)
+    found = margins(boxes, triplets, rules=rules, rigid=True)
+
+    def pull(values, at):
+        (slope,) = torch.autograd.grad(values.sum(), at, retain_graph=True, materialize_grads=True)
+        return float(slope.abs().sum())
+
+    assert pull(found[~of_size], boxes.size) == 0
+    assert pull(found[of_size], boxes.size) > 0
+    assert pull(found[~of_size], boxes.position) > 0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs
+from echomodel.compact.wholeness import group_means
 from echomodel.graph import GraphBatch
 from echomodel.objectives import clean_from
 from echomodel.samplers import Predict
@@ -31,3 +33,20 @@ def shape_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, pairs:
         return output if settings.prediction == "sample" else clean_from(output, x, level, settings.objective)
 
     return predict
+
+
+def agreeing(predict: Predict, groups: Tensor) -> Predict:
+    """Clean codes on which each group agrees, their mean, so that equal furniture stays equal from the first step on.
+
+    Arguments:
+        predict: the denoiser's clean sample (N, K).
+        groups: (N,) int64, number of each node's group in [0, N). Known nodes (level 0) speak for their whole group.
+    """
+    alone = bool((groups == torch.arange(len(groups), device=groups.device)).all())
+
+    def agreed(x: Tensor, level: Tensor) -> Tensor:
+        clean = predict(x, level)
+        weight = torch.where(level == 0, 1.0, 1e-6).to(clean)[:, None]
+        return group_means(clean * weight, groups) / group_means(weight, groups)
+
+    return predict if alone else agreed

@@ -35,7 +35,7 @@ def _whole(inside: np.ndarray) -> float:
 
 
 def group_means(values: Tensor, groups: Tensor) -> Tensor:
-    """Each value (N,) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
+    """Each value (N, ...) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
     total = torch.zeros_like(values).index_add(0, groups, values)
     count = torch.zeros_like(values).index_add(0, groups, torch.ones_like(values))
     return (total / count.clamp_min(1))[groups]

@@ -14,11 +14,12 @@ from echomodel.data.shapeset import ShapeSet, build_shapes
 
 @dataclass(frozen=True)
 class DataRecipe:
-    """What a data set holds: `rooms` labelled rooms and all categories in `styles` styles."""
+    """What a data set holds: `rooms` labelled rooms, a share of them `untidy`, and all categories in `styles` styles."""
 
     name: str
     rooms: int
     styles: int
+    untidy: float = 0.3
 
 
 RECIPES = {
@@ -49,7 +50,7 @@ def build_data(
     def report(part: str) -> Callable[[int, int], None] | None:
         return None if progress is None else lambda done, total: progress(part, done, total)
 
-    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"))
+    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), untidy=chosen.untidy)
     shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
     note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
     (folder / "data.json").write_text(json.dumps(note, indent=1) + "\n", "utf-8")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.data.rooms import generate_rooms
+from echomodel.data.rooms import generate_rooms, untidied
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -46,6 +46,8 @@ def build_rooms(
     seed: int,
     styles: int,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    untidy: float = 0.0,
 ) -> RoomSet:
     """Generate and label a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
 
@@ -53,6 +55,7 @@ def build_rooms(
         directory: folder of the set; shards that are complete there are kept.
         count: number of rooms, at least 1. seed: seed of the world. styles: number of style groups of the shape set.
         progress: called with (rooms done, rooms in all).
+        untidy: share of the rooms to train on that are shaken (see `echomodel.data.rooms.untidied`), 0 to 1.
 
     Raises:
         ValueError: the folder holds a set that was begun with other arguments.
@@ -63,6 +66,7 @@ def build_rooms(
     folder.mkdir(parents=True, exist_ok=True)
     words = [category.name for category in vocabulary().categories]
     plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
+    plan["untidy"] = untidy
     _claim(folder, plan)
     for number, first in enumerate(range(0, count, ROOMS_PER_SHARD)):
         path = folder / f"rooms-{number:04d}.bin"
@@ -70,7 +74,8 @@ def build_rooms(
         if not path.exists():
             rooms: list[RoomBoxes] = []
             for start in range(first, last, 100):
-                rooms += generate_rooms(min(100, last - start), seed, styles=styles, start=start)
+                drawn = generate_rooms(min(100, last - start), seed, styles=styles, start=start)
+                rooms += [_maybe_untidied(room, seed, start + k, untidy) for k, room in enumerate(drawn)]
                 if progress:
                     progress(start + min(100, last - start), count)
             write_shard(path, rooms, first)
@@ -90,7 +95,7 @@ def write_shard(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first:
     for k, room in enumerate(rooms):
         n = len(room)
         entry = (n, len(room.floor_polygon), n * n, words.room_type_id(room.room_type),
-                 (first + k) % HELD_OUT_EVERY == HELD_OUT_EVERY - 1, room.height)  # fmt: skip
+                 _held_out(first + k), room.height)  # fmt: skip
         objects = np.zeros(n, OBJECT)
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
@@ -229,6 +234,16 @@ class RoomSet:
         order = rng.permutation(np.flatnonzero(self.held_out == held_out))
         for start in range(0, len(order), scenes):
             yield self.batch(order[start : start + scenes], rules=rules, drop=drop, rng=rng)
+
+
+def _held_out(number: int) -> bool:
+    return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
+
+
+def _maybe_untidied(room: RoomBoxes, seed: int, number: int, share: float) -> RoomBoxes:
+    """The room, or with probability `share` its untidy version; held-out rooms stay tidy."""
+    rng = np.random.Generator(np.random.PCG64([seed, number, 1]))
+    return room if _held_out(number) or rng.random() >= share else untidied(room, rng)
 
 
 def _rounded(room: RoomBoxes) -> RoomBoxes:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
+
 import torch
 from torch import Tensor
 
 from echomodel.rules.geometry import BoxesLike, pairs
-from echomodel.rules.sets import RuleSet, rule_set
+from echomodel.rules.sets import SIZES, RuleSet, rule_set
 
 
 class _Tensors:
@@ -18,6 +20,12 @@ class _Tensors:
         self.size = size.to(kind)
         self.position = torch.as_tensor(boxes.position).to(self.size)
         self.yaw = torch.as_tensor(boxes.yaw).to(self.size)
+
+    def of_fixed_size(self) -> _Tensors:
+        """The same boxes, through whose sizes no gradient passes."""
+        fixed = copy.copy(self)
+        fixed.size = self.size.detach()
+        return fixed
 
 
 def measured(rules: str = "strict") -> frozenset[int]:
@@ -32,6 +40,7 @@ def margins(
     rules: str = "strict",
     scene: Tensor | None = None,
     center: Tensor | None = None,
+    rigid: bool = False,
 ) -> Tensor:
     """Signed margin of every relation, >= 0 iff it is satisfied; differentiable in size, position and yaw.
 
@@ -41,12 +50,13 @@ def margins(
         rules: `strict` or `sgfront`.
         scene: (N,) int64, scene of each node; needed where `center` holds several rows.
         center: (2,) or (S, 2) float, x and z of the rooms' centres; default the origin. Only `symmetrical_to` asks.
+        rigid: relations of place have no gradient in the sizes: furniture moves aside, it does not shrink.
 
     Returns:
         (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
         0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
-    return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center)
+    return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center, rigid)
 
 
 def verdicts(
@@ -69,16 +79,23 @@ def verdicts(
 
 
 def _margins(
-    boxes: _Tensors, triplets: Tensor, rules: RuleSet, scene: Tensor | None, center: Tensor | None
+    boxes: _Tensors,
+    triplets: Tensor,
+    rules: RuleSet,
+    scene: Tensor | None,
+    center: Tensor | None,
+    rigid: bool = False,
 ) -> Tensor:
     triplets = torch.as_tensor(triplets, device=boxes.size.device)
     centre = node_centres(boxes.position, scene, center)
     out = boxes.size.new_zeros(len(triplets))
+    placed = boxes.of_fixed_size() if rigid else boxes
     for predicate, rule in rules.margins.items():
         chosen = (triplets[:, 1] == predicate).nonzero()[:, 0]
         if len(chosen):
             subject, object_ = triplets[chosen, 0], triplets[chosen, 2]
-            pair = pairs(boxes, subject, object_, centre, oriented=rules.oriented)
+            of = boxes if predicate in SIZES else placed
+            pair = pairs(of, subject, object_, centre, oriented=rules.oriented)
             out = out.index_copy(0, chosen, rule(pair))
     return out
 

@@ -19,6 +19,7 @@ HEIGHT = 0.1  # relative difference of the tops for taller and shorter
 TOUCH = 0.04  # metres of vertical play for standing on
 NEAR = 0.45  # metres for close by and symmetrical to
 LEFT, RIGHT, FRONT, BEHIND, CLOSE, ABOVE, ON, BIGGER, SMALLER, TALLER, SHORTER, SYMMETRICAL = range(1, 13)
+SIZES = frozenset({BIGGER, SMALLER, TALLER, SHORTER})  # what sizes answer for; all others are relations of place
 
 
 @dataclass(frozen=True)

@@ -54,8 +54,9 @@ def relation_hinge(
 ) -> Tensor:
     """Mean over told relations of how far the predicted boxes miss them, weighted by (1 - level)^2."""
     decoded = Boxes.decode(vectors, statistics)
-    size = decoded.size.clamp(0.02, 8.0)
-    boxes = Boxes(size, decoded.position, decoded.yaw)
+    # ratios to a height near or below zero would explode or change their sign
+    lifted = torch.cat([decoded.position[:, :1], decoded.position[:, 1:2].clamp_min(0), decoded.position[:, 2:]], dim=1)
+    boxes = Boxes(decoded.size.clamp(0.05, 8.0), lifted, decoded.yaw)
     pair, predicate = batch.predicates.nonzero(as_tuple=True)
     measurable = ((predicate >= 1) & (predicate <= 12)).nonzero()[:, 0]
     pair, predicate = pair[measurable], predicate[measurable]
@@ -69,7 +70,7 @@ def relation_hinge(
             continue
         ends = chosen[:, [0, 2]]
         weight = (1 - level[ends].amax(1)).square() * ~known[ends].all(1)
-        margin = margins(boxes, chosen, rules=name)
+        margin = margins(boxes, chosen, rules=name, rigid=True)
         weight = weight * emphasis[chosen[:, 1]]
         total = total + (torch.log1p((SLACK - margin).clamp_min(0)) * weight).sum()
         weights = weights + weight.sum()

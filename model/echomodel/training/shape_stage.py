@@ -56,8 +56,8 @@ def shape_loss(
     known = draw_known(batch.graph.scene, scenes, generator)
     level = shifted(draw_levels(scenes, generator))[batch.graph.scene] * ~known
     noise = torch.randn(clean.shape, generator=generator)
-    # equal furniture starts from equal noise when sampled, so half of the scenes train that way
-    shared = torch.rand(scenes, generator=generator) < 0.5
+    # equal furniture starts from equal noise when sampled, so most of the scenes train that way
+    shared = torch.rand(scenes, generator=generator) < 0.75
     noise = torch.where(expand(shared[batch.graph.scene], noise), noise[first_of_group(batch)], noise)
     noisy = torch.where(expand(known, clean), clean, add_noise(clean, noise, level, objective))
     latent = model.latent(batch.graph.category, batch.pairs) if graph_latent is None else graph_latent

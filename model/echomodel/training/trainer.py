@@ -86,6 +86,7 @@ class Trainer:
         self.optimizer = torch.optim.AdamW(
             [{"params": decayed, "weight_decay": settings.decay}, {"params": others, "weight_decay": 0.0}],
             lr=settings.rate,
+            fused=True,
         )
         self.step = 0
         if resume:
