@@ -13,6 +13,7 @@ from echousd.graph import SceneGraph
 from echousd.room import pipeline
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, Room, RoomOptions
+from echousd.room.styles import free_name
 
 if TYPE_CHECKING:
     from echomodel.echo import EchoModel
@@ -137,15 +138,13 @@ def _without(graph: SceneGraph, names: set[str]) -> SceneGraph | None:
 
 
 def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> dict[str, str]:
-    """An object may have taken the name of one whose asset others still use: then its asset gets another name."""
+    """A new asset whose name an asset that stays has already gets another name."""
     kept = {asset for name, asset in assets.items() if name not in fresh}
     renamed: dict[str, str] = {}
-    for name in fresh:
-        asset, number = assets[name], 2
+    for name in sorted(fresh):
+        asset = assets[name]
         if asset in kept and asset not in renamed:
-            while f"{asset}_{number}" in kept or f"{asset}_{number}" in assets.values():
-                number += 1
-            renamed[asset] = f"{asset}_{number}"
+            renamed[asset] = free_name(asset, kept | set(assets.values()) | set(renamed.values()))
     return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
 
 

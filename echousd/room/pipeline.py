@@ -21,7 +21,7 @@ from echousd.graph import SceneGraph
 from echousd.room.meshing import FACES, box_mesh, mesh_from_shape
 from echousd.room.room import Provenance, Room, RoomOptions, Verdict
 from echousd.room.shell import box_corners, floor_polygon
-from echousd.room.styles import equal_sizes, shared_assets, style_groups
+from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
 
 if TYPE_CHECKING:
     from echomodel.echo import EchoModel
@@ -205,7 +205,7 @@ def make_meshes(
     faces: int = FACES,
     watch: Watch | None = None,
 ) -> tuple[dict[str, trimesh.Trimesh], dict[str, str]]:
-    """Meshes in their boxes, and which object uses whose asset.
+    """Meshes in their boxes, and the name of the asset that each object uses.
 
     Arguments:
         graph, boxes: n objects.
@@ -217,12 +217,13 @@ def make_meshes(
     names = [node.name for node in graph.nodes]
     size = np.asarray(boxes.size, float)
     occupied = None if grids is None else grids < 0
-    assets = shared_assets(names, [node.category for node in graph.nodes], style_groups(graph), size, occupied)
+    categories = [node.category for node in graph.nodes]
+    owners = shared_assets(names, categories, style_groups(graph), size, occupied)
     meshes: dict[str, trimesh.Trimesh] = {}
     with (watch or Watch()).stage("meshes", len(names)) as tell:
         for i, name in enumerate(names):
-            if assets[name] != name:
-                meshes[name] = meshes[assets[name]]
+            if owners[name] != name:
+                meshes[name] = meshes[owners[name]]
             elif grids is None:
                 meshes[name] = box_mesh(size[i])
             else:
@@ -231,7 +232,7 @@ def make_meshes(
                 except ValueError as error:
                     raise ValueError(f"shape of {name!r}: {error}; try another seed or shapes 'boxes'") from None
             tell(i + 1, len(names))
-    return meshes, assets
+    return meshes, asset_names(owners, dict(zip(names, categories, strict=True)))
 
 
 def judge(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict") -> tuple[Verdict, ...]:

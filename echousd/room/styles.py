@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -119,6 +119,32 @@ def shared_assets(
             owners.append(i)
             out[name] = name
     return out
+
+
+def asset_names(owners: Mapping[str, str], categories: Mapping[str, str]) -> dict[str, str]:
+    """Object name -> name of its asset: the object's own, or its category's where several objects share the asset.
+
+    A shared asset must not carry the name of one of its users, which other software shows under all of them.
+
+    Arguments:
+        owners: object name -> object whose asset it uses, see `shared_assets`.
+        categories: object name -> category.
+    """
+    taken = set(owners)
+    named: dict[str, str] = {}
+    for owner in owners.values():
+        if owner not in named and sum(other == owner for other in owners.values()) > 1:
+            named[owner] = free_name(categories[owner], taken)
+            taken.add(named[owner])
+    return {name: named.get(owner, owner) for name, owner in owners.items()}
+
+
+def free_name(word: str, taken: Container[str]) -> str:
+    """The word itself, or the first of `word_2`, `word_3` ... that is not taken."""
+    name, number = word, 2
+    while name in taken:
+        name, number = f"{word}_{number}", number + 1
+    return name
 
 
 def _agree(i: int, j: int, size: np.ndarray, occupancy: np.ndarray | None) -> bool:

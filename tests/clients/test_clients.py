@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from environments import python_of, run, three
-from pxr import Usd, UsdGeom
+from pxr import Usd, UsdGeom, UsdShade
 
 from echousd.export import export
 from echousd.stage import read_graph
@@ -64,44 +64,75 @@ def test_nvidia_validator_reports_no_failures(rooms: list[Path]) -> None:
         assert "No issues found" in said or (counts and not any(counts)), said
 
 
+def blender(room: Path) -> dict[str, dict]:
+    """What Blender makes of a room, by the names of its objects."""
+    lines = run(python_of("blender"), HERE / "blender_import.py", room).splitlines()
+    things = [json.loads(line) for line in lines if line.startswith("{")]
+    assert len({thing["name"] for thing in things}) == len(things)
+    return {thing["name"]: thing for thing in things}
+
+
+def in_blender(point: np.ndarray) -> tuple[float, float, float]:
+    """Y up in USD is Z up in Blender."""
+    return point[0], -point[2], point[1]
+
+
+def bound_looks(mesh: UsdGeom.Mesh) -> set[str]:
+    """Names of the materials bound to a mesh or to its parts."""
+    parts = UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsets() or [mesh]
+    return {UsdShade.MaterialBindingAPI(p).ComputeBoundMaterial()[0].GetPrim().GetName() for p in parts}
+
+
+def check_blender(file: Path, room: Path) -> None:
+    """Every object of a room, first and later users of an asset alike, arrives in Blender as the stage says.
+
+    Arguments:
+        file: what Blender imports, the room itself or an export of it.
+        room: root layer of the room.
+    """
+    things = blender(file)
+    stage = Usd.Stage.Open(str(room))
+    placed = UsdGeom.XformCache()
+    wanted = visible_meshes(stage)
+    owners = [*(("Objects", name) for name in read_graph(room).names), ("Shell", "Floor")]
+    assert {name for _, name in owners} == set(wanted)
+    assert things["Room"]["parent"] is None
+    assert things["Objects"]["parent"] == things["Shell"]["parent"] == "Room"
+    assert sum(thing["type"] == "MESH" for thing in things.values()) == len(owners)
+    for group, name in owners:
+        # the object itself: its own name, its parent, its place in the world
+        thing, (mesh,) = things[name], wanted[name]
+        assert thing["type"] == "EMPTY"
+        assert thing["parent"] == group
+        at = np.array(placed.GetLocalToWorldTransform(mesh.GetPrim().GetParent()))[3, :3]
+        np.testing.assert_allclose(thing["position"], in_blender(at), atol=1e-4)
+        # and one mesh below it, under the asset's name: no other object's
+        (part,) = (t for t in things.values() if t["parent"] == name and t["type"] == "MESH")
+        label = re.sub(r"\.\d{3}$", "", part["name"])
+        assert label == mesh.GetPrim().GetName()
+        assert label.removesuffix("_mesh") not in {other for _, other in owners} - {name}
+        assert part["faces"] == len(mesh.GetFaceVertexCountsAttr().Get())
+        # Exact corners: the bounds of a turned object's local box are wider than the object.
+        turn = np.array(placed.GetLocalToWorldTransform(mesh.GetPrim()))
+        points = np.array(mesh.GetPointsAttr().Get(), float) @ turn[:3, :3] + turn[3, :3]
+        corners = np.array([in_blender(point) for point in points])
+        np.testing.assert_allclose(part["low"], corners.min(0), atol=1e-3)
+        np.testing.assert_allclose(part["high"], corners.max(0), atol=1e-3)
+        st = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").ComputeFlattened())
+        assert part["uv_layers"] == ["st"]
+        np.testing.assert_allclose(part["uv_spread"], np.ptp(st, 0), atol=1e-3)
+        assert set(part["materials"]) == bound_looks(mesh)
+    assert {thing["name"] for thing in things.values() if thing["type"] == "CAMERA"} == {"perspective", "top"}
+
+
 def test_blender_imports_names_places_uvs_and_materials(rooms: list[Path]) -> None:
-    python = python_of("blender")
     for room in rooms:
-        lines = run(python, HERE / "blender_import.py", room).splitlines()
-        things = [json.loads(line) for line in lines if line.startswith("{")]
-        by_name = {thing["name"]: thing for thing in things}
-        meshes = [thing for thing in things if thing["type"] == "MESH"]
-        assert {"Room", "Objects", "Shell"} <= set(by_name)
-        assert by_name["Objects"]["parent"] == "Room"
-        stage = Usd.Stage.Open(str(room))
-        wanted = visible_meshes(stage)
-        assert len(meshes) == sum(map(len, wanted.values()))
-        placed = UsdGeom.XformCache()
-        for name in bounds(room):
-            (mesh,) = wanted[name]
-            # Exact corners: the bounds of a turned object's local box are wider than the object.
-            turn = np.array(placed.GetLocalToWorldTransform(mesh.GetPrim()))
-            points = np.array(mesh.GetPointsAttr().Get(), float) @ turn[:3, :3] + turn[3, :3]
-            low, high = points.min(0), points.max(0)
-            # Y up in USD is Z up in Blender: (x, y, z) -> (x, -z, y).
-            lower, upper = (low[0], -high[2], low[1]), (high[0], -low[2], high[1])
-            same = [
-                thing
-                for thing in meshes
-                if np.allclose(thing["low"], lower, atol=0.03) and np.allclose(thing["high"], upper, atol=0.03)
-            ]
-            # Blender merges an Xform with its only mesh and keeps the mesh's name; shared assets get .001, .002 ...
-            same = [thing for thing in same if thing["name"].split(".")[0] == mesh.GetPrim().GetName()]
-            assert same, f"{room}: {name} is not where it should be"
-            (found,) = same
-            assert found["parent"] in ("Objects", name)
-            assert found["faces"] == len(mesh.GetFaceVertexCountsAttr().Get())
-            assert found["uv_layers"] == ["st"]
-            assert min(found["uv_spread"]) > 0.01
-            subsets = [p for p in mesh.GetPrim().GetChildren() if p.IsA(UsdGeom.Subset)]
-            assert len(found["materials"]) == max(len(subsets), 1)
-        assert by_name["Floor_mesh"]["materials"]
-        assert {thing["name"] for thing in things if thing["type"] == "CAMERA"} == {"perspective", "top"}
+        check_blender(room, room)
+
+
+def test_blender_imports_the_package_for_the_web(rooms: list[Path], tmp_path: Path) -> None:
+    for number, room in enumerate(rooms):
+        check_blender(export(room, tmp_path / f"{number}.usdz"), room)
 
 
 def test_three_loads_the_package_for_the_web(rooms: list[Path], tmp_path: Path) -> None:

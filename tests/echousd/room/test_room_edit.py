@@ -66,13 +66,13 @@ def test_owner_of_a_shared_asset_may_go(root):
     graph = graph.remove_node("nightstand_left")
     room = edit(root, graph, model=StandIn())
     room.save(root.parent, preview=False)
-    assert room.assets["nightstand_right"] == "nightstand_left"
+    assert room.assets["nightstand_right"] == "nightstand"
     stage = Usd.Stage.Open(str(root))
     stage.Reload()
-    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_left_mesh")
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_mesh")
     assert not stage.GetPrimAtPath("/Room/Objects/nightstand_left")
-    again = graph.add_node("nightstand_left", "wardrobe")
-    assert edit(root, again, model=StandIn()).assets["nightstand_left"] == "nightstand_left_2"
+    again = graph.add_node("nightstand", "wardrobe")
+    assert edit(root, again, model=StandIn()).assets["nightstand"] == "nightstand_2"
 
 
 def test_another_category_gets_another_shape(root):

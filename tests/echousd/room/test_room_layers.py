@@ -28,7 +28,8 @@ def stage(root):
 def test_files_are_those_of_the_design(root):
     found = {str(path.relative_to(root.parent)) for path in root.parent.rglob("*") if path.is_file()}
     layers = {f"layers/{name}.usda" for name in ("materials", "physics", "layout", "graph", "geometry")}
-    assets = {f"assets/{n}/{n}{end}" for n in set(OBJECTS) - {"nightstand_right"} for end in (".usda", "_geo.usdc")}
+    names = set(OBJECTS) - {"nightstand_left", "nightstand_right"} | {"nightstand"}
+    assets = {f"assets/{n}/{n}{end}" for n in names for end in (".usda", "_geo.usdc")}
     assert found == {"bedroom.usda", "bedroom.json", "textures/floor.png"} | layers | assets
 
 
@@ -75,9 +76,18 @@ def test_kinds_payloads_and_hints(stage):
 
 
 def test_style_group_shares_one_asset(stage, room):
-    assert room.assets["nightstand_right"] == "nightstand_left"
+    assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
     assert room.meshes["nightstand_right"] is room.meshes["nightstand_left"]
-    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_left_mesh")
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_mesh")
+
+
+def test_meshes_have_a_transform_of_their_own(stage):
+    """Else Blender makes one object of an Xform and its only mesh, under the mesh's name."""
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            (op,) = UsdGeom.Xformable(prim).GetOrderedXformOps()
+            assert op.GetPrecision() == UsdGeom.XformOp.PrecisionFloat
+            assert op.Get() == (0, 0, 0)
 
 
 def test_layout_layer_holds_transforms_alone(root):
@@ -131,8 +141,8 @@ def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
     def bound(path):
         return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
 
-    left = bound("/Room/Objects/nightstand_left/nightstand_left_mesh/wood")
-    assert left == bound("/Room/Objects/nightstand_right/nightstand_left_mesh/wood") == "set_nightstand_left_wood"
+    left = bound("/Room/Objects/nightstand_left/nightstand_mesh/wood")
+    assert left == bound("/Room/Objects/nightstand_right/nightstand_mesh/wood") == "set_nightstand_left_wood"
     assert bound("/Room/Objects/wardrobe/wardrobe_mesh/wood") == "room_wood"
 
 

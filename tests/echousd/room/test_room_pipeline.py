@@ -7,7 +7,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.room.pipeline import graph_batch, judge
-from echousd.room.styles import equal_sizes, shared_assets, style_groups
+from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
 
 
 def chairs(*relations, styles=(None, None, None)):
@@ -32,6 +32,12 @@ def test_assets_are_shared_by_equal_shapes_of_one_style_only():
     assert shared_assets(names, ["stool", "chair", "stool"], style, size) == {"a": "a", "b": "b", "c": "a"}
     assert shared_assets(names, kind, dict.fromkeys("abc", "room"), size) == {"a": "a", "b": "b", "c": "c"}
     assert shared_assets(names, kind, style, size * [[1], [1.01], [1]]) == {"a": "a", "b": "b", "c": "a"}
+
+
+def test_shared_assets_are_named_for_what_they_are():
+    owners = {"stool": "stool", "a": "a", "b": "a", "c": "c", "d": "c", "e": "e"}
+    names = asset_names(owners, dict.fromkeys(owners, "stool"))
+    assert names == {"stool": "stool", "a": "stool_2", "b": "stool_2", "c": "stool_3", "d": "stool_3", "e": "e"}
 
 
 def test_nearly_equal_sizes_of_a_set_become_equal():
@@ -72,7 +78,7 @@ def test_repair_keeps_the_graph():
     room = echousd.generate(graph, model=Heap(), shapes="boxes")
     assert [v.state for v in room.verdicts if v.state != "unmeasured"] == ["kept"] * 5
     assert room.notes == ()
-    assert room.assets["nightstand_right"] == "nightstand_left"
+    assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
 
 
 def test_verdicts_are_those_of_the_rules():
