@@ -47,6 +47,8 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
 
 def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
     """The layer as it would lie on disk; the same content gives the same bytes. `suffix`: `.usda` or `.usdc`."""
+    if suffix == ".usda":
+        return layer.ExportToString().encode("utf-8")
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
         path = Path(folder) / f"layer{suffix}"
         if not layer.Export(str(path)):
@@ -57,6 +59,9 @@ def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
 def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
     """Author a UsdGeomMesh with indexed normals and `st`, and a GeomSubset per material group if there are several."""
     mesh = UsdGeom.Mesh.Define(stage, path)
+    # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
+    # In floats: three.js fails on whole numbers in doubles of a usdc.
+    mesh.AddTranslateOp(UsdGeom.XformOp.PrecisionFloat).Set(Gf.Vec3f(0.0))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(form.points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(form.faces), 3, np.int32)))

@@ -115,5 +115,14 @@ def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _indexed(values: np.ndarray, digits: int) -> tuple[np.ndarray, np.ndarray]:
-    unique, index = np.unique(np.round(values, digits) + 0.0, axis=0, return_inverse=True)
-    return unique.astype(np.float32), index.reshape(-1).astype(np.int32)
+    """The different rows of `values`, rounded, in lexicographic order, and for every row the number of its value."""
+    whole = np.rint(values * 10.0**digits).astype(np.int64)
+    low = whole.min(0)
+    span = whole.max(0) - low + 1
+    if float(np.prod(span.astype(float))) > 2**62:  # rows as one number each sort ten times as fast
+        unique, index = np.unique(whole, axis=0, return_inverse=True)
+    else:
+        keys = np.ravel_multi_index(tuple((whole - low).T), tuple(span))
+        found, index = np.unique(keys, return_inverse=True)
+        unique = np.stack(np.unravel_index(found, tuple(span)), 1) + low
+    return (unique / 10.0**digits).astype(np.float32), index.reshape(-1).astype(np.int32)
