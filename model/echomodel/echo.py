@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel, load_weights
@@ -19,10 +19,12 @@ from echomodel.compact.wholeness import group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
+from echomodel.released.packed import PackedLinear
 from echomodel.samplers import Predict, guided, sample
 
 Progress = Callable[[int, int], None]
 SAME_STYLE, SAME_MATERIAL = 13, 15
+TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,21 +46,32 @@ class EchoModel:
     Arguments:
         model: the model, in evaluation mode.
         hash: short hash of the weights it came from.
+        packed: on a CPU, lay the shape denoiser's linear maps out for oneDNN, equal but for rounding and 1.5 times as
+            fast (`benchmarks/inference_modes.py`); do not train the model on then.
+        half_decode: decode shapes in bfloat16, which is faster where the processor has it (AVX-512 BF16, AMX) and
+            slower elsewhere.
     """
 
-    def __init__(self, model: CompactModel, hash: str = "") -> None:
-        self.model, self.hash = model.eval(), hash
+    def __init__(self, model: CompactModel, hash: str = "", *, packed: bool = True, half_decode: bool = False) -> None:
+        self.model, self.hash, self.half_decode = model.eval(), hash, half_decode
+        if packed and "shape" in model.parts and self.device.type == "cpu":
+            pack_linear_maps(model.shape)
 
     @classmethod
-    def load(cls, path: str | Path | None = None, *, device: torch.device | str = "cpu") -> EchoModel:
+    def load(
+        cls, path: str | Path | None = None, *, device: torch.device | str = "cpu", half_decode: bool = False
+    ) -> EchoModel:
         """Load the weights that ship with the package, a weights file, or a folder of weights files.
+
+        Arguments:
+            path: file or folder, None = the shipped weights. device: where to. half_decode: as in the class.
 
         Raises:
             WeightsError: there are none, or they are damaged or do not belong together.
         """
         source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
         files = sorted(source.glob("*.safetensors")) if source.is_dir() else [source]
-        return cls(*load_weights(files, device))
+        return cls(*load_weights(files, device), half_decode=half_decode)
 
     @property
     def config(self) -> CompactConfig:
@@ -163,6 +176,7 @@ class EchoModel:
         known: Tensor | None = None,
         known_mask: Tensor | None = None,
         edit: GraphEdit | None = None,
+        guidance: float = 1.0,
         noise: Tensor | None = None,
         candidates: int | None = None,
         progress: Progress | None = None,
@@ -176,7 +190,7 @@ class EchoModel:
                 back unchanged.
             noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
             candidates: draws per object, of which the most whole is kept (pieces of one class and style together).
-            generator, steps, sampler, edit, progress: as for `sample_layout`.
+            generator, steps, sampler, edit, guidance, progress: as for `sample_layout`.
 
         Returns:
             (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
@@ -192,26 +206,29 @@ class EchoModel:
         boxes.check()
         known, known_mask = self._known(graph, known, known_mask)
         given = None if known is None else self.model.shape.codes(coder.encode(known))
-        pairs, latent = pairs_of(graph, self.config.predicates), self.graph_latent(graph, edit)
         equal, steps = equal_furniture(graph), steps or settings.steps
-        predict = agreeing(shape_predictor(self.model, graph, boxes.size, pairs, latent), equal)
         tries = 1 if noise is not None else candidates or settings.candidates
+        width = max(1, min(tries, TOGETHER // graph.num_nodes))
+        rounds = [min(width, tries - start) for start in range(0, tries, width)]
         grids, best = torch.empty(0), torch.empty(0)
-        for attempt in range(tries):
-            x = self._noise((graph.num_nodes, settings.components), generator, noise)
+        for number, count in enumerate(rounds):
+            starts = [self._noise((graph.num_nodes, settings.components), generator, noise) for _ in range(count)]
             if noise is None:
-                x = settings.temperature * x[equal]
+                starts = [settings.temperature * x[equal] for x in starts]
             codes = sample(
-                sampler or settings.sampler, predict, x, steps, settings.objective, known=given,
-                known_mask=known_mask, generator=generator, progress=_part_of(progress, attempt, tries),
+                sampler or settings.sampler, self._shape_predictor(graph, boxes.size, equal, edit, guidance, count),
+                torch.cat(starts), steps, settings.objective, known=_repeated(given, count),
+                known_mask=_repeated(known_mask, count), generator=generator,
+                progress=_part_of(progress, number, len(rounds)),
             )  # fmt: skip
-            drawn = torch.cat([coder.decode(self.model.shape.latents(part)) for part in codes.split(4)])
-            whole = group_means(wholeness(drawn), equal) if tries > 1 else best
-            if attempt == 0:
-                grids, best = drawn, whole
-                continue
-            better = whole > best
-            grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
+            for draw in codes.chunk(count):
+                drawn = self._decoded(draw)
+                whole = group_means(wholeness(drawn), equal) if tries > 1 else best
+                if not len(grids):
+                    grids, best = drawn, whole
+                    continue
+                better = whole > best
+                grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
         if known is None or known_mask is None:
             return grids
         return torch.where(known_mask[:, None, None, None], known, grids)
@@ -222,6 +239,29 @@ class EchoModel:
             raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
         chosen = torch.full_like(graph.room_type, config.rules.index(rules))
         return layout_predictor(self.model, graph, pairs_of(graph, config.predicates), latent, chosen)
+
+    def _shape_predictor(
+        self, graph: GraphBatch, size: Tensor, equal: Tensor, edit: GraphEdit | None, guidance: float, count: int
+    ) -> Predict:
+        """The denoiser of `count` draws behind one another, each of all objects of the graph."""
+
+        def of(one: GraphBatch, latent: Tensor) -> Predict:
+            many = GraphBatch.pack([one] * count)
+            pairs = pairs_of(many, self.config.predicates)
+            return shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
+
+        predict = of(graph, self.graph_latent(graph, edit))
+        if guidance != 1.0:
+            bare = graph.with_triplets(graph.triplets[:0])
+            predict = guided(predict, of(bare, self.graph_latent(bare)), guidance)
+        first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
+        return agreeing(predict, equal.repeat(count) + first)
+
+    def _decoded(self, codes: Tensor) -> Tensor:
+        """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time."""
+        latents, decode = self.model.shape.latents, self.model.autoencoder.decode
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half_decode):
+            return torch.cat([decode(latents(part)).float() for part in codes.split(4)])
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
         config = self.config
@@ -259,6 +299,9 @@ class EchoModel:
             return torch.randn(shape, generator=generator, device=generator.device).to(self.device)
         if tuple(noise.shape) != shape:
             raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
+        bad = ~torch.isfinite(noise).all(1)
+        if bool(bad.any()):
+            raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
         return noise.to(self.device)
 
 
@@ -286,6 +329,18 @@ def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
         touched[subject] = True
         touched[target] = True
     return touched
+
+
+def pack_linear_maps(net: nn.Module) -> None:
+    """Let every linear map inside multiply with packed weights; its parameters stay, for looking at and saving."""
+    for module in net.modules():
+        if isinstance(module, nn.Linear):
+            module.forward = PackedLinear(module.weight, module.bias)  # type: ignore[method-assign]
+
+
+def _repeated(values: Tensor | None, count: int) -> Tensor | None:
+    """(N, ...) behind itself `count` times."""
+    return None if values is None else torch.cat([values] * count)
 
 
 def _part_of(progress: Progress | None, attempt: int, tries: int) -> Progress | None:

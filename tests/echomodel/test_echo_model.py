@@ -158,3 +158,71 @@ def test_configurations_survive_json_and_settings() -> None:
         with_settings(CompactConfig(), ["layout.steps=many"])
     with pytest.raises(ValueError, match=r"shape.objective is 'v', allowed: noise, velocity, flow"):
         with_settings(CompactConfig(), ["shape.objective=v"])
+
+
+def test_draws_side_by_side_are_draws_one_by_one(model: EchoModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    together = model.sample_shapes(bedroom(), boxes(), generator=seeded(), candidates=3)
+    monkeypatch.setattr("echomodel.echo.TOGETHER", 1)
+    done: list[tuple[int, int]] = []
+    alone = model.sample_shapes(
+        bedroom(), boxes(), generator=seeded(), candidates=3, progress=lambda *part: done.append(part)
+    )
+    torch.testing.assert_close(together, alone, rtol=1e-4, atol=1e-4)
+    assert done == [(k, 6) for k in range(1, 7)]
+
+
+def test_packed_weights_and_half_decoding_change_little(model: EchoModel) -> None:
+    noise = torch.randn(3, 8, generator=seeded())
+    plain = EchoModel(CompactModel(model.config, STATISTICS), packed=False)
+    plain.model.load_state_dict(model.model.state_dict())
+    half = EchoModel(plain.model, packed=False, half_decode=True)
+    packed, exact, rough = (
+        one.sample_shapes(bedroom(), boxes(), generator=seeded(), noise=noise) for one in (model, plain, half)
+    )
+    torch.testing.assert_close(packed, exact, rtol=1e-4, atol=1e-4)
+    assert 0 < float((rough - exact).abs().max()) < 0.05
+    assert rough.dtype == torch.float32
+
+
+@pytest.mark.parametrize("part", ["layout", "shapes"])
+def test_guidance_extrapolates_from_the_graph_without_relations(model: EchoModel, part: str) -> None:
+    noise = torch.randn(3, 8, generator=seeded())
+
+    def run(graph: GraphBatch, guidance: float) -> torch.Tensor:
+        options = {"generator": seeded(), "noise": noise, "steps": 1, "guidance": guidance}
+        if part == "layout":
+            return model.sample_layout(graph, relation_guidance=0.0, **options).position
+        codes: list[torch.Tensor] = []
+        original, model._decoded = model._decoded, lambda x: codes.append(x) or original(x)  # type: ignore[func-returns-value,method-assign]
+        try:
+            model.sample_shapes(graph, boxes(), **options)
+        finally:
+            del model._decoded  # type: ignore[method-assign]
+        return codes[0]
+
+    graph = bedroom().with_triplets(bedroom().triplets[:2])  # no equal furniture, whose codes are averaged
+    told, bare = run(graph, 1.0), run(graph.with_triplets(graph.triplets[:0]), 1.0)
+    assert not torch.allclose(told, bare)
+    torch.testing.assert_close(run(graph, 3.0), bare + 3.0 * (told - bare), rtol=1e-3, atol=1e-4)
+    torch.testing.assert_close(run(graph, 0.0), bare, rtol=1e-4, atol=1e-5)
+
+
+def test_a_batch_gives_what_single_runs_give(model: EchoModel) -> None:
+    graphs = [
+        bedroom(),
+        GraphBatch.single([7]),
+        GraphBatch.single([3, 4, 5], [[0, 5, 1], [2, 12, 1]], floor=(3.0, 5.0)),
+    ]
+    packed, noise = GraphBatch.pack(graphs), torch.randn(7, 8, generator=seeded())
+    together = model.sample_layout(packed, generator=seeded(), noise=noise, steps=5, guidance=1.5)
+    shapes = model.sample_shapes(packed, boxes(7), generator=seeded(), noise=noise, guidance=1.5)
+    start = 0
+    for graph in graphs:
+        part = slice(start, start + graph.num_nodes)
+        own = noise[part]
+        alone = model.sample_layout(graph, generator=seeded(), noise=own, steps=5, guidance=1.5)
+        for name in ("size", "position", "yaw"):
+            torch.testing.assert_close(getattr(alone, name), getattr(together, name)[part], rtol=1e-3, atol=1e-4)
+        grids = model.sample_shapes(graph, boxes(len(own)), generator=seeded(), noise=own, guidance=1.5)
+        torch.testing.assert_close(grids, shapes[part], rtol=1e-3, atol=1e-4)
+        start += graph.num_nodes
