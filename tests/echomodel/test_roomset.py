@@ -121,7 +121,7 @@ def test_untidy_rooms_are_labelled_as_they_stand(tmp_path):
         room = shaken.room(int(number))
         assert room.categories == tidy.room(int(number)).categories
         assert np.array_equal(shaken.relations(number), label_relations(room, rules="strict"))
-    with pytest.raises(ValueError, match="was begun with untidy 0.5"):
+    with pytest.raises(ValueError, match=r"was begun with untidy 0\.5"):
         build_rooms(tmp_path / "b", 40, 3, 5)
 
 

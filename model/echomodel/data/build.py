@@ -14,7 +14,7 @@ from echomodel.data.shapeset import ShapeSet, build_shapes
 
 @dataclass(frozen=True)
 class DataRecipe:
-    """What a data set holds: `rooms` labelled rooms, a share of them `untidy`, and all categories in `styles` styles."""
+    """What a data set holds: `rooms` labelled rooms, a share of them `untidy`; all categories in `styles` styles."""
 
     name: str
     rooms: int

@@ -254,9 +254,7 @@ def _rounded(room: RoomBoxes) -> RoomBoxes:
     return RoomBoxes.from_json(entry)
 
 
-def _triplets(
-    bits: np.ndarray, counts: np.ndarray, thinned: tuple[float, np.random.Generator] | None
-) -> np.ndarray:
+def _triplets(bits: np.ndarray, counts: np.ndarray, thinned: tuple[float, np.random.Generator] | None) -> np.ndarray:
     """(E, 3) triplets of the packed rooms from their pairs' bits (n * n per room, row = subject)."""
     pair, predicate = np.nonzero((bits[:, None] >> np.arange(16, dtype=np.uint16)) & 1)
     if thinned:

@@ -152,9 +152,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
         sofa = room.somewhere(category, size=size, style=style)
     if sofa is None:
         return None
-    if room.wanted.get("tv_stand") and television(
-        room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4
-    ):
+    if room.wanted.get("tv_stand") and television(room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4):
         room.take("tv_stand")
     table = _coffee_table(room, sofa, style)
     _second_sofa(room, sofa, table)

@@ -17,8 +17,8 @@ ON_THE_FLOOR = 0.02  # metres
 def untidied(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
     """The room with its furniture shifted, resized and now and then exchanged; relations have to be labelled anew.
 
-    Real rooms hold furniture that overlaps, sticks through walls or is far from its usual size, and edited graphs ask for
-    arrangements that no tidy room shows. How untidy a room gets is drawn anew for each, mostly little.
+    Real rooms hold furniture that overlaps, sticks through walls or is far from its usual size, and edited graphs ask
+    for arrangements that no tidy room shows. How untidy a room gets is drawn anew for each, mostly little.
 
     Arguments:
         room: n objects. Equal models stay of equal size; what stands on or hangs above the floor only moves in plan.
