@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    import trimesh
 
 
 def register(app: typer.Typer) -> None:
@@ -26,7 +30,10 @@ def shapes(
     ] = 12,
     steps: Annotated[int | None, typer.Option(help="Sampling steps; default the model's.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the choice, the rooms and the sampling.")] = 0,
-    sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet, eight generated shapes per class.")] = None,
+    per_class: Annotated[
+        int, typer.Option(min=0, help="Objects to generate of every class, cleaned as in rooms; 0 = none.")
+    ] = 0,
+    sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet of what is generated per class.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
 ) -> None:
@@ -40,7 +47,7 @@ def shapes(
     from echomodel.data.shapeset import ShapeSet
     from echomodel.data.sheet import contact_sheet
     from echomodel.echo import EchoModel
-    from echomodel.metrics.shape_evaluation import ShapeEvaluation, evaluate_shapes
+    from echomodel.metrics.shape_evaluation import ShapeEvaluation, class_shapes, evaluate_shapes
 
     if (meshes is None) == (shape_set is None):
         raise ValueError("name one set to compare with: --meshes FOLDER or --set FOLDER")
@@ -57,15 +64,38 @@ def shapes(
             bar.update(tasks[what], completed=done)
 
         settings = ShapeEvaluation(limit=limit, rooms=rooms, seed=seed, steps=steps)
-        result, made = evaluate_shapes(EchoModel.load(model), found, settings, progress)
+        loaded = EchoModel.load(model)
+        result, made = evaluate_shapes(loaded, found, settings, progress)
+        if per_class:
+            result["classes"], made = _cleaned(class_shapes(loaded, per_class, seed, progress))
     if sheet is not None and made:
-        contact_sheet([(name, made[name][:8]) for name in sorted(made)]).save(sheet)
+        contact_sheet([(name, made[name][: per_class or 8]) for name in sorted(made)]).save(sheet)
     if out is not None:
         out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
     if json_out:
         typer.echo(json.dumps(result))
     else:
         _print(result)
+
+
+def _cleaned(shapes: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
+    """Generated shapes as the meshes that a room would get, and how many of them are closed."""
+    from echousd.room.meshing import mesh_from_shape
+
+    made: dict[str, list[trimesh.Trimesh]] = {}
+    scores = {"objects": 0, "empty": 0, "watertight": 0}
+    for name, objects in shapes.items():
+        made[name] = []
+        for grid, size in objects:
+            scores["objects"] += 1
+            try:
+                clean = mesh_from_shape(grid, size)
+            except ValueError:
+                scores["empty"] += 1
+                continue
+            scores["watertight"] += clean.watertight
+            made[name].append(clean.mesh)
+    return scores, made
 
 
 def _print(result: dict) -> None:
@@ -81,6 +111,11 @@ def _print(result: dict) -> None:
             name, f"{row['n']:.0f}", *(f"{row[key]:.3f}" for key in ("f_score", "iou")), f"{row['chamfer']:.4f}"
         )
     console.print(table)
+    if "classes" in result:
+        made = result["classes"]
+        console.print(
+            f"\n{made['objects']} of all classes, {made['empty']} empty, {made['watertight']} closed when clean"
+        )
     if "generation" not in result:
         return
     made = result["generation"]

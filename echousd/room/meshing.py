@@ -14,7 +14,7 @@ from echomodel.data.tsdf import mesh_from_tsdf
 SMALLEST = 0.004  # solids below this share of the largest one are noise
 PASS_BAND, SHRINK, SWELL = 6, 0.5, -0.53  # Taubin (1995): rounds, lambda, mu; low frequencies such as thin legs stay
 FACES = 5000
-NOISY = 200_000  # faces of a raw mesh that is noise more than shape: one try is enough
+FINEST, COARSENINGS = 1 / 4000, 16  # first tolerance in diagonals of the mesh; it grows to a twentieth
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,29 +79,37 @@ def taubin(mesh: trimesh.Trimesh, rounds: int = PASS_BAND) -> np.ndarray:
 
 
 def decimate(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """At most `faces` triangles by quadric error; tries other settings until a closed mesh stays closed."""
+    """About `faces` triangles at most, closed where the mesh is: by quadric error, else by simplifying a manifold."""
     if len(mesh.faces) <= faces:
         return mesh
     import fast_simplification
 
     points, triangles = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
-    tried: list[trimesh.Trimesh] = []
-    for aggression in (3, 5, 4, 6) if len(triangles) <= NOISY else (6,):
-        p, t = fast_simplification.simplify(points, triangles, target_count=faces, agg=aggression)
-        reduced = trimesh.Trimesh(p, t, process=False)
-        reduced.merge_vertices()
-        reduced.update_faces(reduced.nondegenerate_faces() & reduced.unique_faces())
-        reduced.remove_unreferenced_vertices()
-        tried.append(reduced)
-        if reduced.is_watertight and reduced.is_winding_consistent and len(reduced.faces) <= 1.05 * faces:
-            return reduced
-    return min(tried, key=lambda m: (not m.is_winding_consistent, _open_edges(m)))
+    p, t = fast_simplification.simplify(points, triangles, target_count=faces, agg=3)
+    reduced = trimesh.Trimesh(p, t, process=False)
+    reduced.merge_vertices()
+    reduced.update_faces(reduced.nondegenerate_faces() & reduced.unique_faces())
+    reduced.remove_unreferenced_vertices()
+    if reduced.is_watertight and reduced.is_winding_consistent and len(reduced.faces) <= 1.05 * faces:
+        return reduced
+    return _manifold(points, triangles, faces) or reduced
 
 
-def _open_edges(mesh: trimesh.Trimesh) -> int:
-    """Edges that do not belong to exactly two faces."""
-    _, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-    return int((count != 2).sum())
+def _manifold(points: np.ndarray, triangles: np.ndarray, faces: int) -> trimesh.Trimesh | None:
+    """Simplified with ever larger tolerance; never opens a mesh. None where the mesh was not closed to begin with."""
+    from manifold3d import Error, Manifold, Mesh
+
+    solid = Manifold(Mesh(points, triangles.astype(np.uint32)))
+    if solid.status() != Error.NoError or solid.is_empty():
+        return None
+    tolerance = FINEST * float(np.linalg.norm(np.ptp(points, axis=0)))
+    for _ in range(COARSENINGS):
+        solid = solid.simplify(tolerance)
+        if solid.num_tri() <= faces:
+            break
+        tolerance *= 1.4
+    out = solid.to_mesh()
+    return trimesh.Trimesh(out.vert_properties[:, :3], out.tri_verts, process=False)
 
 
 def fit(mesh: trimesh.Trimesh, size: np.ndarray) -> trimesh.Trimesh:

@@ -12,6 +12,7 @@ import torch
 import trimesh
 
 from echomodel.boxes import Boxes
+from echomodel.data.furniture import sample_size
 from echomodel.data.rooms import generate_rooms
 from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.graph import GraphBatch
@@ -85,6 +86,31 @@ def evaluate_shapes(
     if settings.rooms:
         result["generation"], meshes = _generation(model, shapes, settings, told)
     return result, meshes
+
+
+def class_shapes(
+    model: EchoModel, count: int, seed: int = 0, progress: Callable[[str, int, int], None] | None = None
+) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
+    """Generate `count` objects of every class, each alone in its scene: (64, 64, 64) grids and (3,) sizes in metres.
+
+    Arguments:
+        model: whose shape branch is sampled with its defaults.
+        count: objects per class.
+        seed: seed of the sizes, which are drawn as the furniture's are, and of the sampling.
+        progress: called with (what, classes done, all).
+    """
+    words = [category.name for category in vocabulary().categories]
+    rng, generator = np.random.default_rng([seed, 2]), torch.Generator().manual_seed(seed)
+    found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for number, name in enumerate(words):
+        sizes = np.stack([sample_size(name, rng) for _ in range(count)])
+        graph = GraphBatch.pack([GraphBatch.single([number])] * count)
+        boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))
+        grids = model.sample_shapes(graph, boxes, generator=generator).float().cpu().numpy()
+        found[name] = list(zip(grids, sizes, strict=True))
+        if progress:
+            progress("classes", number + 1, len(words))
+    return found
 
 
 @torch.no_grad()

@@ -85,7 +85,8 @@ def test_shapes_are_scored(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("echomodel.data.shapeset.HELD_OUT_EVERY", 1)
     shapes = build_shapes(tmp_path / "shapes", 1, 3)
     torch.manual_seed(0)
-    raw = {"latent": {"width": 8}, "shape": {"width": 16, "layers": 1, "heads": 2, "echo_width": 16}}
+    shape = {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "candidates": 1, "steps": 2}
+    raw = {"latent": {"width": 8}, "shape": shape}
     statistics = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
     model = CompactModel(from_dict(CompactConfig, raw), statistics, ("latent", "autoencoder", "shape")).eval()
     model.autoencoder.initialise(torch.from_numpy(shapes.tsdf(range(0, 46, 5))))
@@ -98,6 +99,11 @@ def test_shapes_are_scored(tmp_path, monkeypatch, capsys):
     assert result["reconstruction"]["all"]["f_score"] > 0.7  # the PCA alone, before any training
     assert result["generation"]["objects"] > 1
     assert 0 <= result["generation"]["watertight"] <= 1
+    assert run([*arguments, "--rooms", "0", "--per-class", "1"]) == 0
+    classes = json.loads(capsys.readouterr().out)["classes"]
+    assert classes["objects"] == 46
+    assert classes["watertight"] + classes["empty"] == 46
+    assert Image.open(tmp_path / "sheet.png").size[1] == 46 * 120
     assert run([*arguments, "--meshes", str(tmp_path)]) == 2
     assert "name one set" in capsys.readouterr().err
     save_weights(tmp_path / "model.safetensors", model, ("latent", "autoencoder"))
