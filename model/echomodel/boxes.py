@@ -11,6 +11,8 @@ from torch import Tensor
 
 from echomodel.roomboxes import RoomBoxes
 
+LARGEST = 10.0  # log metres, far beyond any furniture
+
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
@@ -89,7 +91,8 @@ class Boxes:
         """The inverse of `encode`, differentiable; the (sin, cos) pair may have any length, yaw = atan2(sin, cos)."""
         low, span = statistics.bounds(vectors)
         plain = (vectors[:, :6] + 1) / 2 * span + low
-        size = plain[:, :3].exp() if statistics.log_size else plain[:, :3]
+        # a guess of the clean box from pure noise lies anywhere: its exponential must stay finite, gradients too
+        size = plain[:, :3].clamp(-LARGEST, LARGEST).exp() if statistics.log_size else plain[:, :3]
         return cls(size, plain[:, 3:], torch.atan2(vectors[:, 6], vectors[:, 7]))
 
 

@@ -177,15 +177,31 @@ def convert(
     if classes is not None and len(classes) != count:
         raise CheckpointError(f"{len(classes)} class names for a model of {count} classes")
     model = build(config, tensors, str(source))
+    write_released(target, model, config, names, statistics)
+    return config
+
+
+def write_released(
+    target: str | os.PathLike[str],
+    model: nn.Module,
+    config: ReleasedConfig,
+    classes: Sequence[str] | None,
+    statistics: BoxStatistics | None,
+) -> None:
+    """Write a model's tensors with config, vocabulary and box statistics inside; the file appears whole or not at all.
+
+    Arguments:
+        target: the file. model: what `config` describes. classes: names by id. statistics: box normalisation.
+    """
     metadata = {
         "format": FORMAT,
         "config": json.dumps(config.to_json()),
         "vocabulary": json.dumps(
-            {"classes": names, "predicates": [p.name for p in vocabulary().predicates]} if config.encoder else None
+            {"classes": classes, "predicates": [p.name for p in vocabulary().predicates]} if config.encoder else None
         ),
         "box_statistics": json.dumps(statistics.to_json() if statistics else None),
     }
-    state = {key: value.clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
+    state = {key: value.detach().clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
@@ -194,7 +210,15 @@ def convert(
         beside.replace(target)
     finally:
         beside.unlink(missing_ok=True)
-    return config
+
+
+def is_released(path: str | os.PathLike[str]) -> bool:
+    """Whether a file says that it holds a converted model; False for anything else, unreadable files included."""
+    try:
+        with safe_open(path, framework="pt") as file:
+            return (file.metadata() or {}).get("format") == FORMAT
+    except (OSError, SafetensorError):
+        return False
 
 
 def load_released(path: str | os.PathLike[str]) -> nn.Module:

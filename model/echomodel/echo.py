@@ -74,6 +74,16 @@ class EchoModel:
         return cls(*load_weights(files, device), half_decode=half_decode)
 
     @property
+    def preset(self) -> str:
+        """`compact`: how this model's preset is called."""
+        return "compact"
+
+    @property
+    def has_shapes(self) -> bool:
+        """Whether there are a shape branch and its autoencoder."""
+        return {"autoencoder", "shape"} <= set(self.model.parts)
+
+    @property
     def config(self) -> CompactConfig:
         """Sizes, objectives and default steps."""
         return self.model.config
@@ -335,7 +345,7 @@ def pack_linear_maps(net: nn.Module) -> None:
     """Let every linear map inside multiply with packed weights; its parameters stay, for looking at and saving."""
     for module in net.modules():
         if isinstance(module, nn.Linear):
-            module.forward = PackedLinear(module.weight, module.bias)  # type: ignore[method-assign]
+            module.forward = PackedLinear(module.weight, module.bias)  # type: ignore[method-assign,assignment]
 
 
 def _repeated(values: Tensor | None, count: int) -> Tensor | None:

@@ -92,6 +92,35 @@ class ClipTextEncoder:
             ) from None
 
 
+class RandomTextEncoder:
+    """A seeded random vector per text: tells texts apart and knows nothing of their meaning; needs no weights.
+
+    Arguments:
+        width: length of the vectors.
+    """
+
+    def __init__(self, width: int = 512) -> None:
+        self._width = width
+
+    @property
+    def name(self) -> str:
+        """Kind and width."""
+        return f"random-{self._width}"
+
+    @property
+    def width(self) -> int:
+        """Length of the vectors."""
+        return self._width
+
+    def __call__(self, texts: Sequence[str]) -> Tensor:
+        """n texts -> (n, width) float32, each of about unit length."""
+        if not texts:
+            return torch.zeros(0, self.width)
+        seeds = [int.from_bytes(hashlib.sha256(text.encode()).digest()[:7], "big") for text in texts]
+        drawn = [torch.randn(self.width, generator=torch.Generator().manual_seed(seed)) for seed in seeds]
+        return torch.stack(drawn) * self.width**-0.5
+
+
 class CachedTextEncoder:
     """Another encoder with its results kept in one safetensors file per encoder name.
 

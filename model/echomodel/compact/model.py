@@ -57,6 +57,14 @@ class CompactModel(nn.Module):
         """State of one part, keys with the part's name in front."""
         return {f"{part}.{key}": value for key, value in getattr(self, part).state_dict().items()}
 
+    def part_parameters(self, part: str) -> list[nn.Parameter]:
+        """Parameters of one part."""
+        return list(getattr(self, part).parameters())
+
+    def write(self, path: Path, parts: Sequence[str]) -> None:
+        """Write parts to a weights file, see `save_weights`."""
+        save_weights(path, self, parts)
+
 
 def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half: bool = True) -> None:
     """Write parts of a model with everything needed to use them; `half` stores floats as float16."""

@@ -161,13 +161,59 @@ def released(classes: int = 14) -> ReleasedConfig:
     return ReleasedConfig(encoder=EncoderConfig(classes=classes))
 
 
-def paper(classes: int = 14) -> ReleasedConfig:
-    """The paper's wiring at the paper's sizes: latents reach both denoisers, edges carry text features."""
-    encoder = EncoderConfig(classes=classes, separated=False)
-    text = encoder.text
+@dataclass(frozen=True)
+class PaperSizes:
+    """Sizes and Table 4 switches of the `paper` preset; the defaults are the paper's.
+
+    Arguments:
+        text, learned, flag, hidden, layers: as in `EncoderConfig`, for all graph convolutions.
+        context, code, heads: as in `UNetConfig`, for both branches.
+        layout_width, layout_mult, shape_width, shape_mult, blocks: of the two denoisers.
+        grid: voxels along an axis of the shape latents; the autoencoder's resolution is 4 times that.
+        vq_channels, vq_codes: of the autoencoder.
+        time_in_echo, echo, conditioning: of the shape branch (Table 4).
+    """
+
+    text: int = 512
+    learned: int = 128
+    flag: int = 64
+    hidden: int = 256
+    layers: int = 5
+    context: int = 1280
+    code: int = 64
+    heads: int = 8
+    layout_width: int = 512
+    layout_mult: tuple[int, ...] = (1, 1, 1, 1)
+    shape_width: int = 224
+    shape_mult: tuple[int, ...] = (1, 2, 3)
+    blocks: int = 2
+    grid: int = 16
+    vq_channels: int = 64
+    vq_codes: int = 8192
+    time_in_echo: bool = True
+    echo: bool = True
+    conditioning: str = "crossattn"
+
+
+def paper(classes: int = 14, sizes: PaperSizes | None = None) -> ReleasedConfig:
+    """The paper's wiring: latents reach both denoisers, edges carry text features; at the paper's sizes or others."""
+    s = sizes or PaperSizes()
+    encoder = EncoderConfig(
+        classes=classes, text=s.text, learned=s.learned, flag=s.flag, hidden=s.hidden, layers=s.layers, separated=False
+    )
+    common: dict[str, Any] = {
+        "edge_features": s.text, "predicate": s.learned, "hidden": s.hidden, "layers": s.layers, "code": s.code,
+        "heads": s.heads, "context": s.context, "blocks": s.blocks, "grid": s.grid,
+    }  # fmt: skip
+    # the condition of the shapes is as wide as what reaches the U-Net where no echo stands between them
+    volume = s.conditioning == "concat" and not s.echo
     return ReleasedConfig(
         preset="paper",
         encoder=encoder,
-        layout=UNetConfig(objects=2 * encoder.node, edge_features=text),
-        shape=shape_unet(edge_features=text),
-    )
+        layout=UNetConfig(objects=2 * encoder.node, width=s.layout_width, mult=s.layout_mult, **common),
+        shape=shape_unet(
+            objects=s.grid**3 if volume else s.context, width=s.shape_width, mult=s.shape_mult, echo=s.echo,
+            time_in_echo=s.time_in_echo, conditioning=s.conditioning, **common,
+        ),
+        vqvae=VQConfig(channels=s.vq_channels, codes=s.vq_codes, resolution=4 * s.grid),
+    )  # fmt: skip

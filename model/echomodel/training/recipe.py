@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Literal
 
 from echomodel.config import CompactConfig, from_dict, with_settings
+from echomodel.released.config import PaperSizes
 
-Stage = Literal["vqvae", "layout", "shape", "joint"]
+Stage = Literal["vqvae", "layout", "shape", "joint", "paper_vqvae", "paper"]
 
 
 @dataclass(frozen=True)
@@ -51,18 +52,21 @@ class Recipe:
     """One training run.
 
     Arguments:
-        stage: `vqvae` (autoencoder), `layout`, `shape` or `joint` (both branches on one latent graph).
+        stage: `vqvae` (autoencoder), `layout`, `shape` or `joint` (both branches on one latent graph); `paper_vqvae`
+            and `paper` are the autoencoder and the joint stage of the `paper` preset.
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.
         data: folder that `echousd data build` made; its held-out part is for validation.
         start: weights files to start from.
         frozen: parts that the stage would train but that stay as they are.
         nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
+        scenes, text: `paper` alone: scenes per batch, and where text features come from: `clip` (downloaded once), a
+            weights file of CLIP's, or `random` (vectors that only tell texts apart).
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes.
-        model: sizes of the model.
+        model: sizes of the compact model. paper: sizes of the `paper` preset.
         optimizer: how to step.
     """
 
@@ -74,6 +78,8 @@ class Recipe:
     frozen: tuple[str, ...] = ()
     nodes: int = 512
     shapes_per_batch: int = 32
+    scenes: int = 64
+    text: str = "clip"
     relation_weight: float = 0.5
     validate_every: int = 2000
     save_every: int = 1000
@@ -81,6 +87,7 @@ class Recipe:
     precision: Literal["float32", "bfloat16"] = "float32"
     threads: int = 0
     model: CompactConfig = field(default_factory=CompactConfig)
+    paper: PaperSizes = field(default_factory=PaperSizes)
     optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
 
 

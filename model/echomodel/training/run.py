@@ -15,6 +15,7 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.training.autoencoder_stage import AutoencoderStage
 from echomodel.training.joint_stage import JointStage
 from echomodel.training.layout_stage import LayoutStage
+from echomodel.training.paper_stage import PaperStage, box_bounds, paper_model, text_encoder
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 from echomodel.training.shape_stage import ShapeStage
@@ -41,6 +42,8 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     if int(os.environ.get("WORLD_SIZE", 1)) > 1 and not torch.distributed.is_initialized():
         torch.distributed.init_process_group("nccl" if torch.cuda.is_available() else "gloo")
     torch.manual_seed(recipe.seed)
+    if recipe.stage in ("paper", "paper_vqvae"):
+        return _open_paper(recipe, folder, resume, report)
     model = CompactModel(recipe.model, _NO_BOXES, _PARTS[recipe.stage])
     started: tuple[str, ...] = ()
     components = None
@@ -53,6 +56,21 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
         if "layout" in given.parts:
             model.statistics = given.statistics
     stage = _stage(recipe, model, started, resume, components)
+    return Trainer(recipe, model, stage, folder, resume=resume, report=report)
+
+
+def _open_paper(recipe: Recipe, folder: Path, resume: bool, report: Report | None) -> Trainer:
+    autoencoder = recipe.stage == "paper_vqvae"
+    if not autoencoder and not recipe.start and not resume:
+        raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
+    rooms, shapes = RoomSet(_folder(recipe, "rooms")), ShapeSet(_folder(recipe, "shapes"))
+    model = paper_model(recipe.paper, recipe.start)
+    if model.statistics is None:
+        model.statistics = box_bounds(rooms)
+    text = text_encoder(recipe.text, recipe.paper.text)
+    stage = PaperStage(
+        rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder
+    )
     return Trainer(recipe, model, stage, folder, resume=resume, report=report)
 
 

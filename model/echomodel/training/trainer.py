@@ -8,19 +8,21 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
-from echomodel.compact.model import CompactModel, save_weights
+from echomodel.compact.model import CompactModel
 from echomodel.config import to_json
 from echomodel.training.logs import RunLog, plot_log
+from echomodel.training.paper_stage import PaperModel
 from echomodel.training.recipe import Recipe
 
 Report = Callable[[int, dict[str, float]], None]
+Trainable = CompactModel | PaperModel
 
 
 class TrainingStage(Protocol):
@@ -32,15 +34,15 @@ class TrainingStage(Protocol):
     @property
     def saved(self) -> tuple[str, ...]: ...
 
-    def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]: ...
+    def loss(self, model: Any, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]: ...
 
-    def validate(self, model: CompactModel) -> dict[str, float]: ...
+    def validate(self, model: Any) -> dict[str, float]: ...
 
 
 class _Loss(nn.Module):
     """The loss as a module's forward pass, which is what DistributedDataParallel wraps."""
 
-    def __init__(self, model: CompactModel, stage: TrainingStage) -> None:
+    def __init__(self, model: Trainable, stage: TrainingStage) -> None:
         super().__init__()
         self.model, self._stage = model, stage
 
@@ -66,7 +68,7 @@ class Trainer:
     def __init__(
         self,
         recipe: Recipe,
-        model: CompactModel,
+        model: Trainable,
         stage: TrainingStage,
         folder: Path,
         *,
@@ -77,7 +79,8 @@ class Trainer:
         self.report = report or (lambda step, values: None)
         self.rank, self.world = int(os.environ.get("RANK", 0)), int(os.environ.get("WORLD_SIZE", 1))
         for name in model.parts:
-            getattr(model, name).requires_grad_(name in stage.trained)
+            for parameter in model.part_parameters(name):
+                parameter.requires_grad_(name in stage.trained)
         self.average = copy.deepcopy(model).requires_grad_(False).eval()
         self.trained = {name: p for name, p in model.named_parameters() if p.requires_grad}
         decayed = [p for p in self.trained.values() if p.ndim > 1]
@@ -163,7 +166,7 @@ class Trainer:
         copies = {key: value.detach().contiguous().clone() for key, value in tensors.items()}
         save_file(copies, partial, metadata=metadata)
         partial.replace(self.folder / "checkpoint.safetensors")
-        save_weights(self.folder / "weights.safetensors", self.average, self.stage.saved)
+        self.average.write(self.folder / "weights.safetensors", self.stage.saved)
 
     def _load(self) -> None:
         path = self.folder / "checkpoint.safetensors"
@@ -184,9 +187,10 @@ class Trainer:
         with torch.no_grad():
             for name, parameter in self.trained.items():
                 averaged[name].copy_(tensors[f"average.{name}"])
-                self.optimizer.state[parameter] = {
-                    key: tensors[f"optimizer.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
-                }
+                if f"optimizer.step.{name}" in tensors:  # published networks have weights that nothing reads
+                    self.optimizer.state[parameter] = {
+                        key: tensors[f"optimizer.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
+                    }
         self.step = int(metadata["step"])
 
 

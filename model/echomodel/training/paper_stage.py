@@ -1,0 +1,223 @@
+"""The `paper` stages: the paper's own sizes and wiring trained on our rooms (EchoScene 3.5 and its supplement)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.checkpoint import load_released, write_released
+from echomodel.data.roomset import RoomSet
+from echomodel.data.shapeset import ShapeSet
+from echomodel.released.config import PaperSizes, paper
+from echomodel.released.editing import pack_changes, pack_scenes, pseudo_graph
+from echomodel.released.encoder import SceneGraphTensors
+from echomodel.released.model import GraphChange, ReleasedModel
+from echomodel.released.scene import published_scene
+from echomodel.roomboxes import RoomBoxes
+from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
+from echomodel.training.shapes import read
+from echomodel.vocabulary import vocabulary
+
+DISTANCE = 4 / 64  # our grids hold distances over 4 voxels, the published ones in sides of the grid
+SCENE_BOX = (-1.0,) * 6  # what the published loader gives the `_scene_` node, with an angle of -1
+AUTOENCODER = "vqvae"
+
+
+class PaperModel(ReleasedModel):
+    """The `paper` preset as the trainer takes it: `network` is everything but the autoencoder."""
+
+    parts = ("network", AUTOENCODER)
+
+    def part_parameters(self, part: str) -> list[torch.nn.Parameter]:
+        """Parameters of a part."""
+        inside = {id(p) for p in self.vqvae.parameters()}
+        return [p for p in self.parameters() if (id(p) in inside) == (part == AUTOENCODER)]
+
+    def write(self, path: Path, parts: Sequence[str]) -> None:
+        """Write all parts, whatever `parts` says, in the form of `echousd convert`."""
+        write_released(path, self, self.config, self.classes, self.statistics)
+
+
+class PaperStage:
+    """Both branches at once on one latent graph, or (`autoencoder`) the VQ-VAE that the shape branch works on.
+
+    The inverse strategy: a pseudo graph goes in, the true scene comes out. A batch of scenes feeds the layout branch
+    and as many of its first scenes as fit the node budget the shape branch.
+
+    Arguments:
+        rooms: the room set, labelled by the published rules. shapes: the parametric shape set that it names.
+        text: encoder of labels and relations.
+        scenes: scenes per batch.
+        budget: nodes in the shape branch's part of a batch, and grids in a batch of the autoencoder.
+        autoencoder: train the VQ-VAE instead of the branches.
+    """
+
+    def __init__(
+        self,
+        rooms: RoomSet,
+        shapes: ShapeSet,
+        text: TextEncoder,
+        *,
+        scenes: int,
+        budget: int,
+        autoencoder: bool,
+    ) -> None:
+        self.rooms, self.shapes, self.text = rooms, shapes, text
+        self.scenes, self.budget = scenes, budget
+        self.trained = self.saved = (AUTOENCODER,) if autoencoder else ("network",)
+        held = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
+        self.numbers = {False: (~held).nonzero()[0], True: held.nonzero()[0]}
+        used = ~shapes.held_out if not shapes.held_out.all() else shapes.held_out
+        self.used = used.nonzero()[0]
+
+    def loss(self, model: PaperModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
+        """Loss of one random batch."""
+        if self.trained == (AUTOENCODER,):
+            picked = self.used[torch.randint(len(self.used), (self.budget,), generator=generator).numpy()]
+            loss = self._autoencoding(model, picked)
+            return loss, {"autoencoder": loss}
+        rooms = self._draw(generator, held=False)
+        losses = self._losses(model, rooms, generator)
+        return losses["loss"], {name: losses[name] for name in ("layout", "shape")}
+
+    @torch.no_grad()
+    def validate(self, model: PaperModel) -> dict[str, float]:
+        """The same losses on held-out rooms, the same draws every time."""
+        generator = torch.Generator().manual_seed(0)
+        if self.trained == (AUTOENCODER,):
+            held = self.shapes.held_out.nonzero()[0]
+            picked = (held if len(held) else self.used)[: self.budget]
+            return {"held/autoencoder": float(self._autoencoding(model, picked))}
+        losses = self._losses(model, self._draw(generator, held=True), generator)
+        return {f"held/{name}": float(losses[name]) for name in ("layout", "shape")}
+
+    def _autoencoding(self, model: PaperModel, numbers: np.ndarray) -> Tensor:
+        return model.vqvae.loss(published_grids(read(self.shapes, numbers), model.vqvae.config.resolution))
+
+    def _draw(self, generator: torch.Generator, *, held: bool) -> list[RoomBoxes]:
+        pool = self.numbers[held]
+        picked = pool[torch.randint(len(pool), (self.scenes,), generator=generator).numpy()]
+        return [self.rooms.room(int(number), rules="sgfront") for number in picked]
+
+    def _losses(self, model: PaperModel, rooms: list[RoomBoxes], generator: torch.Generator) -> dict[str, Tensor]:
+        graphs = [self.scene(room) for room in rooms]
+        changes = [self._pseudo(graph, room, generator) for graph, room in zip(graphs, rooms, strict=True)]
+        whole, scene = pack_scenes(graphs)
+        assert model.statistics is not None
+        boxes = torch.cat([scene_boxes(room, model.statistics) for room in rooms])
+        latents = self._latents(model, rooms)
+        return model.training_losses(
+            whole, scene, boxes, latents, generator=generator, change=pack_changes(graphs, changes), budget=self.budget
+        )
+
+    def scene(self, room: RoomBoxes) -> SceneGraphTensors:
+        """A room as a published graph with text features on nodes and edges."""
+        classes = vocabulary().coarse_categories
+        triples = torch.as_tensor([] if room.relations is None else room.relations, dtype=torch.int64).reshape(-1, 3)
+        return published_scene(_labels(room), triples, classes=classes, text=self.text, edges=True)
+
+    def _pseudo(self, graph: SceneGraphTensors, room: RoomBoxes, generator: torch.Generator) -> GraphChange:
+        labels, words = [*_labels(room), "floor", "_scene_"], {p.id: p.sgfront for p in vocabulary().predicates}
+
+        def relation_text(subject: int, predicate: int, target: int) -> Tensor:
+            return self.text([edge_text(labels[subject], words[predicate], labels[target])])[0]
+
+        return pseudo_graph(graph, generator, relation_text)
+
+    @torch.no_grad()
+    def _latents(self, model: PaperModel, rooms: list[RoomBoxes]) -> Tensor:
+        """Latents of the nodes that the budget can reach; floor and scene nodes have those of an empty grid."""
+        grids: list[Tensor] = []
+        side = model.vqvae.config.resolution
+        for room in rooms:
+            if sum(len(part) for part in grids) >= self.budget:
+                break
+            empty = torch.zeros(2, 1, side, side, side)
+            own = [self.shapes.index_of(name) if name else -1 for name in room.models or ()]
+            known = torch.zeros(len(room), 1, side, side, side)
+            rows = [k for k, number in enumerate(own) if number >= 0]
+            if rows:
+                known[rows] = published_grids(read(self.shapes, np.array([own[k] for k in rows])), side)
+            grids += [known, empty]
+        encoder = model.vqvae.eval()
+        found = torch.cat([encoder.encode(part) for part in torch.cat(grids).split(8)])
+        missing = sum(len(room) + 2 for room in rooms) - len(found)
+        return torch.cat([found, found.new_zeros(max(missing, 0), *found.shape[1:])])
+
+
+def published_grids(grids: Tensor, side: int = 64) -> Tensor:
+    """Our grids (K, 64, 64, 64) in the published frame, whose +X is an object's front, and unit: (K, 1, R, R, R).
+
+    `side` is R, 64 or a part of it for a smaller autoencoder, whose voxels are means.
+    """
+    turned = (grids.flip(1).transpose(1, 3) * DISTANCE)[:, None].contiguous()
+    return turned if side == grids.shape[1] else torch.nn.functional.avg_pool3d(turned, grids.shape[1] // side)
+
+
+def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:
+    """Normalised (n + 2, 8) boxes of a room's objects, its floor and its `_scene_` node (SPEC: section 1.3)."""
+    objects = Boxes.from_room(room)
+    extent = torch.as_tensor(room.floor_polygon.max(0) - room.floor_polygon.min(0), dtype=torch.float32)
+    floor = Boxes(torch.stack([extent[0], torch.tensor(0.0), extent[1]])[None], torch.zeros(1, 3), torch.zeros(1))
+    angle = torch.tensor(-1.0)
+    scene = torch.cat([torch.tensor(SCENE_BOX), torch.stack([angle.sin(), angle.cos()])])
+    return torch.cat([Boxes.cat([objects, floor]).encode(statistics), scene[None]])
+
+
+def box_bounds(rooms: RoomSet, count: int = 2000) -> BoxStatistics:
+    """Lowest and highest sizes and positions of a set's first rooms, floors included, as the published bounds file."""
+    boxes = []
+    for number in range(min(count, len(rooms))):
+        room = rooms.room(number)
+        boxes.append(Boxes.from_room(room))
+        extent = room.floor_polygon.max(0) - room.floor_polygon.min(0)
+        size = torch.tensor([[float(extent[0]), 0.0, float(extent[1])]])
+        boxes.append(Boxes(size, torch.zeros(1, 3), torch.zeros(1)))
+    every = Boxes.cat(boxes)
+
+    def bound(values: Tensor) -> tuple[float, ...]:
+        return tuple(float(v) for v in values)
+
+    return BoxStatistics(
+        bound(every.size.amin(0)),
+        bound(every.size.amax(0)),
+        bound(every.position.amin(0)),
+        bound(every.position.amax(0)),
+    )
+
+
+def paper_model(sizes: PaperSizes, start: tuple[str, ...] = ()) -> PaperModel:
+    """The `paper` preset, with the autoencoder (or everything that fits) of earlier runs.
+
+    Raises:
+        ValueError: a file of `start` was trained with other sizes.
+    """
+    classes = vocabulary().coarse_categories
+    model = PaperModel(paper(len(classes), sizes), classes=classes)
+    for path in start:
+        given = load_released(path)
+        if getattr(given, "config", None) != model.config:
+            raise ValueError(f"{path}: was not trained with the sizes in the recipe's [paper]")
+        model.load_state_dict(given.state_dict())
+        model.statistics = getattr(given, "statistics", None)
+    return model
+
+
+def text_encoder(source: str, width: int) -> TextEncoder:
+    """The encoder that a recipe's `text` names: `clip`, a CLIP weights file, or `random`; cached on disk."""
+    if source == "random":
+        return CachedTextEncoder(RandomTextEncoder(width))
+    encoder = CachedTextEncoder(ClipTextEncoder(None if source == "clip" else source))
+    if encoder.width != width:
+        raise ValueError(f"recipe field 'paper.text' is {width}, CLIP's features have {encoder.width} numbers")
+    return encoder
+
+
+def _labels(room: RoomBoxes) -> list[str]:
+    words = vocabulary()
+    return [words.categories[words.category_id(name)].coarse for name in room.categories]
