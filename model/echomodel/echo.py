@@ -292,13 +292,14 @@ class EchoModel:
             raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
         known, mask = known.to(self.device), mask.to(self.device)
         if isinstance(known, Boxes):
-            known[mask].check()
             one = known.size.new_ones(())
-            return Boxes(
+            filled = Boxes(
                 torch.where(mask[:, None], known.size, one),
                 torch.where(mask[:, None], known.position, 0 * one),
                 torch.where(mask, known.yaw, 0 * one),
-            ), mask
+            )
+            filled.check()
+            return filled, mask
         bad = ~torch.isfinite(known.flatten(1)).all(1) & mask
         if bool(bad.any()):
             raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
