@@ -1,4 +1,4 @@
-"""Quality against cost of sampling steps, per sampler: python benchmarks/step_sweep.py ROOMS.json [--shapes]."""
+"""Quality against cost of sampling steps, per sampler: python benchmarks/step_sweep.py ROOMS.json [--shapes SET]."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.compact.wholeness import wholeness
+from echomodel.data.shapeset import ShapeSet
+from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echomodel.metrics.pointsets import chamfer_matrix
 from echomodel.metrics.room_figures import with_known_words
+from echomodel.metrics.shapes import surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS
 
 RULES = "sgfront"
+POINTS = 1024
 
 
 def layout_row(model: EchoModel, graph: GraphBatch, truth: Boxes, steps: int, sampler: str, pull: float) -> str:
@@ -38,15 +44,36 @@ def layout_row(model: EchoModel, graph: GraphBatch, truth: Boxes, steps: int, sa
     )
 
 
-def shape_row(model: EchoModel, graph: GraphBatch, boxes: Boxes, steps: int, sampler: str, fine: torch.Tensor) -> str:
-    """Distance to the same noise sampled in very many steps, seconds per object."""
+def shape_row(
+    model: EchoModel, graph: GraphBatch, boxes: Boxes, references: dict[int, torch.Tensor], steps: int, sampler: str
+) -> str:
+    """Distance to the nearest true shape of the class, wholeness, seconds per object; one draw of each object."""
     started = time.perf_counter()
-    grids = model.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(0), steps=steps, sampler=sampler)
+    generator = torch.Generator().manual_seed(0)
+    grids = model.sample_shapes(graph, boxes, generator=generator, steps=steps, sampler=sampler, candidates=1)
     seconds = (time.perf_counter() - started) / graph.num_nodes
-    inside, other = grids < 0, fine < 0
-    union = (inside | other).flatten(1).sum(1).clamp_min(1)
-    iou = ((inside & other).flatten(1).sum(1) / union).mean()
-    return f"{sampler:10} {steps:5d}  IoU with 200 Euler steps {float(iou):.3f}  {seconds:6.2f} s per object"
+    nearest = []
+    for grid, category in zip(grids.numpy(), graph.category.tolist(), strict=True):
+        try:
+            points = torch.from_numpy(surface_points(mesh_from_tsdf(grid), POINTS))[None]
+        except ValueError:
+            continue
+        nearest.append(float(chamfer_matrix(points, references[category]).min()))
+    whole = float(wholeness(grids).mean())
+    return (
+        f"{sampler:10} {steps:5d}  nearest true shape {np.mean(nearest):.5f}  wholeness {whole:.3f}"
+        f"  {seconds * 1000:7.1f} ms per object"
+    )
+
+
+def references_of(shapes: ShapeSet, categories: list[int], count: int = 24) -> dict[int, torch.Tensor]:
+    """Surface points (count, POINTS, 3) of true shapes per class."""
+    rng, found = np.random.default_rng(0), {}
+    for category in sorted(set(categories)):
+        chosen = rng.permutation(np.flatnonzero(shapes.category == category))[:count]
+        clouds = [surface_points(mesh_from_tsdf(shapes[int(i)]), POINTS) for i in chosen]
+        found[category] = torch.from_numpy(np.stack(clouds))
+    return found
 
 
 def graphs_of(rooms: list[RoomBoxes]) -> tuple[GraphBatch, Boxes]:
@@ -63,21 +90,19 @@ def main() -> None:
     parser.add_argument("--steps", default="5,10,20,50,100,1000")
     parser.add_argument("--limit", type=int, default=60)
     parser.add_argument("--model", type=Path)
-    parser.add_argument("--shapes", action="store_true")
+    parser.add_argument("--shapes", type=Path, help="set of true shapes to compare with")
     options = parser.parse_args()
     steps = [int(word) for word in options.steps.split(",")]
     model = EchoModel.load(options.model)
     rooms = [room for room in with_known_words(read_rooms(options.rooms)) if len(room) > 1][: options.limit]
-    graph, truth = graphs_of(rooms[:3] if options.shapes else rooms)
-    if options.shapes:
-        generator = torch.Generator().manual_seed(0)
-        fine = model.sample_shapes(graph, truth, generator=generator, steps=200, sampler="euler")
+    graph, truth = graphs_of(rooms)
+    references = references_of(ShapeSet(options.shapes), graph.category.tolist()) if options.shapes else {}
     for sampler in SAMPLERS:
         for count in steps:
             if sampler == "ddim":  # the same as Euler for rectified flow
                 continue
             if options.shapes:
-                print(shape_row(model, graph, truth, count, sampler, fine), flush=True)
+                print(shape_row(model, graph, truth, references, count, sampler), flush=True)
             else:
                 for pull in (0.0, 0.1):
                     print(layout_row(model, graph, truth, count, sampler, pull), flush=True)

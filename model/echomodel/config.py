@@ -65,7 +65,7 @@ class AutoencoderConfig:
     patch: int = 4
     channels: int = 6
     width: int = 64
-    blocks: int = 1
+    blocks: int = 2
     levels: int = 0
 
 

@@ -26,9 +26,9 @@ class AutoencoderStage:
     Arguments:
         shapes: shape set; its held-out part is for validation.
         batch: grids per batch, per process.
-        components: a shape branch whose principal components the decoder also learns to read: half of each batch is
-            whole latents projected on them, which is all that a denoiser working in them can say. The decoder puts
-            back what the projection blurs (thin legs, edges).
+        components: a shape branch whose principal components the decoder learns to read: a batch then is `batch` whole
+            latents projected on them, which is all that a denoiser working in them can say, and half as many latents
+            as they are. The decoder puts back what the projection blurs (thin legs, edges).
     """
 
     trained = saved = ("autoencoder",)
@@ -45,13 +45,13 @@ class AutoencoderStage:
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
-        grids = draw_grids(self.shapes, self.used, self.batch, generator)
+        grids = draw_grids(self.shapes, self.used, self.batch // (2 if self.components else 1), generator)
         latent = model.autoencoder.encode(grids)
         noise = NOISE * torch.randn(latent.shape, generator=generator)
         error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
         if self.components is None:
             return error, {"reconstruction": error}
-        picked = torch.randint(len(self.used), (max(self.batch // 2, 1),), generator=generator)
+        picked = torch.randint(len(self.used), (self.batch,), generator=generator)
         whole = read(self.shapes, self.used[picked.numpy()])
         blurred = self.projected(model.autoencoder.encode(whole), generator)
         projected = reconstruction_loss(whole, model.autoencoder.decode(blurred).float())
