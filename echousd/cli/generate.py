@@ -40,8 +40,15 @@ def register(app: typer.Typer) -> None:
             ),
         ],
         seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
-        preset: Annotated[str, typer.Option(help="Which model: compact.")] = "compact",
-        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+        preset: Annotated[
+            str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
+        ] = None,
+        weights: Annotated[
+            Path | None,
+            typer.Option(
+                "--weights", "--model", help="Weights file or folder, from convert or train; default: those that ship."
+            ),
+        ] = None,
         shapes: Annotated[str, typer.Option(help="generate: shapes from the model; boxes: plain boxes.")] = "generate",
         samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
@@ -66,18 +73,15 @@ def register(app: typer.Typer) -> None:
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
         with progress_bar() as listen:
-            from echousd.room.pipeline import PRESETS
             from echousd.room.pipeline import generate as make
             from echousd.room.room import RoomOptions
             from echousd.room.save import save_flat, save_layers, write_preview
 
-            if preset not in PRESETS:
-                raise ValueError(f"preset is {preset!r}, allowed: {', '.join(PRESETS)}")
             options = RoomOptions(up_axis.upper(), walls, atlas)
             imported = time.perf_counter() - started
             room = make(
-                graph, seed=seed, shapes=shapes, model=weights, repair=repair, samples=samples, steps=steps,
-                faces=faces, options=options, progress=listen,
+                graph, seed=seed, shapes=shapes, model=weights, preset=preset, repair=repair, samples=samples,
+                steps=steps, faces=faces, options=options, progress=listen,
             )  # fmt: skip
             spent = {"imports": imported, **room.timings}
             listen("write", 0, 1)

@@ -16,7 +16,8 @@ from echousd.room.room import Provenance, Room, RoomOptions
 from echousd.room.styles import free_name
 
 if TYPE_CHECKING:
-    from echomodel.echo import EchoModel
+    from echomodel.echo import GraphEdit
+    from echousd.room.pipeline import Echo
 
 
 def edit(
@@ -25,7 +26,7 @@ def edit(
     *,
     seed: int = 0,
     shapes: str = "generate",
-    model: EchoModel | str | Path | None = None,
+    model: Echo | str | Path | None = None,
     repair: bool = True,
     steps: int | None = None,
     progress: pipeline.Progress | None = None,
@@ -49,18 +50,25 @@ def edit(
     with watch.stage("read"):
         saved = read_room(root)
     fresh, moving = touched(saved.graph, graph)
-    pinned = _pinned(graph, saved, fresh, moving)
+    echo, layouts, notes, grids = None, [], (), None
     if fresh or moving:
         with watch.stage("load"):
             echo = pipeline.load_model(model)
-        boxes = pipeline.sample_boxes(echo, pinned, seed=seed, number=0, steps=steps, watch=watch)
-        boxes, notes = pipeline.settled(pinned, boxes, repair, watch)
-    else:
-        echo, notes = None, ()
-        boxes = _boxes_of(pinned)
-    grids = None
+        change = graph_edit(saved.graph, graph)
+    for number, before in enumerate(saved.layouts):
+        pinned = _pinned(graph, saved.graph, before, fresh, moving)
+        if layouts:  # one furniture in all layouts
+            pinned = pipeline.with_sizes(pinned, layouts[0])
+        if echo is None:
+            layouts.append(_boxes_of(pinned))
+            continue
+        found = pipeline.sample_boxes(echo, pinned, seed=seed, number=number, steps=steps, change=change, watch=watch)
+        found, told = pipeline.settled(pinned, found, repair, watch)
+        layouts.append(found)
+        notes = told if number == 0 else notes
+    boxes = layouts[0]
     if fresh and shapes == "generate" and echo is not None:
-        grids = pipeline.sample_shapes(echo, graph, boxes, seed=seed, steps=steps, watch=watch)
+        grids = pipeline.sample_shapes(echo, graph, boxes, seed=seed, steps=steps, change=change, watch=watch)
     made = _without(graph, set(graph.names) - fresh)
     rows = torch.tensor([i for i, name in enumerate(graph.names) if name in fresh], dtype=torch.long)
     meshes, assets = dict(saved.meshes), dict(saved.assets)
@@ -77,9 +85,9 @@ def edit(
         boxes=boxes,
         meshes={name: meshes[name] for name in graph.names},
         assets=assets,
-        floor=pipeline.room_floor(graph, [boxes]),
+        floor=pipeline.room_floor(graph, layouts),
         verdicts=pipeline.judge(graph, boxes),
-        layouts=(boxes,),
+        layouts=tuple(layouts),
         notes=notes,
         provenance=_provenance(manifest, echo),
         options=RoomOptions(manifest["up_axis"], manifest.get("walls", False), manifest.get("atlas", False)),
@@ -101,13 +109,29 @@ def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
     return fresh, {name for name in moving - fresh if not after.node(name).locked}
 
 
-def _pinned(graph: SceneGraph, saved: SavedRoom, fresh: Iterable[str], moving: Iterable[str]) -> SceneGraph:
+def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
+    """The change as the model takes it: what was related among the objects that stay, and which are new.
+
+    An object of another category counts as new.
+    """
+    from echomodel.echo import GraphEdit
+
+    old = {node.name: node.category for node in before.nodes}
+    added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)
+    stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}
+    relations = tuple(r for r in before.relations if r.subject in stay and r.object in stay)
+    return GraphEdit(pipeline.graph_batch(after.replaced(relations=relations)).triplets, added)
+
+
+def _pinned(
+    graph: SceneGraph, old: SceneGraph, boxes: Boxes, fresh: Iterable[str], moving: Iterable[str]
+) -> SceneGraph:
     """The graph with the boxes of everything that stays written into its nodes."""
-    row = {name: i for i, name in enumerate(saved.graph.names)}
+    row = {name: i for i, name in enumerate(old.names)}
     nodes = []
     for node in graph.nodes:
         if node.name not in fresh:
-            size, position, yaw = (v[row[node.name]].tolist() for v in _arrays(saved.boxes))
+            size, position, yaw = (v[row[node.name]].tolist() for v in _arrays(boxes))
             fields: dict[str, Any] = {"size": node.size or tuple(size)}
             if node.name not in moving:
                 fields |= {"position": node.position or tuple(position), "yaw": yaw if node.yaw is None else node.yaw}

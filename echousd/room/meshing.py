@@ -44,7 +44,10 @@ def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
         raise ValueError(f"face budget is {faces}, need at least 100")
     mesh = mesh_from_tsdf(largest_solids(np.asarray(grid, np.float32)))
     mesh.vertices = taubin(mesh) * extent
-    mesh = fit(decimate(mesh, faces), extent)
+    mesh = decimate(mesh, faces)
+    if not len(mesh.faces):
+        raise ValueError(f"nothing is left of its noisy surface with {faces} faces")
+    mesh = fit(mesh, extent)
     return CleanMesh(mesh, bool(mesh.is_watertight))
 
 

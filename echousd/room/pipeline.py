@@ -24,11 +24,14 @@ from echousd.room.shell import box_corners, floor_polygon
 from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
 
 if TYPE_CHECKING:
-    from echomodel.echo import EchoModel
+    from echomodel.echo import EchoModel, GraphEdit
+    from echomodel.released.echo import ReleasedEcho
+
+    Echo = EchoModel | ReleasedEcho
 
 Progress = Callable[[str, int, int], None]
 SHAPES = ("generate", "boxes")
-PRESETS = ("compact",)
+PRESETS = ("compact", "paper", "released")
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
 
 
@@ -59,7 +62,8 @@ def generate(
     *,
     seed: int = 0,
     shapes: str = "generate",
-    model: EchoModel | str | Path | None = None,
+    model: Echo | str | Path | None = None,
+    preset: str | None = None,
     repair: bool = True,
     samples: int = 1,
     steps: int | None = None,
@@ -73,7 +77,9 @@ def generate(
         graph: the graph, or a file that holds one (stage, YAML, JSON).
         seed: of all randomness, 0 or more; equal arguments give equal rooms.
         shapes: `generate` meshes with the shape branch, or plain `boxes`.
-        model: a loaded model, a weights file, or None for the weights that ship with the package.
+        model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
+            the package.
+        preset: which kind of model it must be (`PRESETS`); None = any.
         repair: move and size the sampled boxes as little as possible until the graph is kept.
         samples: number of layouts of the same furniture.
         steps: sampling steps, None for the model's own.
@@ -91,6 +97,7 @@ def generate(
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
     if seed < 0:
         raise ValueError(f"seed is {seed}, allowed: 0 or more")
+    check_preset(model, preset)
     watch = Watch(progress)
     source = ""
     if not isinstance(graph, SceneGraph):
@@ -100,12 +107,12 @@ def generate(
         with watch.stage("read"):
             graph = load_graph(graph)
     with watch.stage("load"):
-        echo = load_model(model)
+        echo = load_model(model, preset)
         if shapes == "generate":
             require_shapes(echo)
     layouts = [sample_boxes(echo, graph, seed=seed, number=0, steps=steps, watch=watch)]
     layouts[0], notes = settled(graph, layouts[0], repair, watch)
-    sized = _with_sizes(graph, layouts[0])
+    sized = with_sizes(graph, layouts[0])
     for number in range(1, samples):
         found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, watch=watch)
         found = Boxes(layouts[0].size, found.position, found.yaw)
@@ -123,25 +130,52 @@ def generate(
         verdicts=judge(graph, boxes),
         layouts=tuple(layouts),
         notes=notes,
-        provenance=Provenance(seed, "compact", getattr(echo, "hash", ""), shapes, source),
+        provenance=Provenance(seed, preset_of(echo), getattr(echo, "hash", ""), shapes, source),
         options=options or RoomOptions(),
         timings=watch.seconds,
     )
 
 
-def load_model(model: EchoModel | str | Path | None) -> EchoModel:
-    """The model itself, or the one in a weights file (None: shipped); raises ValueError where there is none."""
+def load_model(model: Echo | str | Path | None, preset: str | None = None) -> Echo:
+    """The model itself, or the one in a weights file (None: shipped), of the kind that the file says it is.
+
+    Raises ValueError where there is none, or one of another preset than `preset`.
+    """
+    check_preset(model, preset)
+    from echomodel.checkpoint import is_released
+
     if model is not None and not isinstance(model, str | Path):
-        return model
-    from echomodel.echo import EchoModel
+        echo = model
+    elif model is not None and is_released(model):
+        from echomodel.released.echo import ReleasedEcho
 
-    return EchoModel.load(model)
+        echo = ReleasedEcho.load(model)
+    else:
+        from echomodel.echo import EchoModel
+
+        echo = EchoModel.load(model)
+    if preset not in (None, preset_of(echo)):
+        raise ValueError(f"{model}: holds a model of the preset {preset_of(echo)!r}, asked for: {preset!r}")
+    return echo
 
 
-def require_shapes(echo: EchoModel) -> None:
+def check_preset(model: Echo | str | Path | None, preset: str | None) -> None:
+    """Raises ValueError for an unknown preset, or one without weights of its own where none are given."""
+    if preset not in (None, *PRESETS):
+        raise ValueError(f"preset is {preset!r}, allowed: {', '.join(PRESETS)}")
+    if model is None and preset not in (None, "compact"):
+        how = "train it" if preset == "paper" else "convert a published checkpoint (echousd convert)"
+        raise ValueError(f"no weights ship for the preset {preset!r}: {how} and name the file (--weights FILE)")
+
+
+def preset_of(echo: Echo) -> str:
+    """Name of a model's preset."""
+    return getattr(echo, "preset", "compact")
+
+
+def require_shapes(echo: Echo) -> None:
     """Raises ValueError for a model without a shape branch."""
-    parts = getattr(getattr(echo, "model", None), "parts", ("autoencoder", "shape"))
-    if getattr(echo, "sample_shapes", None) is None or not {"autoencoder", "shape"} <= set(parts):
+    if getattr(echo, "sample_shapes", None) is None or not getattr(echo, "has_shapes", True):
         raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
 
 
@@ -159,7 +193,14 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
 
 
 def sample_boxes(
-    echo: EchoModel, graph: SceneGraph, *, seed: int, number: int, steps: int | None = None, watch: Watch | None = None
+    echo: Echo,
+    graph: SceneGraph,
+    *,
+    seed: int,
+    number: int,
+    steps: int | None = None,
+    change: GraphEdit | None = None,
+    watch: Watch | None = None,
 ) -> Boxes:
     """Boxes from the layout branch in the room's frame; what the graph fixes is given to it and comes back."""
     batch = graph_batch(graph)
@@ -174,6 +215,8 @@ def sample_boxes(
     extra: dict[str, Any] = {"known": known, "known_mask": given} if bool(given.any()) else {}
     if steps is not None:
         extra["steps"] = steps
+    if change is not None:
+        extra["edit"] = change
     with (watch or Watch()).stage("layout") as tell:
         found = echo.sample_layout(batch, generator=_generator(seed, "layout", number), progress=tell, **extra)
     rows = torch.arange(len(nodes))
@@ -186,14 +229,24 @@ def sample_boxes(
 
 
 def sample_shapes(
-    echo: EchoModel, graph: SceneGraph, boxes: Boxes, *, seed: int, steps: int | None = None, watch: Watch | None = None
+    echo: Echo,
+    graph: SceneGraph,
+    boxes: Boxes,
+    *,
+    seed: int,
+    steps: int | None = None,
+    change: GraphEdit | None = None,
+    watch: Watch | None = None,
 ) -> np.ndarray:
     """(n, 64, 64, 64) float32 TSDFs from the shape branch; raises ValueError for a model without one."""
     require_shapes(echo)
     centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
     with (watch or Watch()).stage("shapes") as tell:
         generator = _generator(seed, "shapes", 0)
-        grids = echo.sample_shapes(graph_batch(graph), centred, generator=generator, steps=steps, progress=tell)
+        extra: dict[str, Any] = {} if change is None else {"edit": change}
+        grids = echo.sample_shapes(
+            graph_batch(graph), centred, generator=generator, steps=steps, progress=tell, **extra
+        )
         return np.asarray(grids)
 
 
@@ -277,7 +330,7 @@ def settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tupl
         if not torch.equal(
             same.size, found.boxes.size
         ):  # chairs of one set that had to shrink: all of them, if it fits
-            second = repaired(_with_sizes(graph, same), same)
+            second = repaired(with_sizes(graph, same), same)
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
     collisions = tuple(f"{a} and {b} collide by {depth:.2f} m" for a, b, depth in found.collisions)
@@ -298,7 +351,8 @@ def _alike(graph: SceneGraph, boxes: Boxes, judged_by: Boxes | None = None) -> B
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)
 
 
-def _with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
+def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
+    """The graph with the sizes of the boxes written into its nodes."""
     sizes = [tuple(row) for row in boxes.size.tolist()]
     return graph.replaced(nodes=tuple(n.replaced(size=s) for n, s in zip(graph.nodes, sizes, strict=True)))
 

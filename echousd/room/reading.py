@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 import trimesh
-from pxr import UsdGeom
+from pxr import Usd, UsdGeom
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
@@ -35,6 +35,7 @@ class SavedRoom:
     Arguments:
         graph: the composed stage's graph, an artist's changes included.
         boxes: N boxes in the order of the graph's nodes, as composed.
+        layouts: all arrangements of the variant set `layout`, in its order, or `boxes` alone.
         meshes: object name -> mesh in its own frame, metres.
         assets: object name -> asset name.
         carried: asset name -> its files.
@@ -43,6 +44,7 @@ class SavedRoom:
 
     graph: SceneGraph
     boxes: Boxes
+    layouts: tuple[Boxes, ...]
     meshes: Mapping[str, trimesh.Trimesh]
     assets: Mapping[str, str]
     carried: Mapping[str, CarriedAsset]
@@ -61,13 +63,12 @@ def read_room(root: str | Path) -> SavedRoom:
     if manifest is None:
         raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
     graph = read_graph(stage)
-    size, position, yaw = [], [], []
+    size = []
     meshes: dict[str, trimesh.Trimesh] = {}
     carried: dict[str, CarriedAsset] = {}
     assets: dict[str, str] = {}
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
-        prim = stage.GetPrimAtPath(f"{OBJECTS}/{node.name}")
         mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{OBJECTS}/{node.name}/{asset}_mesh"))
         if asset is None or not mesh:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
@@ -80,13 +81,34 @@ def read_room(root: str | Path) -> SavedRoom:
         else:
             meshes[node.name] = next(meshes[n] for n, a in assets.items() if a == asset)
         low, high = meshes[node.name].bounds
-        pose, _ = UsdGeom.XformCache().ComputeRelativeTransform(prim, stage.GetPrimAtPath("/Room"))
-        front = pose.TransformDir((0, 0, 1))
         size.append(high - low)
+    sizes = torch.tensor(np.array(size), dtype=torch.float32)
+    boxes = _boxes(stage, graph, sizes)
+    return SavedRoom(graph, boxes, _layouts(stage, graph, sizes) or (boxes,), meshes, assets, carried, manifest)
+
+
+def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
+    """Boxes of the objects as the stage places them now."""
+    position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath("/Room")
+    for name in graph.names:
+        pose, _ = cache.ComputeRelativeTransform(stage.GetPrimAtPath(f"{OBJECTS}/{name}"), room)
+        front = pose.TransformDir((0, 0, 1))
         position.append(tuple(pose.ExtractTranslation()))
         yaw.append(np.arctan2(front[0], front[2]))
-    boxes = Boxes(*(torch.tensor(np.array(v), dtype=torch.float32) for v in (size, position, yaw)))
-    return SavedRoom(graph, boxes, meshes, assets, carried, manifest)
+    return Boxes(size, *(torch.tensor(np.array(v), dtype=torch.float32) for v in (position, yaw)))
+
+
+def _layouts(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> tuple[Boxes, ...]:
+    """Boxes under every variant of `layout`; the stage is left as it was."""
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    names = [name for name in variants.GetVariantNames() if name.startswith("layout_")]
+    found = []
+    for name in sorted(names, key=lambda name: (len(name), name)):
+        with Usd.EditContext(stage, stage.GetSessionLayer()):
+            variants.SetVariantSelection(name)
+            found.append(_boxes(stage, graph, size))
+            variants.ClearVariantSelection()
+    return tuple(found)
 
 
 def _carry(folder: Path, asset: str, mesh: UsdGeom.Mesh) -> CarriedAsset:

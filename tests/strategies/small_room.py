@@ -45,14 +45,19 @@ def small_graph(**room: object) -> SceneGraph:
 
 
 class StandIn:
-    """Knows the two calls of the echo model; `shift` metres along x come from the generator it is given."""
+    """Knows the two calls of the echo model; `shift` metres along x come from the generator it is given.
+
+    `edits` are the graph edits that it was told of.
+    """
 
     hash = "standin"
 
     def __init__(self, shift: float = 0.0) -> None:
         self.shift = shift
+        self.edits: list = []
 
-    def sample_layout(self, graph, *, generator, steps=None, known=None, known_mask=None, progress=None):
+    def sample_layout(self, graph, *, generator, steps=None, known=None, known_mask=None, edit=None, progress=None):
+        self.edits.append(edit)
         used: dict[str, int] = {}
         size, position, yaw = [], [], []
         for number in graph.category.tolist():
@@ -68,7 +73,8 @@ class StandIn:
             progress(1, 1)
         return Boxes(torch.tensor(size), moved, torch.tensor(yaw, dtype=torch.float32))
 
-    def sample_shapes(self, graph, boxes, *, generator, steps=None, known=None, known_mask=None, progress=None):
+    def sample_shapes(self, graph, boxes, *, generator, steps=None, edit=None, progress=None):
+        self.edits.append(edit)
         return np.stack([ball_tsdf() if c % 2 else table_tsdf() for c in graph.category.tolist()])
 
 

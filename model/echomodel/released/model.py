@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -126,12 +127,18 @@ class ReleasedModel(GraphEncoder):
 
     @torch.no_grad()
     def sample_layout(
-        self, graph: SceneGraphTensors, *, generator: torch.Generator, change: GraphChange | None = None
+        self,
+        graph: SceneGraphTensors,
+        *,
+        generator: torch.Generator,
+        change: GraphChange | None = None,
+        progress: Callable[[int, int], None] | None = None,
     ) -> Boxes:
         """Boxes of all nodes by 1,000 ancestral steps (EchoScene, section 3.3); sizes can come out negative.
 
         Arguments:
             graph: one or many scenes. generator: source of all randomness. change: as `conditions`.
+            progress: called with (steps done, steps).
 
         Returns:
             N boxes in the scene's own frame, metres and radians.
@@ -155,7 +162,7 @@ class ReleasedModel(GraphEncoder):
             noise=lambda step: torch.randn(shape, generator=generator),
             variance=variance,
         )
-        return Boxes.decode(last(states), statistics)
+        return Boxes.decode(last(states, progress, len(self.layout_tables.betas)), statistics)
 
     @torch.no_grad()
     def sample_shapes(
@@ -167,6 +174,7 @@ class ReleasedModel(GraphEncoder):
         shared_noise: bool = True,
         change: GraphChange | None = None,
         winograd: bool = True,
+        progress: Callable[[int, int], None] | None = None,
     ) -> Tensor:
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
 
@@ -174,6 +182,7 @@ class ReleasedModel(GraphEncoder):
             graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
             shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
             change: as `conditions`. winograd: as `FrozenShape`: faster, at the cost of memory.
+            progress: called with (steps done, steps).
 
         Returns:
             (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
@@ -197,7 +206,7 @@ class ReleasedModel(GraphEncoder):
         if self.config.shape.conditioning == "crossattn" and conditions.shape is not None:
             net = self.shape_df.diffusion_net
             denoise = FrozenShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
-        return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)))
+        return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
 
     def training_losses(
         self,

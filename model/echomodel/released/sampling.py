@@ -71,11 +71,15 @@ def ddim(denoise: Denoiser, x: Tensor, grid: DDIMGrid) -> Iterator[tuple[int, Te
         yield step, x
 
 
-def last(states: Iterator[tuple[int, Tensor]]) -> Tensor:
-    """The final state of a sampler."""
+def last(
+    states: Iterator[tuple[int, Tensor]], progress: Callable[[int, int], None] | None = None, steps: int = 0
+) -> Tensor:
+    """The final state of a sampler; `progress` is called with (steps done, `steps`)."""
     final = None
-    for _, state in states:
+    for done, (_, state) in enumerate(states, start=1):
         final = state
+        if progress is not None:
+            progress(done, steps)
     if final is None:
         raise ValueError("sampler made no step")
     return final

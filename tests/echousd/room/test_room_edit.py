@@ -61,6 +61,43 @@ def test_new_object_leaves_all_others_alone(root):
     assert echousd.read_graph(stage) == graph
 
 
+def test_all_layouts_of_a_room_are_kept(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(0.4), faces=600, samples=3)
+    root = room.save(tmp_path / "bedroom", preview=False)
+    saved = read_room(root)
+    assert len(saved.layouts) == 3
+    for ours, theirs in zip(saved.layouts, room.layouts, strict=True):
+        torch.testing.assert_close(ours.position, theirs.position, atol=2e-4, rtol=0)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edited = edit(root, graph, model=StandIn(0.4), seed=9)
+    edited.save(root.parent, preview=False)
+    assert len(edited.layouts) == 3
+    for before, after in zip(room.layouts, edited.layouts, strict=True):
+        torch.testing.assert_close(after.position[:6], before.position, atol=2e-3, rtol=0)
+        torch.testing.assert_close(after.size, edited.boxes.size)
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert variants.GetVariantNames() == ["layout_0", "layout_1", "layout_2"]
+    assert variants.GetVariantSelection() == "layout_0"
+    smaller = edit(root, graph.remove_node("chair"), model=StandIn(0.4))
+    assert len(smaller.layouts) == 3
+
+
+def test_model_is_told_what_was_edited(root):
+    model = StandIn()
+    graph = small_graph().unrelate("wardrobe", "taller_than", "bed").relabel_node("pendant", "table_lamp")
+    graph = graph.add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edit(root, graph, model=model)
+    assert len(model.edits) == 2  # the layout branch and the shape branch
+    for told in model.edits:
+        assert [name for name, new in zip(graph.names, told.added.tolist(), strict=True) if new] == ["pendant", "chair"]
+        bed, wardrobe = graph.names.index("bed"), graph.names.index("wardrobe")
+        pairs = {(s, o) for s, _, o in told.before.tolist()}
+        assert (wardrobe, bed) in pairs  # as it was before
+        assert graph.names.index("chair") not in {end for pair in pairs for end in pair}
+
+
 def test_owner_of_a_shared_asset_may_go(root):
     graph = small_graph().unrelate("lamp", "standing_on", "nightstand_left")
     graph = graph.remove_node("nightstand_left")

@@ -1,0 +1,98 @@
+"""`echousd generate --weights FILE` with a converted published checkpoint: small random weights of the same form."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import torch
+from pxr import Usd, UsdGeom
+from safetensors.torch import save_file
+from small_room import ball_tsdf, small_graph
+
+from echomodel.checkpoint import convert
+from echomodel.released.bounds import statistics_from_bounds
+from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
+from echomodel.released.model import ReleasedModel
+from echomodel.released.tables import LayoutTables
+from echomodel.released.vqvae import VQVAE
+from echomodel.text import ClipTextEncoder
+
+SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
+ENCODER = EncoderConfig(learned=8, flag=4, hidden=16, layers=2, separated=False)
+CONFIG = ReleasedConfig(
+    encoder=ENCODER,
+    layout=UNetConfig(width=32, objects=ENCODER.node, **SMALL),
+    shape=shape_unet(width=32, mult=(1, 1), blocks=1, attention=(2,), objects=32, **SMALL),
+    vqvae=VQConfig(channels=8, codes=16),
+)
+BOUNDS = [0.3, 0.3, 0.3, 2.0, 2.0, 2.0, -2.0, 0.0, -2.0, 2.0, 1.0, 2.0, -3.2, 3.2]
+
+
+@pytest.fixture
+def weights(tmp_path, monkeypatch) -> Path:
+    torch.manual_seed(1)
+    torch.save(ReleasedModel(CONFIG).state_dict(), tmp_path / "model.pth")
+    convert(tmp_path / "model.pth", tmp_path / "model.safetensors", statistics=statistics_from_bounds(BOUNDS))
+    # few steps, and text features as a cache holds them: no download in a test
+    monkeypatch.setattr(ReleasedModel, "layout_tables", LayoutTables.linear(1e-3, 0.2, 10))
+    # random weights decode to noise, of which no mesh is left
+    ball = torch.tensor(0.2 * ball_tsdf())
+    monkeypatch.setattr(VQVAE, "decode", lambda self, z: ball.expand(len(z), 1, -1, -1, -1))
+    labels = ("bed", "nightstand", "lamp", "wardrobe", "floor", "room")
+    monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path))
+    save_file({word: torch.randn(512) for word in labels}, tmp_path / f"text-{ClipTextEncoder().name}.safetensors")
+    return tmp_path / "model.safetensors"
+
+
+def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    folder = tmp_path / "out" / "bedroom"
+    words = ("--weights", weights, "--preset", "released", "--seed", 3, "--steps", 2, "--faces", 400)
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", folder, *words)
+    assert done.code == 0, done.err
+    manifest = json.loads((folder / "bedroom.json").read_text())
+    assert manifest["preset"] == "released"
+    assert len(manifest["model"]) == 12
+    stage = Usd.Stage.Open(str(folder / "bedroom.usda"))
+    assert stage.GetCompositionErrors() == []
+    bed = UsdGeom.Mesh(stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh"))
+    assert len(bed.GetFaceVertexCountsAttr().Get()) > 12  # a shape, not a box
+
+
+def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):
+    graph, out = tmp_path / "graph.usda", tmp_path / "room"
+    small_graph().to_stage(graph)
+    done = echousd_command("generate", graph, "-o", out, "--model", weights, "--preset", "compact")
+    assert (done.code, out.exists()) == (2, False)
+    assert "model.safetensors: holds a model of the preset 'released', asked for: 'compact'" in done.err
+    monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "empty"))
+    from echomodel.text import TextEncoderError
+
+    def absent(self):
+        raise TextEncoderError("text features need the package open_clip_torch: pip install 'echousd[text]'")
+
+    monkeypatch.setattr(ClipTextEncoder, "_load", absent)
+    done = echousd_command("generate", graph, "-o", out, "--weights", weights)
+    assert (done.code, out.exists()) == (2, False)
+    assert "pip install 'echousd[text]'" in done.err
+    assert done.err.strip().splitlines()[-1].startswith("error: ")
+
+
+def test_categories_without_a_class_are_named(tmp_path, echousd_command):
+    config = ReleasedConfig(encoder=EncoderConfig(classes=4, learned=8, flag=4, hidden=16, layers=2, separated=False))
+    config = ReleasedConfig(encoder=config.encoder, layout=CONFIG.layout, shape=None, vqvae=None)
+    torch.save(ReleasedModel(config).state_dict(), tmp_path / "model.pth")
+    classes = ["_scene_", "bed", "floor", "wardrobes"]
+    file = tmp_path / "model.safetensors"
+    convert(tmp_path / "model.pth", file, classes=classes, statistics=statistics_from_bounds(BOUNDS))
+    small_graph().to_stage(tmp_path / "graph.usda")
+    words = ("--weights", file, "--shapes", "boxes")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *words)
+    assert done.code == 2
+    said = " ".join(done.err.split())
+    assert "no class for nightstand, table_lamp, wardrobe (nearest: wardrobes), pendant_lamp" in said
+    assert "allowed: bed, wardrobes" in said
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--weights", file)
+    assert "no shape branch; use shapes 'boxes'" in " ".join(done.err.split())
