@@ -85,11 +85,11 @@ def top_view(scenery: Scenery) -> View:
 
 
 def corner_view(scenery: Scenery) -> View:
-    """From above a corner, the side that most objects turn their front to, the whole scene in the picture."""
+    """From above a corner, the one where least is hidden, the whole scene in the picture."""
     from echousd.room.cameras import APERTURE, FOCAL_LENGTH, perspective_view
 
     points = scenery.triangles.reshape(-1, 3).astype(float)
-    return View(perspective_view(points, scenery.facing), APERTURE / 2 / FOCAL_LENGTH, False)
+    return View(perspective_view(points, scenery.furniture), APERTURE / 2 / FOCAL_LENGTH, False)
 
 
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pxr import Usd
 
-from echousd.drawables import Paint, read_drawables, read_image
+from echousd.drawables import Drawable, Paint, read_drawables, read_image
+from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
 SHELL = ("floor", "wall", "ceiling")
@@ -25,7 +26,7 @@ class Scenery:
         st: (f, 3, 2) float32 texture coordinates.
         texture: (f,) int, which of `images` colours the face, -1 for none.
         images: (h, w, 3) float32 linear RGB each.
-        facing: (2,) float, x and z of the objects' mean front.
+        furniture: boxes of the objects.
         wall: (f,) int, which wall a face belongs to, -1 for none.
     """
 
@@ -37,7 +38,7 @@ class Scenery:
     st: np.ndarray
     texture: np.ndarray
     images: tuple[np.ndarray, ...]
-    facing: np.ndarray
+    furniture: Furniture
     wall: np.ndarray
 
     @property
@@ -99,7 +100,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[str, tuple[int, np.ndarray]] = {}
-    fronts = []
+    boxes = []
     walls = 0
     for mesh in read_drawables(stage):
         count = len(mesh.triangles)
@@ -127,9 +128,20 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                 part["texture"][faces] = images[paint.texture][0]
         parts.append(part)
         if mesh.category not in SHELL:
-            fronts.append(mesh.world[[0, 2], 2])
+            boxes.append(_box(mesh))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    facing = np.mean(fronts, 0) if fronts else np.array([0.0, 1.0])
-    return Scenery(images=tuple(image for _, image in images.values()), facing=facing, **joined)
+    sizes = np.array(boxes).reshape(-1, 7)
+    furniture = Furniture(sizes[:, :3], sizes[:, 3:6], sizes[:, 6])
+    return Scenery(images=tuple(image for _, image in images.values()), furniture=furniture, **joined)
+
+
+def _box(mesh: Drawable) -> np.ndarray:
+    """(7,) float: size and bottom centre in metres and yaw of the box around a mesh in its own frame."""
+    points = mesh.triangles.reshape(-1, 3)
+    low, high = points.min(0), points.max(0)
+    turn, shift = mesh.world[:3, :3], mesh.world[:3, 3]
+    bottom = turn @ [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2] + shift
+    size = (high - low) * np.linalg.norm(turn, axis=0)
+    return np.concatenate([size, bottom, [np.arctan2(turn[0, 2], turn[2, 2])]])

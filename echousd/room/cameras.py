@@ -8,10 +8,13 @@ import numpy as np
 import shapely
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
+from echousd.sight import Furniture
+
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 WIDE = 18.0  # mm, for a camera inside
 MARGIN = 1.06
+FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
 
 @dataclass(frozen=True)
@@ -38,17 +41,23 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def perspective_view(points: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """(4, 4) float camera to world of a view from the side that most furniture faces, with all points in the picture.
+def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
+    """(4, 4) float camera to world of a view from the corner where least furniture is hidden, fronts preferred.
 
     Arguments:
-        points: (n, 3) float, metres, what must be seen.
-        facing: (2,) float, x and z of the furniture's mean front.
+        points: (n, 3) float, metres, what must be in the picture.
+        furniture: what shall be seen.
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
-    side = corners[np.argmax(corners @ (facing + np.array([1e-3, 2e-3])))]
-    direction = np.array([0.55 * side[0], 0.62, 0.85 * side[1]])
-    direction /= np.linalg.norm(direction)
+    facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
+    views = [_framed(points, np.array([0.55 * x, 0.62, 0.85 * z])) for x, z in corners]
+    hidden = [furniture.hidden(view[:3, 3]) for view in views]
+    return views[int(np.argmin(np.array(hidden) - FRONTS * facing))]
+
+
+def _framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world of the nearest camera in that direction that has all points in its picture."""
+    direction = direction / np.linalg.norm(direction)
     target = (points.min(0) + points.max(0)) / 2
     half = APERTURE / 2 / FOCAL_LENGTH / MARGIN
     for _ in range(4):  # the middle of the picture moves a little with the distance
@@ -60,12 +69,12 @@ def perspective_view(points: np.ndarray, facing: np.ndarray) -> np.ndarray:
     return view_matrix(target + direction * distance, target)
 
 
-def inside_view(floor: np.ndarray, facing: np.ndarray, height: float) -> np.ndarray:
-    """(4, 4) float camera to world of a view from a corner inside a room with walls, towards the furniture's fronts.
+def inside_view(floor: np.ndarray, furniture: Furniture, height: float) -> np.ndarray:
+    """(4, 4) float camera to world of a view from a corner inside a room with walls, where little is hidden.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
-        facing: (2,) float, x and z of the furniture's mean front.
+        furniture: what shall be seen, its fronts rather than its backs.
         height: of the walls, metres.
     """
     room = shapely.Polygon(floor)
@@ -73,19 +82,20 @@ def inside_view(floor: np.ndarray, facing: np.ndarray, height: float) -> np.ndar
     step = middle - floor
     step = floor + 0.35 * step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
     seen = [room.contains(shapely.LineString([corner, middle])) for corner in step]
-    reach = np.linalg.norm(floor - middle, axis=1) + (floor - middle) @ facing
+    reach = np.linalg.norm(floor - middle, axis=1) + (floor - middle) @ furniture.facing
+    reach = reach - [furniture.hidden(np.array([x, 0.72 * height, z])) for x, z in step]
     corner = step[int(np.argmax(np.where(seen, reach, -np.inf)))] if any(seen) else middle + 0.1
     return view_matrix(np.array([corner[0], 0.72 * height, corner[1]]), np.array([middle[0], 0.22 * height, middle[1]]))
 
 
 def write_cameras(
-    stage: Usd.Stage, volume: Volume, points: np.ndarray, facing: np.ndarray, walled: np.ndarray | None = None
+    stage: Usd.Stage, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None
 ) -> None:
     """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:
         stage: receives the cameras.
-        volume, points, facing: see `perspective_view`.
+        volume: of the room. points, furniture: see `perspective_view`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
     """
     UsdGeom.Scope.Define(stage, "/Room/Cameras")
@@ -100,9 +110,9 @@ def write_cameras(
     top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
     if walled is not None:
-        matrix = inside_view(walled, facing, float(volume.upper[1]))
+        matrix = inside_view(walled, furniture, float(volume.upper[1]))
     else:
-        matrix = perspective_view(points, facing)
+        matrix = perspective_view(points, furniture)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
     camera.CreateFocalLengthAttr(WIDE if walled is not None else FOCAL_LENGTH)
     camera.CreateHorizontalApertureAttr(APERTURE)

@@ -15,6 +15,7 @@ from echousd.room.room import Room
 from echousd.room.styles import ROOM_STYLE, style_groups
 from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
+from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 
 LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest first
@@ -187,11 +188,10 @@ def root_layer(room: Room) -> Sdf.Layer:
     volume = room_volume(room)
     low, high = (Gf.Vec3f(*map(float, corner)) for corner in (volume.lower, volume.upper))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
-    yaw, weight = np.asarray(room.boxes.yaw, float), np.asarray(room.boxes.size, float).prod(1)
-    facing = np.array([(np.sin(yaw) * weight).sum(), (np.cos(yaw) * weight).sum()]) / max(float(weight.sum()), 1e-9)
+    furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
     cameras.write_lights(stage, volume, room.height)
     walled = room.floor if room.options.walls else None
-    cameras.write_cameras(stage, volume, room_points(room), facing, walled)
+    cameras.write_cameras(stage, volume, room_points(room), furniture, walled)
     return assets.without_stage(stage, _add_sublayers)
 
 

@@ -7,6 +7,8 @@ from small_room import OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.room import RoomOptions
+from echousd.room.cameras import perspective_view
+from echousd.sight import Furniture
 from echousd.stage import read_graph
 
 
@@ -188,6 +190,23 @@ def test_cameras_see_everything_and_light_is_there(stage, room):
     assert top.GetHorizontalApertureAttr().Get() / 10 >= 4.0
     assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
     assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
+
+
+def test_camera_stands_where_no_tall_piece_hides_the_others():
+    low = [(0.6, 0.5, 0.6)] * 3
+    size = np.array([*low, (1.8, 2.3, 0.6)])
+    position = np.array([(-1.0, 0, -0.5), (0.0, 0, -0.5), (1.0, 0, -0.5), (0.6, 0, 1.0)])
+    furniture = Furniture(size, position, np.array([0, 0, 0, np.pi]))
+    assert furniture.hidden(np.array([0.6, 1.5, 4.0])) > 1.5  # from behind the wardrobe
+    assert furniture.hidden(np.array([0.0, 6.0, 0.0])) == 0
+    corners = np.concatenate([position - size / 2, position + size * (0.5, 1, 0.5)])
+    for turn in range(4):  # wherever the wardrobe stands, the camera stands elsewhere
+        cos, sin = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
+        rotate = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+        turned = Furniture(size, position @ rotate.T, furniture.yaw + turn * np.pi / 2)
+        eye = perspective_view(corners @ rotate.T, turned)[:3, 3]
+        assert turned.hidden(eye) < 1.0
+        assert (rotate.T @ eye)[2] < 0
 
 
 def test_provenance_in_every_layer_and_in_the_manifest(root, room, stage):

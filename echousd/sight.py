@@ -1,0 +1,43 @@
+"""What of the furniture an eye sees: boxes that hide one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Furniture:
+    """The boxes of n objects: size and bottom centre (n, 3) float, metres, yaw (n,) float, radians."""
+
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+    @property
+    def facing(self) -> np.ndarray:
+        """(2,) float, x and z of the mean front, weighted by volume."""
+        weight = self.size.prod(1)
+        front = np.array([(np.sin(self.yaw) * weight).sum(), (np.cos(self.yaw) * weight).sum()])
+        return front / max(float(weight.sum()), 1e-9)
+
+    def hidden(self, eye: np.ndarray) -> float:
+        """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""
+        n = len(self.size)
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        turn = np.zeros((n, 3, 3))  # object frame -> room frame
+        turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cos, sin, 1.0, -sin, cos
+        middle = self.position + self.size * (0.0, 0.5, 0.0)
+        grid = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
+        points = middle[:, None] + np.einsum("nij,nkj->nki", turn, grid * self.size[:, None])
+        # every line of sight (object a, point k) in the frame of every box b
+        start = np.einsum("bij,bi->bj", turn, eye - middle)[:, None, None]
+        way = np.einsum("bij,aki->bakj", turn, points - eye)
+        way = np.where(np.abs(way) < 1e-9, 1e-9, way)
+        half = 0.5 * self.size[:, None, None]
+        first, second = (-half - start) / way, (half - start) / way
+        enter, leave = np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
+        blocked = (enter < leave) & (leave > 0) & (enter < 1)
+        blocked[np.arange(n), np.arange(n)] = False
+        return float(blocked.any(0).mean(1).sum())
