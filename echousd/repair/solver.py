@@ -37,7 +37,7 @@ class RepairConfig:
         limit: largest change of the logarithm of a size.
         slack: metres or ratio by which relations are to hold.
         rounds: most linearisations in one attempt; patience: how many of them without progress end it.
-        budget: no further attempt is started after this many linearisations in all.
+        budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
     """
 
     move: float = 0.3
@@ -46,7 +46,7 @@ class RepairConfig:
     slack: float = 0.004
     rounds: int = 16
     patience: int = 6
-    budget: int = 30
+    budget: int = 26
 
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
@@ -95,7 +95,8 @@ def solve(
     through = 0
     spent = 0
     while best is None or spent < config.budget:
-        found = _descend(problem, size, position, yaw, handicap, through, rules=rules, centre=centre, config=config)
+        left = replace(config, rounds=min(config.rounds, max(config.budget - spent - 1, 1)))
+        found = _descend(problem, size, position, yaw, handicap, through, rules=rules, centre=centre, config=left)
         spent += found.rounds
         if best is None or found.score < best.score:
             best = found
