@@ -1,3 +1,4 @@
+import contextlib
 import hashlib
 import os
 import signal
@@ -163,6 +164,52 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
         assert stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
     make(seed=1).save(folder, preview=False)
     assert not (folder / STAGING).exists()
+
+
+@pytest.mark.parametrize("moment", range(0, 40, 3))
+def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, moment):
+    """Another graph is saved over a room and after some operation on the disk nothing happens, no tidying either."""
+    from pathlib import Path
+
+    from echousd.room import folder as folders
+
+    folder = tmp_path / "bedroom"
+    root = make(seed=1).save(folder, preview=False)
+    other = make(seed=2, graph=small_graph().remove_node("pendant").add_node("second_bed", "double_bed"))
+    files, done = len(room_files(other)), 0
+
+    def counted(real):
+        def call(*args, **kwargs):
+            nonlocal done
+            done += 1
+            if done > files + moment:  # each file was written to the staging folder before
+                raise KeyboardInterrupt
+            return real(*args, **kwargs)
+
+        return call
+
+    with monkeypatch.context() as patch:
+        for name in ("write_bytes", "write_text", "replace", "mkdir", "unlink"):
+            patch.setattr(Path, name, counted(getattr(Path, name)))
+        patch.setattr(folders.shutil, "rmtree", counted(folders.shutil.rmtree))
+        with contextlib.suppress(KeyboardInterrupt):
+            other.save(folder, preview=False)
+    layers = [path for path in folder.rglob("*.usd*") if STAGING not in path.parts]
+    for path in layers:
+        layer = Sdf.Layer.Find(str(path))
+        if layer:
+            layer.Reload(True)
+    stage = opened(root)
+    assert stage.GetCompositionErrors() == []
+    for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren():
+        assert any(child.IsA(UsdGeom.Mesh) for child in prim.GetChildren()) or prim.GetName() in (
+            "pendant",
+            "second_bed",
+        )
+    other.save(folder, preview=False)
+    assert not (folder / STAGING).exists()
+    assert set(folders.find_manifest(folder)["assets"]) == set(other.names)
+    assert not (folder / "assets/pendant").exists()
 
 
 def test_full_disk_says_so_and_changes_nothing(tmp_path, monkeypatch):
