@@ -50,7 +50,9 @@ def edit(
     with watch.stage("read"):
         saved = read_room(root)
     fresh, moving = touched(saved.graph, graph)
-    echo, layouts, notes, grids = None, [], (), None
+    echo, grids = None, None
+    layouts: list[Boxes] = []
+    notes: tuple[str, ...] = ()
     if fresh or moving:
         with watch.stage("load"):
             echo = pipeline.load_model(model)

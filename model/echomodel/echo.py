@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
-from echomodel.compact.model import CompactModel, load_weights
+from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
 from echomodel.compact.wholeness import group_means, wholeness
@@ -71,6 +71,8 @@ class EchoModel:
         """
         source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
         files = sorted(source.glob("*.safetensors")) if source.is_dir() else [source]
+        if path is not None and not files:
+            raise WeightsError(f"{source}: holds no weights files (.safetensors)")
         return cls(*load_weights(files, device), half_decode=half_decode)
 
     @property

@@ -96,3 +96,22 @@ def test_categories_without_a_class_are_named(tmp_path, echousd_command):
     assert "allowed: bed, wardrobes" in said
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--weights", file)
     assert "no shape branch; use shapes 'boxes'" in " ".join(done.err.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("missing.safetensors", "not a readable safetensors file (No such file"),
+        ("damaged.safetensors", "not a readable safetensors file"),
+        ("folder", "holds no weights files (.safetensors)"),
+    ],
+)
+def test_weights_that_are_missing_or_damaged_are_named(tmp_path, echousd_command, name, text):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "damaged.safetensors").write_bytes(bytes([200, 1, 0, 0, 0, 0, 0, 0]) + b'{"format":')
+    small_graph().to_stage(tmp_path / "graph.usda")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--weights", tmp_path / name)
+    assert done.code == 2
+    said = done.err.strip().splitlines()[-1]
+    assert said.startswith(f"error: {tmp_path / name}: {text}")
+    assert not (tmp_path / "room").exists()
