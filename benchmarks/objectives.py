@@ -2,7 +2,7 @@
 
     python benchmarks/objectives.py DATA [--steps 1200] [--objectives noise,velocity,flow] [-o runs/objectives]
 
-DATA is a folder of `echousd data build`. Each objective is trained by model/recipes/layout.toml for as many steps from
+DATA is a folder of `echousd data build`. Each objective is trained by model/recipes/latent.toml for as many steps from
 the same seed, then samples the same held-out rooms, without guidance. Losses of different targets cannot be compared;
 the share of relations kept (both rule sets) and the error of the sizes can.
 """
@@ -20,7 +20,7 @@ from echomodel.samplers import SAMPLERS
 from echomodel.training.recipe import read_recipe
 from echomodel.training.run import open_run
 
-RECIPE = Path(__file__).parents[1] / "model" / "recipes" / "layout.toml"
+RECIPE = Path(__file__).parents[1] / "model" / "recipes" / "latent.toml"
 
 
 def scores(stage: object, model: CompactModel, sampler: str, steps: int, rooms: int) -> str:
