@@ -27,6 +27,7 @@ def layout(
     rules: Annotated[str, typer.Option(help="strict or sgfront, for labels and scores.")] = "strict",
     change: Annotated[bool, typer.Option("--change", help="Also after turning one relation per room round.")] = False,
     add: Annotated[bool, typer.Option("--add", help="Also after adding one object per room.")] = False,
+    complete: Annotated[bool, typer.Option("--complete", help="Also with half of the true boxes given.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the dropping, the edits and the sampling.")] = 0,
     drop: Annotated[float, typer.Option(help="Share of the relations that the graph does not tell.")] = 0.5,
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
@@ -54,7 +55,7 @@ def layout(
     from echousd.cli.data import load_rooms
 
     found = load_rooms(rooms, limit, held_out=held_out)
-    settings = LayoutEvaluation(rules, drop, seed, change, add, contradictions)
+    settings = LayoutEvaluation(rules, drop, seed, change, add, complete, contradictions)
     console = Console(stderr=True, highlight=False)
     if model == "truth":
         sampler = _truth(found)
@@ -95,6 +96,8 @@ def _model_sampler(
             guidance=guidance,
             relation_guidance=relation_guidance,
             edit=edit,
+            known=edited.known,
+            known_mask=edited.known_mask,
         )
 
     return sample
@@ -122,7 +125,7 @@ def _print(result: dict, console: Console) -> None:
 
     from echomodel.data.report import rows_between
 
-    modes = [mode for mode in ("generation", "change", "add") if mode in result]
+    modes = [mode for mode in ("generation", "change", "add", "complete") if mode in result]
     table = Table("relations kept", *modes, "n", box=None)
 
     def cell(share: float | None) -> str:
@@ -150,9 +153,7 @@ def _print(result: dict, console: Console) -> None:
         console.print(f"\nsizes: {len(off)} of {len(sizes)} classes and axes are off (median by 10% or KS above 0.25)")
         table = Table("class", "axis", "n", "median ratio", "KS", box=None)
         for row in sorted(off, key=lambda row: -row["ks"])[:15]:
-            table.add_row(
-                row["category"], row["axis"], str(row["n"]), f"{row['median_ratio']:.2f}", f"{row['ks']:.2f}"
-            )
+            table.add_row(row["category"], row["axis"], str(row["n"]), f"{row['median_ratio']:.2f}", f"{row['ks']:.2f}")
         console.print(table)
     ours, real = result["figures"]["overlap"], result["real_figures"]["overlap"]
     console.print(

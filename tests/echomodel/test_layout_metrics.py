@@ -1,6 +1,7 @@
 """Layout metrics: true boxes score full marks, wrong ones do not, and edits change what they say."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,6 +93,24 @@ def test_edits_are_scored_apart(rooms):
     again = []
     evaluate_layout(rooms, lambda e: again.append(e) or right(e), settings)
     assert torch.equal(again[1].graph.triplets, change.graph.triplets)
+
+
+def test_completion_gives_half_of_the_true_boxes(rooms):
+    seen = []
+
+    def sample(edited):
+        seen.append(edited)
+        if edited.known is None:
+            return truth(rooms)(edited)
+        position = torch.where(edited.known_mask[:, None], edited.known.position, 0 * edited.known.position)
+        return replace(edited.known, position=position)
+
+    result = evaluate_layout(rooms, sample, LayoutEvaluation(complete=True, scenes=40))
+    given = seen[-1].known_mask
+    assert 0.4 < given.float().mean() < 0.6
+    assert torch.equal(seen[-1].touched, ~given)
+    assert result["complete"]["untouched"]["total"] == 1.0  # relations between given boxes
+    assert result["complete"]["edited"]["total"] < 0.8
 
 
 def test_contradictions_stay_when_asked_for(rooms):

@@ -136,4 +136,3 @@ def kolmogorov_smirnov(a: np.ndarray, b: np.ndarray) -> float:
 def touched_triplets(triplets: Tensor, nodes: Tensor) -> Tensor:
     """(E,) bool, the triplets with an end among `nodes` (N,) bool."""
     return nodes[triplets[:, 0]] | nodes[triplets[:, 2]]
-

@@ -29,12 +29,15 @@ class EditedGraph:
         graph: the scenes after the edit.
         before: (E, 3) int64 triplets before the edit, None where there was none.
         added: (N,) bool, nodes that came in. touched: (N,) bool, nodes that an edit concerns.
+        known, known_mask: N boxes and (N,) bool, boxes that are given, None where none is.
     """
 
     graph: GraphBatch
     before: Tensor | None
     added: Tensor
     touched: Tensor
+    known: Boxes | None = None
+    known_mask: Tensor | None = None
 
 
 Sampler = Callable[[EditedGraph], Boxes]
@@ -49,6 +52,7 @@ class LayoutEvaluation:
         drop: share of the labelled edges that the graph does not tell.
         seed: of the dropping and the edits.
         change, add: also score after one relation per scene was turned round, after one node per scene was added.
+        complete: also score with half of the true boxes given.
         contradictions: keep what contradicts a changed relation, as the published evaluation does.
         scenes: scenes in a batch.
     """
@@ -58,6 +62,7 @@ class LayoutEvaluation:
     seed: int = 0
     change: bool = False
     add: bool = False
+    complete: bool = False
     contradictions: bool = False
     scenes: int = 64
 
@@ -78,10 +83,10 @@ def evaluate_layout(
         progress: called with (scenes done, in all).
 
     Returns:
-        `rooms` scored, `settings`, `generation` (and `change`, `add`): shares of relations kept per predicate and
-        group, for edits also of the triplets that touch an edited node and of the others; `sizes`: rows per class and
-        axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the form of
-        `room_statistics.json`.
+        `rooms` scored, `settings`, `generation` (and `change`, `add`, `complete`): shares of relations kept per
+        predicate and group, for edits also of the triplets that touch an edited (or free) node and of the others;
+        `sizes`: rows per class and axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the
+        form of `room_statistics.json`.
     """
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     if not rooms:
@@ -91,7 +96,7 @@ def evaluate_layout(
     graphs = [
         GraphBatch.from_room(room, triplets=torch.from_numpy(edges)) for room, edges in zip(rooms, labels, strict=True)
     ]
-    modes = ["generation"] + ["change"] * settings.change + ["add"] * settings.add
+    modes = ["generation"] + ["change"] * settings.change + ["add"] * settings.add + ["complete"] * settings.complete
     done, total = 0, len(rooms) * len(modes)
     out: dict = {"rooms": len(rooms), "settings": asdict(settings)}
     drawn: list[RoomBoxes] = []
@@ -99,7 +104,7 @@ def evaluate_layout(
         found, scenes, edits, offset = [], [], [], 0
         for start in range(0, len(rooms), settings.scenes):
             part = slice(start, start + settings.scenes)
-            edited = _edited(graphs[part], mode, rng, settings)
+            edited = _edited(graphs[part], rooms[part], mode, rng, settings)
             boxes = sample(edited)
             if len(boxes) != edited.graph.num_nodes:
                 raise ValueError(f"the sampler gave {len(boxes)} boxes for {edited.graph.num_nodes} nodes")
@@ -127,13 +132,20 @@ def _scores(boxes: Boxes, triplets: Tensor, touched: Tensor, mode: str, rules: s
 
 
 def _edited(
-    graphs: Sequence[GraphBatch], mode: str, rng: np.random.Generator, settings: LayoutEvaluation
+    graphs: Sequence[GraphBatch],
+    rooms: Sequence[RoomBoxes],
+    mode: str,
+    rng: np.random.Generator,
+    settings: LayoutEvaluation,
 ) -> EditedGraph:
-    """Pack scenes, each with one random edit of the given kind."""
+    """Pack scenes, each with one random edit of the given kind, or half of its boxes given."""
     packed = GraphBatch.pack(graphs)
     none = torch.zeros(packed.num_nodes, dtype=torch.bool)
     if mode == "generation":
         return EditedGraph(packed, None, none, none)
+    if mode == "complete":
+        given = torch.from_numpy(rng.random(packed.num_nodes) < 0.5)
+        return EditedGraph(packed, None, none, ~given, Boxes.cat([Boxes.from_room(room) for room in rooms]), given)
     touched, added = none.clone(), none.clone()
     after, before, first = [], [], 0
     for graph in graphs:
