@@ -9,9 +9,8 @@ import numpy as np
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
+from echousd.repair.relations import relation_margins
 
-# Predicates whose rules look at the same geometry of a pair (sides at the overlap, sizes at the volumes or tops).
-SHARING = ((1, 2, 3, 4), (5,), (6,), (7,), (8, 9), (10, 11), (12,))
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG = range(7)
 
 
@@ -32,56 +31,6 @@ class Linearised:
     equal: np.ndarray
     kind: np.ndarray
     axis: np.ndarray
-
-
-def relation_margins(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *, rules: str, centre: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The differentiable margins of `echomodel.rules` and their gradients, all edges in one backward pass.
-
-    Arguments:
-        size, position: (n, 3) float, metres; yaw: (n,) float, radians; triplets: (e, 3) int.
-        rules: name of the rule set; centre: (2,) float, x and z of the room's centre.
-
-    Returns: margins (e,) float and gradient (e, n, 6) float in the columns of `geometry`.
-    """
-    import torch
-
-    from echomodel.boxes import Boxes
-    from echomodel.rules.geometry import pairs
-    from echomodel.rules.sets import rule_set
-
-    e, n = len(triplets), len(size)
-    value, gradient = np.zeros(e), np.zeros((e, n, COLUMNS))
-    # Each edge gets its own copy of its two boxes, so one backward pass gives every edge's own gradient.
-    ends = np.concatenate((triplets[:, 0], triplets[:, 2]))
-    own_size = torch.tensor(size[ends], dtype=torch.float32, requires_grad=True)
-    own_position = torch.tensor(position[ends], dtype=torch.float32, requires_grad=True)
-    boxes = Boxes(own_size, own_position, torch.tensor(yaw[ends], dtype=torch.float32))
-    middle = torch.tensor([centre[0], 0.0, centre[1]], dtype=torch.float32).expand(2 * e, 3)
-    chosen_rules = rule_set(rules)
-    total = torch.zeros(())
-    for group in SHARING:
-        known = [predicate for predicate in group if predicate in chosen_rules.margins]
-        rows = np.flatnonzero(np.isin(triplets[:, 1], known))
-        if not len(rows):
-            continue
-        subject = torch.as_tensor(rows)
-        pair = pairs(boxes, subject, subject + e, middle, oriented=chosen_rules.oriented)
-        each = torch.stack([chosen_rules.margins[predicate](pair) for predicate in known])
-        which = torch.as_tensor([known.index(predicate) for predicate in triplets[rows, 1]])
-        margin = each.gather(0, which[None])[0]
-        value[rows] = margin.detach().numpy()
-        total = total + margin.sum()
-    if total.requires_grad:
-        by_size, by_position = torch.autograd.grad(total, (own_size, own_position), allow_unused=True)
-        both = np.zeros((2 * e, COLUMNS))
-        if by_position is not None:
-            both[:, :3] = by_position.numpy()
-        if by_size is not None:
-            both[:, 3:] = by_size.numpy() * size[ends]
-        np.add.at(gradient, (np.tile(np.arange(e), 2), ends), both)
-    return value, gradient
 
 
 def linearise(

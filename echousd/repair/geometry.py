@@ -40,6 +40,15 @@ def corners(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarr
     return position[:, None, [0, 2]] + half @ u
 
 
+def spread(gradient: np.ndarray, ends: np.ndarray, n: int) -> np.ndarray:
+    """(r, n, 6) float: gradients by the two boxes of each row, (r, 2, 6), put at the rows' boxes `ends` (r, 2) int."""
+    out = np.zeros((len(ends), n, COLUMNS))
+    r = np.arange(len(ends))
+    out[r, ends[:, 0]] = gradient[:, 0]
+    out[r, ends[:, 1]] += gradient[:, 1]
+    return out
+
+
 def pair_indices(n: int) -> np.ndarray:
     """(n (n - 1) / 2, 2) int: every pair once."""
     return np.stack(np.triu_indices(n, 1), -1)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair.constraints import relation_margins
 from echousd.repair.problem import pose, settle
+from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
 from echousd.repair.solver import RepairConfig, solve
 
