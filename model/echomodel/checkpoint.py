@@ -188,7 +188,9 @@ def write_released(
     classes: Sequence[str] | None,
     statistics: BoxStatistics | None,
 ) -> None:
-    """Write a model's tensors with config, vocabulary and box statistics inside; the file appears whole or not at all.
+    """Write a model's tensors with config, vocabulary, box statistics and the name of its text encoder, if it has one.
+
+    The file appears whole or not at all.
 
     Arguments:
         target: the file. model: what `config` describes. classes: names by id. statistics: box normalisation.
@@ -201,6 +203,8 @@ def write_released(
         ),
         "box_statistics": json.dumps(statistics.to_json() if statistics else None),
     }
+    if isinstance(model, ReleasedModel) and model.text_encoder is not None:
+        metadata["text_encoder"] = model.text_encoder
     state = {key: value.detach().clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -247,4 +251,5 @@ def load_released(path: str | os.PathLike[str]) -> nn.Module:
     if isinstance(model, ReleasedModel):
         model.classes = tuple(words["classes"]) if words and words["classes"] else None
         model.statistics = BoxStatistics.from_json(bounds) if bounds else None
+        model.text_encoder = metadata.get("text_encoder")
     return model

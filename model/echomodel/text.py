@@ -180,6 +180,24 @@ class CachedTextEncoder:
             beside.unlink(missing_ok=True)
 
 
+def encoder_named(name: str | None) -> TextEncoder:
+    """The encoder that a weights file names; None stands for CLIP, as in published checkpoints.
+
+    Raises:
+        TextEncoderError: a name that belongs to no encoder of ours, or to CLIP weights of one's own.
+    """
+    clip = ClipTextEncoder()
+    if name in (None, clip.name):
+        return CachedTextEncoder(clip)
+    kind, _, width = str(name).rpartition("-")
+    if kind == "random" and width.isdecimal() and int(width) > 0:
+        return RandomTextEncoder(int(width))
+    raise TextEncoderError(
+        f"was trained with the text encoder {name!r}, allowed: {clip.name}, random-WIDTH; "
+        "load it in Python and give the encoder (text=...)"
+    )
+
+
 def node_text(label: str) -> str:
     """The published text of a class: its bare label, and `room` for the scene's node."""
     return "room" if label == "_scene_" else label

@@ -11,7 +11,7 @@ import torch
 import trimesh
 
 from echomodel.boxes import Boxes
-from echomodel.checkpoint import class_names, convert
+from echomodel.checkpoint import class_names, convert, write_released
 from echomodel.echo import GraphEdit
 from echomodel.graph import GraphBatch
 from echomodel.released.bounds import statistics_from_bounds
@@ -181,6 +181,18 @@ def test_files_and_features_that_do_not_fit_are_named(tmp_path: Path):
     ):
         ReleasedEcho.load(file)
     loaded = ReleasedEcho.load(file, Words())
+    assert loaded.model.text_encoder is None  # a published checkpoint: CLIP
+    for name, text in (
+        ("random-7", r"text features of random-7 have 7 numbers, the model reads 12"),
+        ("word2vec", r"trained with the text encoder 'word2vec', allowed: ViT-B-32-quickgelu-openai, random-WIDTH"),
+    ):
+        loaded.model.text_encoder = name
+        write_released(tmp_path / "named.safetensors", loaded.model, loaded.model.config, loaded.classes, None)
+        with pytest.raises(ValueError, match=f"named.safetensors: .*{text}"):
+            ReleasedEcho.load(tmp_path / "named.safetensors")
+    loaded.model.text_encoder = "random-12"
+    write_released(tmp_path / "named.safetensors", loaded.model, loaded.model.config, loaded.classes, None)
+    assert ReleasedEcho.load(tmp_path / "named.safetensors").text.name == "random-12"
     assert (loaded.preset, len(loaded.hash), loaded.has_shapes) == ("released", 12, True)
     with pytest.raises(ValueError, match="box statistics are missing: convert the checkpoint with --bounds FILE"):
         loaded.sample_layout(BEDROOM, generator=seeded())

@@ -20,7 +20,7 @@ from echomodel.released.encoder import SceneGraphTensors
 from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
 from echomodel.released.placing import LEVEL
 from echomodel.released.scene import published_scene
-from echomodel.text import CachedTextEncoder, ClipTextEncoder, TextEncoder
+from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -34,15 +34,16 @@ class ReleasedEcho:
 
     Arguments:
         model: the model, with class names; boxes need box statistics, too.
-        text: encoder of class labels; None = OpenAI's CLIP (extra `text`) behind the cache on disk.
+        text: encoder of class labels; None = the one that the model names, else OpenAI's CLIP (extra `text`) behind
+            the cache on disk.
         hash: short hash of the weights it came from.
 
     Raises:
-        ValueError: class names are missing, or the text features have another width than the model reads.
+        ValueError: class names are missing, or the model's text encoder is unknown or has another width than it reads.
     """
 
     def __init__(self, model: ReleasedModel, text: TextEncoder | None = None, hash: str = "") -> None:
-        self.text = text or CachedTextEncoder(ClipTextEncoder())
+        self.text = text or encoder_named(model.text_encoder)
         if model.classes is None:
             count = model.encoder_config.classes
             raise ValueError(f"names of the model's {count} classes are unknown: convert with --classes FILE")

@@ -49,7 +49,11 @@ class ReleasedModel(GraphEncoder):
         config: sizes and preset; `config.encoder` must be there.
         classes: class names in the order of their ids; None = unknown.
         statistics: normalisation of boxes; None = unknown, boxes cannot be sampled then.
+
+    `text_encoder` is the name of the encoder of its text features (`echomodel.text`); None = CLIP, as published.
     """
+
+    text_encoder: str | None = None
 
     def __init__(
         self,

@@ -32,6 +32,7 @@ class PaperModel(ReleasedModel):
     """The `paper` preset as the trainer takes it: `network` is everything but the autoencoder."""
 
     parts = ("network", AUTOENCODER)
+    text_encoder: str | None = "not noted yet"
 
     def part_parameters(self, part: str) -> list[torch.nn.Parameter]:
         """Parameters of a part."""
@@ -87,7 +88,8 @@ class PaperStage:
 
     @torch.no_grad()
     def validate(self, model: PaperModel) -> dict[str, float]:
-        """The same losses on held-out rooms, the same draws every time."""
+        """The same losses on held-out rooms, the same draws every time; the model learns the name of its encoder."""
+        model.text_encoder = self.text.name  # the averaged weights come here before they are written
         generator = torch.Generator().manual_seed(0)
         if self.trained == (AUTOENCODER,):
             held = self.shapes.held_out.nonzero()[0]

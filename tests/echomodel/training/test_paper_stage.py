@@ -12,6 +12,7 @@ from echomodel.checkpoint import load_released
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
+from echomodel.released.echo import ReleasedEcho
 from echomodel.released.model import ReleasedModel
 from echomodel.released.placing import fit_to_box
 from echomodel.released.tables import LayoutTables
@@ -73,6 +74,8 @@ def test_both_branches_train_on_one_latent_graph_and_sample(data: Path, autoenco
     model = load_released(tmp_path / "run" / "weights.safetensors")
     assert isinstance(model, ReleasedModel)
     assert model.config.preset == "paper"
+    assert model.text_encoder == "random-12"
+    assert isinstance(ReleasedEcho.load(tmp_path / "run" / "weights.safetensors").text, RandomTextEncoder)
     stage = trainer.stage
     assert isinstance(stage, PaperStage)
     graph = stage.scene(stage.rooms.room(0, rules="sgfront"))
