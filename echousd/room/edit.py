@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -42,7 +43,8 @@ def edit(
         seed: of the new randomness.
         shapes, model, repair, steps, progress: as for `generate`.
 
-    Raises ValueError as `generate` and `read_room` do.
+    Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
+    `model` is None. Warns where the weights are not those that made the room.
     """
     if shapes not in pipeline.SHAPES:
         raise ValueError(f"shapes is {shapes!r}, allowed: {', '.join(pipeline.SHAPES)}")
@@ -56,6 +58,7 @@ def edit(
     if fresh or moving:
         with watch.stage("load"):
             echo = pipeline.load_model(model)
+            _compare(saved.manifest, echo, given=model is not None, root=Path(root))
         change = graph_edit(saved.graph, graph)
     for number, before in enumerate(saved.layouts):
         pinned = _pinned(graph, saved.graph, before, fresh, moving)
@@ -174,6 +177,24 @@ def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> 
     return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
 
 
-def _provenance(manifest: Mapping[str, Any], echo: Any) -> Provenance:
-    model = getattr(echo, "hash", "") or manifest["model"]
-    return Provenance(manifest["seed"], manifest["preset"], model, manifest["shapes"], manifest["source"])
+def _compare(manifest: Mapping[str, Any], echo: Echo, *, given: bool, root: Path) -> None:
+    """Refuse the weights that ship where the room needs others; warn where the room was made with other weights."""
+    preset, made_with = manifest["preset"], manifest["model"]
+    if not given and preset != pipeline.preset_of(echo):
+        raise ValueError(
+            f"{root}: made with weights of the preset {preset!r} (hash {made_with or 'unknown'}), which do not ship; "
+            "name their file (--weights FILE)"
+        )
+    if made_with and echo.hash and made_with != echo.hash:
+        warnings.warn(
+            f"{root}: made with weights {made_with}, edited with weights {echo.hash}; "
+            "what the edit does not touch stays as it is",
+            stacklevel=3,
+        )
+
+
+def _provenance(manifest: Mapping[str, Any], echo: Echo | None) -> Provenance:
+    preset, model = manifest["preset"], manifest["model"]
+    if echo is not None:
+        preset, model = pipeline.preset_of(echo), echo.hash or model
+    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])

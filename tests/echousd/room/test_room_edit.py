@@ -1,4 +1,6 @@
 import hashlib
+import json
+import warnings
 
 import pytest
 import torch
@@ -154,3 +156,26 @@ def test_command(root, echousd_command, monkeypatch):
     done = echousd_command("edit", root, "--remove", "sofa")
     assert done.code == 2
     assert "sofa" in done.err
+
+
+def test_weights_that_did_not_make_the_room_are_told(root, echousd_command, monkeypatch):
+    from echomodel.echo import EchoModel
+
+    newer = StandIn()
+    newer.hash = "newer"
+    graph = small_graph().add_node("chair", "nightstand")
+    with pytest.warns(UserWarning, match=r"bedroom.usda: made with weights standin, edited with weights newer; what"):
+        room = edit(root, graph, model=newer)
+    assert room.provenance.model == "newer"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        edit(root, graph, model=StandIn())
+
+    manifest = json.loads((root.parent / "bedroom.json").read_text())
+    (root.parent / "bedroom.json").write_text(json.dumps({**manifest, "preset": "released"}))
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+    before = hashes(root.parent)
+    done = echousd_command("edit", root, "--add", "chair:nightstand")
+    assert done.code == 2
+    assert "made with weights of the preset 'released' (hash standin), which do not ship; name their file" in done.err
+    assert hashes(root.parent) == before
