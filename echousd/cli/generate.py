@@ -45,10 +45,9 @@ def register(app: typer.Typer) -> None:
         ] = None,
         weights: Annotated[
             Path | None,
-            typer.Option(
-                "--weights", "--model", help="Weights file or folder, from convert or train; default: those that ship."
-            ),
+            typer.Option(help="Weights file or folder, from convert or train; default: those that ship."),
         ] = None,
+        model: Annotated[Path | None, typer.Option(hidden=True, help="The same as --weights.")] = None,
         shapes: Annotated[str, typer.Option(help="generate: shapes from the model; boxes: plain boxes.")] = "generate",
         samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
@@ -80,7 +79,7 @@ def register(app: typer.Typer) -> None:
             options = RoomOptions(up_axis.upper(), walls, atlas)
             imported = time.perf_counter() - started
             room = make(
-                graph, seed=seed, shapes=shapes, model=weights, preset=preset, repair=repair, samples=samples,
+                graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,
                 steps=steps, faces=faces, options=options, progress=listen,
             )  # fmt: skip
             spent = {"imports": imported, **room.timings}

@@ -90,12 +90,16 @@ def write_preview(root: Path) -> Path | None:
         return None
     buffer = io.BytesIO()
     picture.save(buffer, "PNG")
-    write_whole(out, buffer.getvalue())
+    write_whole(out, buffer.getvalue(), left="the room itself is complete")
     return out
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there as a whole or not at all; raises ValueError where that is impossible."""
+def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed") -> None:
+    """Write a file so that it is there as a whole or not at all; raises ValueError where that is impossible.
+
+    Arguments:
+        left: what the error says about the state in which everything else is left.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -103,7 +107,7 @@ def write_whole(path: Path, content: bytes) -> None:
         temporary.replace(path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
-        raise ValueError(f"{path}: cannot be written ({error.strerror or error}); nothing was changed") from None
+        raise ValueError(f"{path}: cannot be written ({error.strerror or error}); {left}") from None
 
 
 def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import echousd
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.folder import STAGING
-from echousd.room.save import identifier, save_flat
+from echousd.room.save import identifier, save_flat, write_preview
 
 
 def make(seed=0, shift=0.5, graph=None, **more):
@@ -230,6 +230,29 @@ def test_full_disk_says_so_and_changes_nothing(tmp_path, monkeypatch):
         ValueError, match=r"bedroom: cannot be written \(No space left on device\); nothing was changed"
     ):
         make(seed=2).save(folder, preview=False)
+    assert hashes(folder) == before
+
+
+def test_disk_that_is_full_at_the_preview_leaves_the_room(tmp_path, monkeypatch):
+    from pathlib import Path
+
+    pytest.importorskip("embreex")
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    before = hashes(folder)
+    real = Path.write_bytes
+
+    def full(self, data):
+        if ".png" in self.name:
+            real(self, data[:100])
+            raise OSError(28, "No space left on device")
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(
+        ValueError, match=r"bedroom.png: cannot be written \(No space left on device\); the room itself is complete"
+    ):
+        write_preview(folder / "bedroom.usda")
     assert hashes(folder) == before
 
 
