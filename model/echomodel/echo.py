@@ -15,7 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
-from echomodel.compact.wholeness import group_means, wholeness
+from echomodel.compact.wholeness import bearing, group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
@@ -201,7 +201,8 @@ class EchoModel:
             known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
                 back unchanged.
             noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
-            candidates: draws per object, of which the most whole is kept (pieces of one class and style together).
+            candidates: draws per object, of which the most whole that bears what stands on it is kept (pieces of one
+                class and style together).
             generator, steps, sampler, edit, guidance, progress: as for `sample_layout`.
 
         Returns:
@@ -235,7 +236,7 @@ class EchoModel:
             )  # fmt: skip
             for draw in codes.chunk(count):
                 drawn = self._decoded(draw)
-                whole = group_means(wholeness(drawn), equal) if tries > 1 else best
+                whole = group_means(self._merit(drawn, boxes, graph), equal) if tries > 1 else best
                 if not len(grids):
                     grids, best = drawn, whole
                     continue
@@ -268,6 +269,11 @@ class EchoModel:
             predict = guided(predict, of(bare, self.graph_latent(bare)), guidance)
         first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
         return agreeing(predict, equal.repeat(count) + first)
+
+    @staticmethod
+    def _merit(grids: Tensor, boxes: Boxes, graph: GraphBatch) -> Tensor:
+        """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
+        return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, graph.triplets))
 
     def _decoded(self, codes: Tensor) -> Tensor:
         """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time."""

@@ -1,4 +1,4 @@
-"""How whole a generated shape is: of several draws the most whole is kept."""
+"""How whole a generated shape is, and whether it bears what stands on it: of several draws the best is kept."""
 
 from __future__ import annotations
 
@@ -7,7 +7,12 @@ import torch
 from scipy import ndimage
 from torch import Tensor
 
+from echomodel.boxes import Boxes
+
 FILLED = 60  # voxels that a shape spans on every axis of its box-normalised grid
+TOP = 58  # voxel from which on a column counts as reaching the top of the box
+STANDING_ON = 7
+PLAY = 0.1  # metres between the bottom of one and the top of the other
 
 
 def wholeness(grids: Tensor) -> Tensor:
@@ -32,6 +37,37 @@ def _whole(inside: np.ndarray) -> float:
         used = np.flatnonzero(inside.any(axis=tuple(other for other in range(3) if other != axis)))
         spans *= min((used[-1] - used[0] + 1) / FILLED, 1.0)
     return float(volume.max() / volume.sum() * spans)
+
+
+def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """How much of the ground under what stands on each shape is really there, at the top of its box.
+
+    A desk with a shelf at its back fills its box as well as a plain one, but a lamp in its middle would float.
+
+    Arguments:
+        grids: (N, 64, 64, 64) float signed distances, negative inside.
+        boxes: N boxes.
+        triplets: (E, 3) int64; `standing_on` with the subject at the object's top counts.
+
+    Returns:
+        (N,) float32 in [0, 1]; 1 for whatever bears nothing.
+    """
+    out = torch.ones(len(grids), device=grids.device)
+    high = (grids[:, :, TOP:] < 0).any(2)  # (N, x, z): columns that reach the top
+    for above, _, below in triplets[triplets[:, 1] == STANDING_ON].tolist():
+        gap = boxes.position[above, 1] - boxes.position[below, 1] - boxes.size[below, 1]
+        if above == below or abs(float(gap)) > PLAY:
+            continue
+        x, z = (boxes.position[above] - boxes.position[below])[[0, 2]].tolist()
+        sin, cos = float(boxes.yaw[below].sin()), float(boxes.yaw[below].cos())
+        place = np.array([cos * x - sin * z, sin * x + cos * z])
+        extent = boxes.size[below][[0, 2]].cpu().numpy()
+        foot = float(boxes.size[above][[0, 2]].min()) / 4
+        first = np.round((place - foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        last = np.round((place + foot) / extent * FILLED + 31.5).clip(2, 61).astype(int)
+        ground = high[below, first[0] : last[0] + 1, first[1] : last[1] + 1]
+        out[below] = torch.minimum(out[below], ground.float().mean())
+    return out
 
 
 def group_means(values: Tensor, groups: Tensor) -> Tensor:

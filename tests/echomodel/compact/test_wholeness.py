@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import torch
 
-from echomodel.compact.wholeness import group_means, wholeness
+from echomodel.boxes import Boxes
+from echomodel.compact.wholeness import bearing, group_means, wholeness
 
 
 def solid(*boxes: tuple[slice, slice, slice]) -> torch.Tensor:
@@ -25,3 +29,23 @@ def test_wholeness() -> None:
 def test_group_means() -> None:
     found = group_means(torch.tensor([1.0, 0.0, 0.5, 0.25]), torch.tensor([0, 0, 2, 3]))
     assert torch.allclose(found, torch.tensor([0.5, 0.5, 0.5, 0.25]))
+
+
+def test_a_shelf_at_the_back_bears_no_lamp_in_the_middle() -> None:
+    plain, hutch = torch.ones(64, 64, 64), torch.ones(64, 64, 64)
+    plain[2:62, 2:62, 2:62] = -1
+    hutch[2:62, 2:30, 2:62] = -1
+    hutch[2:62, 2:62, 2:12] = -1  # the back is at -Z
+    boxes = Boxes(
+        torch.tensor([[1.4, 1.2, 0.6], [0.2, 0.4, 0.2]]),
+        torch.tensor([[1.0, 0.0, 2.0], [1.0, 1.2, 2.0]]),
+        torch.tensor([math.pi / 2, 0.0]),
+    )
+    told = torch.tensor([[1, 7, 0], [0, 1, 1]])
+    lamp = torch.ones(64, 64, 64)
+    assert bearing(torch.stack([plain, lamp]), boxes, told).tolist() == [1.0, 1.0]
+    assert bearing(torch.stack([hutch, lamp]), boxes, told).tolist() == [0.0, 1.0]
+    # turned by a quarter the back lies at -X of the room: there the shelf bears
+    behind = replace(boxes, position=torch.tensor([[1.0, 0.0, 2.0], [0.73, 1.2, 2.0]]))
+    assert bearing(torch.stack([hutch, lamp]), behind, told).tolist() == [1.0, 1.0]
+    assert bearing(torch.stack([hutch, lamp]), boxes, told[1:]).tolist() == [1.0, 1.0]
