@@ -68,6 +68,7 @@ def _open_paper(recipe: Recipe, folder: Path, resume: bool, report: Report | Non
     if model.statistics is None:
         model.statistics = box_bounds(rooms)
     text = text_encoder(recipe.text, recipe.paper.text)
+    model.text_encoder = text.name  # every weights file says by whom its words were read
     stage = PaperStage(
         rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder
     )
