@@ -101,10 +101,10 @@ class ShapeConfig:
     conditioning: Literal["cross", "concat"] = "cross"
     objective: Objective = "flow"
     prediction: Prediction = "sample"
-    temperature: float = 0.75
+    temperature: float = 1.0
     candidates: int = 8
-    steps: int = 25
-    sampler: Sampler = "euler"
+    steps: int = 10
+    sampler: Sampler = "ancestral"
 
 
 @dataclass(frozen=True)

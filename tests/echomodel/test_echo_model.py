@@ -18,7 +18,16 @@ SIZES = {
     "latent": {"width": 16},
     "layout": {"width": 32, "layers": 2, "steps": 3},
     "autoencoder": {"width": 8},
-    "shape": {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "steps": 2, "components": 8, "tokens": 2},
+    "shape": {
+        "width": 16,
+        "layers": 1,
+        "heads": 2,
+        "echo_width": 16,
+        "steps": 2,
+        "components": 8,
+        "tokens": 2,
+        "sampler": "euler",
+    },
 }
 
 
