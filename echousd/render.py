@@ -86,9 +86,12 @@ def top_view(scenery: Scenery) -> View:
 
 def corner_view(scenery: Scenery) -> View:
     """From above a corner, the one where least is hidden, the whole scene in the picture."""
+    from scipy.spatial import ConvexHull
+
     from echousd.room.cameras import APERTURE, FOCAL_LENGTH, perspective_view
 
     points = scenery.triangles.reshape(-1, 3).astype(float)
+    points = points[ConvexHull(points, qhull_options="QJ").vertices]  # nothing else reaches the picture's border
     return View(perspective_view(points, scenery.furniture), APERTURE / 2 / FOCAL_LENGTH, False)
 
 

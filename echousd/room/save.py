@@ -79,13 +79,16 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
     return path
 
 
+PREVIEW = 400  # pixels
+
+
 def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
     from echousd.render import QUICK, RenderUnavailable, render_file
 
     out = root.with_suffix(".png")
     try:
-        picture = render_file(root, view="perspective", size=512, rays=QUICK)
+        picture = render_file(root, view="perspective", size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
     buffer = io.BytesIO()

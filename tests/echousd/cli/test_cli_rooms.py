@@ -30,7 +30,7 @@ def test_generate_render_and_export(graph, tmp_path, echousd_command):
     for stage in ("imports", "read", "load", "layout", "repair", "shapes", "meshes", "write", "preview", "total"):
         assert f"{stage:>10} " in done.out
     assert "Shaping the furniture" in done.err
-    assert Image.open(folder / "bedroom.png").size == (512, 512)
+    assert Image.open(folder / "bedroom.png").size == (400, 400)
     assert json.loads((folder / "bedroom.json").read_text())["seed"] == 7
 
     picture = tmp_path / "top.png"
