@@ -73,7 +73,7 @@ def register(app: typer.Typer) -> None:
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
         with progress_bar() as listen:
-            gc.disable()  # imports make a million objects and no garbage: a fifth of their time was spent looking for it
+            gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
             from echousd.room.pipeline import generate as make
             from echousd.room.room import RoomOptions
             from echousd.room.save import save_flat, save_layers, write_preview
