@@ -63,44 +63,36 @@ def compiled(function: Callable[..., Tensor]) -> Callable[..., Tensor] | None:
     return torch.compile(function)
 
 
+def step_modes(net: nn.Module, x: Tensor, context: object) -> dict[str, Run | None]:
+    """One step of a denoiser at level 0.5."""
+    level, faster = torch.full((len(x),), 0.5), compiled(net)
+
+    def run() -> Tensor:
+        return net(x, level, context)
+
+    return {
+        "eager": run,
+        "compile": None if faster is None else lambda: faster(x, level, context),
+        "packed": packed(net, x, level, context),
+        "bf16": bf16(run),
+        "compile+bf16": None if faster is None else bf16(lambda: faster(x, level, context)),
+    }
+
+
 def layout_modes(model: EchoModel, scenes: int) -> dict[str, Run | None]:
     """One layout step of rooms with 12 objects, every ordered pair related."""
     graph = GraphBatch.pack([dense_graph(12)] * scenes)
     pairs, net = pairs_of(graph), model.model.layout
     rules = torch.zeros(scenes, dtype=torch.int64)
     context = net.context(graph, pairs, model.graph_latent(graph), rules)
-    x, level = torch.randn(graph.num_nodes, 8), torch.full((graph.num_nodes,), 0.5)
-    faster = compiled(net)
-
-    def run() -> Tensor:
-        return net(x, level, context)
-
-    return {
-        "eager": run,
-        "compile": None if faster is None else lambda: faster(x, level, context),
-        "packed": packed(net, x, level, context),
-        "bf16": bf16(run),
-        "compile+bf16": None if faster is None else bf16(lambda: faster(x, level, context)),
-    }
+    return step_modes(net, torch.randn(graph.num_nodes, 8), context)
 
 
 def shape_modes(model: EchoModel, objects: int) -> dict[str, Run | None]:
     """One shape step of a room."""
     graph, net = dense_graph(objects), model.model.shape
     context = net.context(graph, torch.ones(objects, 3), pairs_of(graph), model.graph_latent(graph))
-    x, level = torch.randn(objects, model.config.shape.components), torch.full((objects,), 0.5)
-    faster = compiled(net)
-
-    def run() -> Tensor:
-        return net(x, level, context)
-
-    return {
-        "eager": run,
-        "compile": None if faster is None else lambda: faster(x, level, context),
-        "packed": packed(net, x, level, context),
-        "bf16": bf16(run),
-        "compile+bf16": None if faster is None else bf16(lambda: faster(x, level, context)),
-    }
+    return step_modes(net, torch.randn(objects, model.config.shape.components), context)
 
 
 def decode_modes(model: EchoModel, objects: int) -> dict[str, Run | None]:

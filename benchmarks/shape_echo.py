@@ -17,13 +17,13 @@ import torch
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import shape_predictor
 from echomodel.data.shapeset import ShapeSet
-from echomodel.echo import EchoModel
+from echomodel.echo import SAME_STYLE, EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.samplers import sample
 from echomodel.training.shape_stage import draw_suites, shape_loss
 from echomodel.training.shapes import read
 
-SAME_STYLE, SUITES = 13, 200
+SUITES = 200
 
 
 @dataclass(frozen=True)

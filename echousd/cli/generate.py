@@ -74,12 +74,12 @@ def register(app: typer.Typer) -> None:
         set_crate_version(crate)
         with progress_bar() as listen:
             gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
-            from echousd.room.pipeline import generate as make
-            from echousd.room.room import RoomOptions
-            from echousd.room.save import save_flat, save_layers, write_preview
-
-            gc.freeze()
-            gc.enable()
+            try:
+                from echousd.room.pipeline import generate as make
+                from echousd.room.room import RoomOptions
+                from echousd.room.save import save_flat, save_layers, write_preview
+            finally:
+                gc.enable()
             options = RoomOptions(up_axis.upper(), walls, atlas)
             imported = time.perf_counter() - started
             room = make(

@@ -86,10 +86,9 @@ def decimate(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     if len(mesh.faces) <= faces:
         return mesh
     reduced = _quadric(mesh, faces)
-    if _closed(reduced) and len(reduced.faces) <= 1.05 * faces:
+    if reduced.is_watertight and reduced.is_winding_consistent and len(reduced.faces) <= 1.05 * faces:
         return reduced
-    coarse = _quadric(mesh, 3 * faces) if len(mesh.faces) > 4 * faces else mesh  # cheaper, and seldom opens a mesh yet
-    return _manifold(coarse if _closed(coarse) else mesh, faces) or reduced
+    return _manifold(mesh, faces) or reduced
 
 
 def _quadric(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
@@ -103,10 +102,6 @@ def _quadric(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     reduced.update_faces(reduced.nondegenerate_faces() & reduced.unique_faces())
     reduced.remove_unreferenced_vertices()
     return reduced
-
-
-def _closed(mesh: trimesh.Trimesh) -> bool:
-    return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
 def _manifold(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh | None:

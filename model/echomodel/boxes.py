@@ -67,6 +67,12 @@ class Boxes:
         """The same boxes on another device."""
         return Boxes(self.size.to(device), self.position.to(device), self.yaw.to(device))
 
+    def replaced(self, mask: Tensor, by: Boxes) -> Boxes:
+        """The same boxes, but those of `by` where `mask` (N,) bool is true."""
+        wide = mask[:, None]
+        size, position = torch.where(wide, by.size, self.size), torch.where(wide, by.position, self.position)
+        return Boxes(size, position, torch.where(mask, by.yaw, self.yaw))
+
     def check(self) -> None:
         """Raises ValueError for a box that is not finite or has an extent that is not positive; names the first."""
         flat = torch.cat([self.size, self.position, self.yaw[:, None]], dim=1)

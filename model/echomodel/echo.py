@@ -157,12 +157,7 @@ class EchoModel:
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
         if known is None or known_mask is None:
             return boxes
-        wide = known_mask[:, None]
-        return Boxes(
-            torch.where(wide, known.size, boxes.size),
-            torch.where(wide, known.position, boxes.position),
-            torch.where(known_mask, known.yaw, boxes.yaw),
-        )
+        return boxes.replaced(known_mask, known)
 
     @torch.no_grad()
     def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:

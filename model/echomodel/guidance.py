@@ -7,10 +7,11 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.rules import margins, measured
+from echomodel.rules.sets import CLOSE, SYMMETRICAL
 from echomodel.samplers import Predict
 
 SLACK = 0.03  # metres or ratio that the guidance asks for beyond what the rule does
-EMPHASIS = {5: 3.0, 12: 8.0}  # close by and symmetrical must hit a small spot against many relations of other kinds
+EMPHASIS = {CLOSE: 3.0, SYMMETRICAL: 8.0}  # they must hit a small spot against many relations of other kinds
 
 
 def relation_guided(

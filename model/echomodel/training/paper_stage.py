@@ -88,8 +88,7 @@ class PaperStage:
 
     @torch.no_grad()
     def validate(self, model: PaperModel) -> dict[str, float]:
-        """The same losses on held-out rooms, the same draws every time; the model learns the name of its encoder."""
-        model.text_encoder = self.text.name  # the averaged weights come here before they are written
+        """The same losses on held-out rooms, the same draws every time."""
         generator = torch.Generator().manual_seed(0)
         if self.trained == (AUTOENCODER,):
             held = self.shapes.held_out.nonzero()[0]

@@ -1,4 +1,3 @@
-import contextlib
 import errno
 import json
 import os
@@ -9,8 +8,8 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from stopped_disk import stopped_disk
 
-from echousd.room import folder as folders
 from echousd.room.folder import STAGING, check_writable, claim, recover, write_together
 
 OLD = {"assets/a.usda": b"a old", "layers/one.usda": b"one old", "room.usda": b"root old"}
@@ -59,24 +58,8 @@ class Killed(Exception):
 def test_killed_at_any_step_leaves_the_old_or_the_new_room(tmp_path, monkeypatch, moment):
     """Every operation on the disk is a moment; after it nothing more happens, not even cleaning up."""
     save(tmp_path, OLD)
-    steps = 0
-
-    def counted(real):
-        def call(*args, **kwargs):
-            nonlocal steps
-            steps += 1
-            if steps > moment:
-                raise Killed
-            return real(*args, **kwargs)
-
-        return call
-
-    with monkeypatch.context() as patch:
-        for name in ("write_bytes", "write_text", "replace", "mkdir", "unlink"):
-            patch.setattr(Path, name, counted(getattr(Path, name)))
-        patch.setattr(folders.shutil, "rmtree", counted(folders.shutil.rmtree))
-        with contextlib.suppress(Killed):
-            save(tmp_path, NEW, remove=["layers/gone.usda"])
+    with stopped_disk(monkeypatch, moment, Killed):
+        save(tmp_path, NEW, remove=["layers/gone.usda"])
     found = written(tmp_path)
     assert found["room.usda"] in (b"root old", b"root new")
     if found["room.usda"] == b"root new":  # what the root refers to is there before the root

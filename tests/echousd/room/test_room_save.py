@@ -1,4 +1,3 @@
-import contextlib
 import hashlib
 import os
 import signal
@@ -10,6 +9,7 @@ from dataclasses import replace
 import pytest
 from pxr import Sdf, Usd, UsdGeom
 from small_room import StandIn, small_graph
+from stopped_disk import stopped_disk
 
 import echousd
 from echousd.room import RoomOptions
@@ -169,31 +169,15 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
 @pytest.mark.parametrize("moment", range(0, 40, 3))
 def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, moment):
     """Another graph is saved over a room and after some operation on the disk nothing happens, no tidying either."""
-    from pathlib import Path
 
     from echousd.room import folder as folders
 
     folder = tmp_path / "bedroom"
     root = make(seed=1).save(folder, preview=False)
     other = make(seed=2, graph=small_graph().remove_node("pendant").add_node("second_bed", "double_bed"))
-    files, done = len(room_files(other)), 0
-
-    def counted(real):
-        def call(*args, **kwargs):
-            nonlocal done
-            done += 1
-            if done > files + moment:  # each file was written to the staging folder before
-                raise KeyboardInterrupt
-            return real(*args, **kwargs)
-
-        return call
-
-    with monkeypatch.context() as patch:
-        for name in ("write_bytes", "write_text", "replace", "mkdir", "unlink"):
-            patch.setattr(Path, name, counted(getattr(Path, name)))
-        patch.setattr(folders.shutil, "rmtree", counted(folders.shutil.rmtree))
-        with contextlib.suppress(KeyboardInterrupt):
-            other.save(folder, preview=False)
+    files = len(room_files(other))  # each is written to the staging folder before
+    with stopped_disk(monkeypatch, files + moment, KeyboardInterrupt):
+        other.save(folder, preview=False)
     layers = [path for path in folder.rglob("*.usd*") if STAGING not in path.parts]
     for path in layers:
         layer = Sdf.Layer.Find(str(path))
