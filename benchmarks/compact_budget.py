@@ -45,7 +45,7 @@ def budget() -> dict[str, float]:
     graph = dense_graph(nodes)
     pairs = pairs_of(graph)
     latent = model.latent(graph.category, pairs)
-    layout = model.layout.context(graph, pairs, latent, torch.zeros(1, dtype=torch.int64))
+    layout = model.layout.context(graph, pairs, latent, torch.zeros(1, dtype=torch.int64), statistics.scale())
     shape = model.shape.context(graph, torch.ones(nodes, 3), pairs, latent)
     coder = model.autoencoder
     level, codes = torch.ones(nodes), torch.randn(nodes, config.shape.components)

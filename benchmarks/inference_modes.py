@@ -84,7 +84,7 @@ def layout_modes(model: EchoModel, scenes: int) -> dict[str, Run | None]:
     graph = GraphBatch.pack([dense_graph(12)] * scenes)
     pairs, net = pairs_of(graph), model.model.layout
     rules = torch.zeros(scenes, dtype=torch.int64)
-    context = net.context(graph, pairs, model.graph_latent(graph), rules)
+    context = net.context(graph, pairs, model.graph_latent(graph), rules, model.model.statistics.scale(graph.category))
     return step_modes(net, torch.randn(graph.num_nodes, 8), context)
 
 

@@ -60,7 +60,8 @@ def main() -> None:
         few = [stored.room(k) for k in range(SCENES)]
     packed = PackedRooms.build(few, 0)
     nodes = int(packed.count.sum())
-    model = CompactModel(CompactConfig(), BoxStatistics.from_boxes(packed.boxes), ("latent", "layout"))
+    statistics = BoxStatistics.from_boxes(packed.boxes, packed.category, CompactConfig().categories)
+    model = CompactModel(CompactConfig(), statistics, ("latent", "layout"))
     stage = LayoutStage(packed, packed, nodes, 1.0)
     generator = torch.Generator().manual_seed(0)
 

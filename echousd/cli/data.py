@@ -128,8 +128,8 @@ def _of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBoxes]:
 
 @data_app.command("report")
 def report(
-    rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder [newly generated rooms].")] = None,
-    real: Annotated[Path | None, typer.Option(help="Real rooms to compare with [statistics of 896 rooms].")] = None,
+    rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder; default: newly generated rooms.")] = None,
+    real: Annotated[Path | None, typer.Option(help="Rooms to compare with; default: 896 real ones.")] = None,
     count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
     seed: Seed = 0,
     worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,

@@ -35,12 +35,14 @@ def layout(
     contradictions: Annotated[
         bool, typer.Option("--contradictions", help="Keep what contradicts a changed relation, as published.")
     ] = False,
-    steps: Annotated[int | None, typer.Option(help="Sampling steps [the model's].")] = None,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.")] = None,
     guidance: Annotated[float, typer.Option(help="Scale of guidance towards the relations, 1 = off.")] = 1.0,
     relation_guidance: Annotated[
-        float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off [the model's].")
+        float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off; default: the model's.")
     ] = None,
-    model: Annotated[str | None, typer.Option(help='Weights [shipped]; "truth" scores the true boxes.')] = None,
+    model: Annotated[
+        str | None, typer.Option(help='Weights, or "truth" for the true boxes; default: those that ship.')
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
 ) -> None:

@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
 def shapes(
     meshes: Annotated[Path | None, typer.Option(help="Set of real meshes, made by `echousd data meshes`.")] = None,
     shape_set: Annotated[Path | None, typer.Option("--set", help="Shape set, made by `echousd data build`.")] = None,
-    model: Annotated[Path | None, typer.Option(help="Weights file or folder; default the shipped ones.")] = None,
+    model: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     limit: Annotated[int, typer.Option(min=1, help="Held-out shapes to reconstruct.")] = 200,
     rooms: Annotated[
         int, typer.Option(min=0, help="Rooms to fill with generated shapes; 0 = reconstruction only.")

@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 def train(
     recipe: Annotated[Path, typer.Argument(help="Recipe file (TOML), see model/recipes.")],
     settings: Annotated[list[str] | None, typer.Option("--set", help="Change a field: key.sub=value.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="The run's folder [runs/RECIPE].")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="The run's folder; default: runs/RECIPE.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue from the folder's checkpoint.")] = False,
     minutes: Annotated[float | None, typer.Option(help="Stop (with a checkpoint) after so many minutes.")] = None,
 ) -> None:

@@ -187,7 +187,7 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         [words.category_id(node.category) for node in graph.nodes],
         [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations],
         room_type=words.room_type_id(graph.room.type),
-        floor=graph.room.extents,
+        floor=graph.room.floor_polygon or graph.room.size,
         names=[node.name for node in graph.nodes],
     )
 

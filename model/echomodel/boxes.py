@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -11,6 +12,9 @@ from torch import Tensor
 
 from echomodel.roomboxes import RoomBoxes
 
+FEWEST = 50  # boxes that the statistics of a class need
+NARROWEST = 0.02  # log metres: sizes that hardly vary would turn noise into huge numbers
+Z95 = 1.6449  # standard score of the 95th percentile
 LARGEST = 10.0  # log metres, far beyond any furniture
 
 
@@ -85,21 +89,37 @@ class Boxes:
                 size, position = self.size[at].tolist(), self.position[at].tolist()
                 raise ValueError(f"box {at} {text}: size {size}, position {position}, yaw {float(self.yaw[at])}")
 
-    def encode(self, statistics: BoxStatistics) -> Tensor:
-        """(N, 8) float32 [sx, sy, sz, px, py, pz, sin, cos], size and position normalised by `statistics`."""
-        size = self.size.clamp_min(1e-3).log() if statistics.log_size else self.size
-        low, span = statistics.bounds(self.size)
-        scaled = (torch.cat([size, self.position], dim=1) - low) / span * 2 - 1
+    def encode(self, scale: BoxScale) -> Tensor:
+        """(N, 8) float32 [sx, sy, sz, px, py, pz, sin, cos], size and position in the units of `scale`."""
+        size = self.size.clamp_min(1e-3).log() if scale.log_size else self.size
+        off = torch.cat([size, self.position], dim=1) - scale.middle.to(size)
+        scaled = off / torch.where(off < 0, scale.below.to(size), scale.above.to(size))
         return torch.cat([scaled, torch.sin(self.yaw)[:, None], torch.cos(self.yaw)[:, None]], dim=1)
 
     @classmethod
-    def decode(cls, vectors: Tensor, statistics: BoxStatistics) -> Boxes:
-        """The inverse of `encode`, differentiable; the (sin, cos) pair may have any length, yaw = atan2(sin, cos)."""
-        low, span = statistics.bounds(vectors)
-        plain = (vectors[:, :6] + 1) / 2 * span + low
+    def decode(cls, vectors: Tensor, scale: BoxScale) -> Boxes:
+        """The inverse of `encode`, differentiable: (N, 8) of any length of (sin, cos), yaw = atan2(sin, cos)."""
+        scaled = vectors[:, :6]
+        step = torch.where(scaled < 0, scale.below.to(vectors), scale.above.to(vectors))
+        plain = scale.middle.to(vectors) + scaled * step
         # a guess of the clean box from pure noise lies anywhere: its exponential must stay finite, gradients too
-        size = plain[:, :3].clamp(-LARGEST, LARGEST).exp() if statistics.log_size else plain[:, :3]
+        size = plain[:, :3].clamp(-LARGEST, LARGEST).exp() if scale.log_size else plain[:, :3]
         return cls(size, plain[:, 3:], torch.atan2(vectors[:, 6], vectors[:, 7]))
+
+
+@dataclass(frozen=True, eq=False)
+class BoxScale:
+    """What the normalised numbers of boxes stand for: 0 is the `middle`, -1 lies `below` under it, 1 `above` over it.
+
+    Arguments:
+        middle, below, above: (N, 6) or (1, 6) float32, size and position, metres.
+        log_size: sizes are in log metres.
+    """
+
+    middle: Tensor
+    below: Tensor
+    above: Tensor
+    log_size: bool
 
 
 @dataclass(frozen=True)
@@ -110,9 +130,13 @@ class BoxStatistics:
         size_low, size_high: three numbers each, metres (or log metres with `log_size`).
         position_low, position_high: three numbers each, metres.
         log_size: normalise the logarithm of the size, so that a volume ratio is a difference.
+        classes: for every class nine numbers, the middle of log x, y, z, how far -1 lies below and 1 above each; with
+            them sizes become standard scores within their class and the size range is not used. Empty = one range for
+            all.
 
     Raises:
-        ValueError: not three numbers each, or a high that is not above its low.
+        ValueError: not three or nine numbers each, a high that is not above its low, a step that is not positive, or
+            classes without `log_size`.
     """
 
     size_low: tuple[float, ...]
@@ -120,6 +144,7 @@ class BoxStatistics:
     position_low: tuple[float, ...]
     position_high: tuple[float, ...]
     log_size: bool = False
+    classes: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         for kind in ("size", "position"):
@@ -128,10 +153,18 @@ class BoxStatistics:
                 raise ValueError(f"box statistics: {kind} bounds have {len(low)} and {len(high)} numbers, expected 3")
             if any(not a < b for a, b in zip(low, high, strict=True)):
                 raise ValueError(f"box statistics: {kind}_high {high} is not above {kind}_low {low} on every axis")
+        for number, row in enumerate(self.classes):
+            if len(row) != 9 or min(row[3:]) <= 0 or not self.log_size:
+                raise ValueError(f"box statistics: class {number} is {row}, expected nine numbers of log sizes")
 
     @classmethod
-    def from_boxes(cls, boxes: Boxes) -> BoxStatistics:
-        """Mean plus and minus one standard deviation of log size and position; x and z share theirs (rooms turn)."""
+    def from_boxes(cls, boxes: Boxes, category: Tensor, categories: int) -> BoxStatistics:
+        """Spreads of log size per class and of position; x and z share theirs (rooms turn).
+
+        Arguments:
+            boxes: N boxes. category: (N,) int64, their classes. categories: number of classes; one with fewer than
+                `FEWEST` boxes gets the spread of all.
+        """
         size, position = boxes.size.double().clamp_min(1e-3).log(), boxes.position.double()
         mean, std = size.mean(0), size.std(0)
         centre = torch.stack([torch.zeros(()), position[:, 1].mean().float(), torch.zeros(())]).double()
@@ -139,19 +172,38 @@ class BoxStatistics:
         spread = torch.stack([plane, position[:, 1].std(), plane])
         numbers = [(mean - std), (mean + std), (centre - spread), (centre + spread)]
         low, high, start, stop = (tuple(round(float(v), 5) for v in values) for values in numbers)
-        return cls(low, high, start, stop, log_size=True)
+        rows, shares = [], size.new_tensor([0.05, 0.5, 0.95])
+        for number in range(categories):
+            own = size[category == number]
+            few, middle, many = (own if len(own) >= FEWEST else size).quantile(shares, dim=0)
+            steps = (torch.cat([middle - few, many - middle]) / Z95).clamp_min(NARROWEST)
+            rows.append(tuple(round(float(v), 4) for v in torch.cat([middle, steps])))
+        return cls(low, high, start, stop, log_size=True, classes=tuple(rows))
 
-    def bounds(self, like: Tensor) -> tuple[Tensor, Tensor]:
-        """low (6,) and high - low (6,) as tensors of the dtype and device of `like`."""
-        low = like.new_tensor([*self.size_low, *self.position_low])
-        return low, like.new_tensor([*self.size_high, *self.position_high]) - low
+    def scale(self, category: Tensor | None = None) -> BoxScale:
+        """What the numbers of boxes stand for: of N boxes of `category` (N,) int64, or of all alike.
+
+        Raises:
+            ValueError: sizes are normalised within classes and there is no `category`.
+        """
+        low = torch.tensor([*self.size_low, *self.position_low])[None]
+        high = torch.tensor([*self.size_high, *self.position_high])[None]
+        middle, half = (low + high) / 2, (high - low) / 2
+        if not self.classes:
+            return BoxScale(middle, half, half, self.log_size)
+        if category is None:
+            raise ValueError("box statistics normalise sizes within classes: the classes of the boxes are needed")
+        sizes = torch.tensor(self.classes).to(category.device)[category].split(3, dim=1)
+        places = (values[:, 3:].to(category.device).expand(len(category), 3) for values in (middle, half, half))
+        centre, below, above = (torch.cat(pair, 1) for pair in zip(sizes, places, strict=True))
+        return BoxScale(centre, below, above, self.log_size)
 
     def to_json(self) -> dict:
         """Plain lists and numbers."""
-        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
+        return json.loads(json.dumps(asdict(self)))
 
     @classmethod
     def from_json(cls, raw: dict) -> BoxStatistics:
         """What `to_json` wrote."""
         fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in raw.items()}
-        return cls(**fields)
+        return cls(**{**fields, "classes": tuple(tuple(row) for row in fields.get("classes", ()))})

@@ -32,6 +32,7 @@ class LayoutConfig:
     Arguments:
         width: channels of a node.
         layers: echo layers.
+        drafts: how often the prediction so far is measured and told to the next layers.
         frequencies: octaves of the Fourier features of the noisy box.
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
@@ -41,11 +42,12 @@ class LayoutConfig:
     """
 
     width: int = 192
-    layers: int = 5
+    layers: int = 6
+    drafts: int = 2
     frequencies: int = 4
-    objective: Objective = "flow"
+    objective: Objective = "velocity"
     steps: int = 20
-    sampler: Sampler = "euler"
+    sampler: Sampler = "ancestral"
     guidance: float = 0.1
     guidance_rounds: int = 4
 
@@ -92,7 +94,7 @@ class ShapeConfig:
     width: int = 256
     layers: int = 4
     heads: int = 4
-    components: int = 256
+    components: int = 384
     tokens: int = 4
     echo_width: int = 128
     echo_layers: int = 2

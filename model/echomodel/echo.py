@@ -136,7 +136,8 @@ class EchoModel:
         config = self.config
         graph = self._checked(graph)
         known, known_mask = self._known(graph, known, known_mask)
-        given = None if known is None else known.encode(self.model.statistics)
+        scale = self.model.statistics.scale(graph.category)
+        given = None if known is None else known.encode(scale)
         conditional = self._layout_predictor(graph, self.graph_latent(graph, edit), rules)
         if guidance != 1.0:
             bare = graph.with_triplets(graph.triplets[:0])
@@ -145,7 +146,7 @@ class EchoModel:
         strength = config.layout.guidance if relation_guidance is None else relation_guidance
         if strength:
             conditional = relation_guided(
-                conditional, graph.triplets, self.model.statistics,
+                conditional, graph.triplets, scale,
                 rules=rules, strength=strength, rounds=config.layout.guidance_rounds, floor=graph.floor[graph.scene],
             )  # fmt: skip
         x = self._noise((graph.num_nodes, 8), generator, noise)
@@ -153,7 +154,7 @@ class EchoModel:
             sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,
             known=given, known_mask=known_mask, generator=generator, progress=progress,
         )  # fmt: skip
-        boxes = Boxes.decode(vectors, self.model.statistics)
+        boxes = Boxes.decode(vectors, scale)
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
         if known is None or known_mask is None:
             return boxes

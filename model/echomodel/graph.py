@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from echomodel.floors import area, centred, extents, padded, trimmed
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 
@@ -21,7 +23,8 @@ class GraphBatch:
         triplets: (E, 3) int64, [subject, predicate, object]; subject and object index the packed nodes.
         scene: (N,) int64, number of the scene that a node belongs to, never decreasing.
         room_type: (S,) int64, position in the vocabulary's room types.
-        floor: (S, 2) float32, x and z extent of the floor's bounding box in metres, NaN = unknown.
+        floor: (S, K, 2) float32, x and z of each floor's corners about the centre of their bounding box, metres; padded
+            with NaN, all NaN = unknown.
         names: N node names, or None.
 
     Raises:
@@ -42,7 +45,7 @@ class GraphBatch:
             "triplets": ((len(self.triplets), 3), torch.int64),
             "scene": ((nodes,), torch.int64),
             "room_type": ((scenes,), torch.int64),
-            "floor": ((scenes, 2), torch.float32),
+            "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), torch.float32),
         }
         for name, (shape, dtype) in expected.items():
             tensor = getattr(self, name)
@@ -61,17 +64,20 @@ class GraphBatch:
         triplets: Sequence[Sequence[int]] | Tensor = (),
         *,
         room_type: int = 0,
-        floor: Sequence[float] | None = None,
+        floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
         names: Sequence[str] | None = None,
     ) -> GraphBatch:
-        """One scene graph from plain lists; arguments as in the class, `floor` None = unknown."""
+        """One scene graph from plain lists; arguments as in the class.
+
+        `floor` is None where unknown, two extents (x, z) of a rectangle, or corners in any frame.
+        """
         nodes = torch.as_tensor(category, dtype=torch.int64).reshape(-1)
         return cls(
             category=nodes,
             triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
             scene=torch.zeros_like(nodes),
             room_type=torch.tensor([room_type]),
-            floor=torch.tensor([[torch.nan, torch.nan] if floor is None else list(floor)], dtype=torch.float32),
+            floor=centred(floor)[None],
             names=None if names is None else tuple(names),
         )
 
@@ -80,13 +86,11 @@ class GraphBatch:
         """The graph of a labelled room (`triplets` overrides its relations); raises `UnknownWord`."""
         words = vocabulary()
         relations = room.relations if triplets is None else triplets
-        known = len(room.floor_polygon) > 0
-        extent = (room.floor_polygon.max(0) - room.floor_polygon.min(0)).tolist() if known else None
         return cls.single(
             [words.category_id(word) for word in room.categories],
             torch.as_tensor([] if relations is None else relations, dtype=torch.int64).reshape(-1, 3),
             room_type=words.room_type_id(room.room_type),
-            floor=extent,
+            floor=room.floor_polygon if len(room.floor_polygon) else None,
         )
 
     @classmethod
@@ -107,7 +111,7 @@ class GraphBatch:
             triplets=torch.cat(triplets),
             scene=torch.cat(scenes),
             room_type=torch.cat([graph.room_type for graph in graphs]),
-            floor=torch.cat([graph.floor for graph in graphs]),
+            floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
         )
 
@@ -124,7 +128,7 @@ class GraphBatch:
                     triplets=triplets - triplets.new_tensor([start, 0, start]),
                     scene=torch.zeros_like(self.scene[start : start + count]),
                     room_type=self.room_type[number : number + 1],
-                    floor=self.floor[number : number + 1],
+                    floor=trimmed(self.floor[number : number + 1]),
                     names=None if self.names is None else self.names[start : start + count],
                 )
             )
@@ -160,7 +164,7 @@ class GraphBatch:
 
         Raises:
             ValueError: no node, an unknown class, predicate or room type id, an end that is no node, a relation of
-                an object to itself or across scenes, scenes out of order, or an impossible floor; the message names
+                an object to itself or across scenes, scenes out of order, or a floor that is none; the message names
                 the entry at fault.
         """
         categories = len(vocabulary().categories) if categories is None else categories
@@ -183,10 +187,16 @@ class GraphBatch:
             if bool(wrong.any()):
                 at = int(wrong.nonzero()[0])
                 raise ValueError(f"triplet {at} {self.triplets[at].tolist()} {text}")
-        bad = torch.isinf(self.floor) | (self.floor <= 0)
-        if bool(bad.any()):
-            at = int(bad.nonzero()[0, 0])
-            raise ValueError(f"floor of scene {at} is {self.floor[at].tolist()} m, expected > 0 or NaN (unknown)")
+        for at, corners in enumerate(self.floor):
+            there = torch.isfinite(corners).all(1)
+            used = corners[: int(there.sum())]
+            if not bool(torch.isnan(corners[len(used) :]).all()) or len(used) in (1, 2):
+                raise ValueError(f"floor of scene {at} has corners {corners.tolist()} m, expected 3 or more, then NaN")
+            if len(used) and float(area(used[None])) < 1e-6:
+                raise ValueError(f"floor of scene {at} spans {extents(used[None])[0].tolist()} m and encloses no area")
+            middle = (used.amax(0) + used.amin(0)) / 2 if len(used) else used.new_zeros(2)
+            if float(middle.abs().max()) > 1e-3:
+                raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
 
 
 def _within(what: str, values: Tensor, size: int) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.boxes import Boxes, BoxScale
+from echomodel.floors import footprint, signed_distance
 from echomodel.rules import margins, measured
 from echomodel.rules.sets import CLOSE, SYMMETRICAL
 from echomodel.samplers import Predict
@@ -17,7 +18,7 @@ EMPHASIS = {CLOSE: 3.0, SYMMETRICAL: 8.0}  # they must hit a small spot against 
 def relation_guided(
     predict: Predict,
     triplets: Tensor,
-    statistics: BoxStatistics,
+    scale: BoxScale,
     *,
     rules: str,
     strength: float,
@@ -32,11 +33,12 @@ def relation_guided(
     Arguments:
         predict: the denoiser's clean sample (N, 8).
         triplets: (E, 3) int64; those that the rules do not measure are ignored.
-        statistics: normalisation of the boxes.
+        scale: what the numbers of the boxes stand for.
         rules: name of the rule set.
         strength: length of a step, 0.1 is a good start.
         rounds: steps after each call of the denoiser.
-        floor: (N, 2) float32, x and z extent of the floor under each node, NaN = unknown; None = all unknown.
+        floor: (N, K, 2) float32, corners of the floor under each node (`GraphBatch.floor`), NaN = unknown; None = all
+            unknown.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
     wanted = triplets[torch.isin(triplets[:, 1], known)]
@@ -52,12 +54,15 @@ def relation_guided(
         for _ in range(rounds):
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()
-                boxes = Boxes.decode(free, statistics)
+                boxes = Boxes.decode(free, scale)
                 missed = (SLACK - margins(boxes, wanted, rules=rules, rigid=True)).clamp(min=0)
                 # the logarithm bounds the pull of a relation that is missed by far
                 pull = (torch.log1p(missed / SLACK) * emphasis).sum()
                 if floor is not None:
-                    pull = pull + torch.log1p(outside(boxes, floor) / SLACK).sum()
+                    beyond = (
+                        outside(boxes, floor).square().sum(1) + 1e-12
+                    ).sqrt()  # one pull a box: it may overhang twice
+                    pull = pull + torch.log1p(beyond / SLACK).sum()
                 (slope,) = torch.autograd.grad(pull * SLACK, free)
             norm = slope.norm(dim=1, keepdim=True).clamp_min(1e-6)
             clean = clean - strength * weight * slope * (1 / norm).clamp(max=1 / 0.05)
@@ -67,13 +72,9 @@ def relation_guided(
 
 
 def outside(boxes: Boxes, floor: Tensor) -> Tensor:
-    """How far boxes reach beyond the floor's bounding box, whose centre is the origin: (N, 2) metres, 0 where unknown.
+    """How far the corners and the middles of the sides lie beyond the walls: (N, 8) metres, 0 where unknown.
 
-    A box larger than the floor is asked to stand in the middle; none is asked to shrink.
+    Arguments:
+        boxes: N boxes; none is asked to shrink. floor: (N, K, 2) float32, corners of the floor under each.
     """
-    sin, cos = boxes.yaw.sin().abs(), boxes.yaw.cos().abs()
-    width, depth = boxes.size[:, 0].detach(), boxes.size[:, 2].detach()
-    reach = torch.stack([cos * width + sin * depth, sin * width + cos * depth], dim=1) / 2
-    room = (floor / 2 - reach).clamp_min(0)
-    beyond = (boxes.position[:, [0, 2]].abs() - room).clamp_min(0)
-    return torch.where(torch.isfinite(floor), beyond, torch.zeros_like(beyond))
+    return (-signed_distance(footprint(boxes.size.detach(), boxes.position, boxes.yaw), floor)).clamp_min(0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -20,7 +22,7 @@ def random_boxes(count: int = 50) -> Boxes:
 def test_encode_decode_round_trip(log_size: bool) -> None:
     boxes = random_boxes()
     statistics = BoxStatistics((-2, -2, -2), (1, 1, 2), (-3, -1, -3), (3, 1, 2), log_size=log_size)
-    back = Boxes.decode(boxes.encode(statistics), statistics)
+    back = Boxes.decode(boxes.encode(statistics.scale()), statistics.scale())
     for name in ("size", "position", "yaw"):
         torch.testing.assert_close(getattr(back, name), getattr(boxes, name), rtol=1e-5, atol=1e-5)
 
@@ -28,17 +30,28 @@ def test_encode_decode_round_trip(log_size: bool) -> None:
 def test_published_normalisation() -> None:
     statistics = BoxStatistics((0, 0, 0), (2, 4, 2), (-3, 0, -3), (3, 2, 3))
     box = Boxes(torch.tensor([[1.0, 4, 0]]), torch.tensor([[3.0, 1, -3]]), torch.tensor([np.pi / 2]))
-    vector = box.encode(statistics)
+    vector = box.encode(statistics.scale())
     torch.testing.assert_close(vector, torch.tensor([[0.0, 1, -1, 1, 0, -1, 1, 0]]), rtol=0, atol=1e-6)
 
 
-def test_statistics_from_boxes_standardise_and_survive_json() -> None:
-    boxes = random_boxes(400)
-    statistics = BoxStatistics.from_boxes(boxes)
-    vectors = boxes.encode(statistics)
-    assert vectors[:, :6].std(0).sub(1).abs().max() < 0.1
+def test_sizes_become_standard_scores_of_their_class_and_statistics_survive_json() -> None:
+    boxes, category = random_boxes(4000), torch.arange(4000) % 4 // 2
+    boxes = Boxes(torch.where(category[:, None] == 1, 5 * boxes.size.square(), boxes.size), boxes.position, boxes.yaw)
+    statistics = BoxStatistics.from_boxes(boxes, category, 3)
+    vectors = boxes.encode(statistics.scale(category))
+    for number in (0, 1):
+        scores = vectors[category == number, :3].quantile(torch.tensor([0.05, 0.5, 0.95]), dim=0)
+        torch.testing.assert_close(scores, torch.tensor([-1.645, 0.0, 1.645])[:, None].expand(3, 3), rtol=0, atol=0.01)
+    assert vectors[:, 3:6].std(0).sub(1).abs().max() < 0.1
     assert statistics.position_high[0] == statistics.position_high[2]
+    assert len(statistics.classes) == 3  # the third has no boxes and gets the spread of all
     assert BoxStatistics.from_json(statistics.to_json()) == statistics
+    back = Boxes.decode(vectors, statistics.scale(category))
+    torch.testing.assert_close(back.size, boxes.size, rtol=1e-4, atol=1e-4)
+    with pytest.raises(ValueError, match="the classes of the boxes are needed"):
+        boxes.encode(statistics.scale())
+    with pytest.raises(ValueError, match=r"class 0 is .* expected nine numbers"):
+        replace(statistics, classes=((0.0,) * 9,))
 
 
 def test_room_is_centred_on_its_floor() -> None:

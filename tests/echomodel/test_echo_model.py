@@ -16,7 +16,7 @@ from echomodel.graph import GraphBatch
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {
     "latent": {"width": 16},
-    "layout": {"width": 32, "layers": 2, "steps": 3},
+    "layout": {"width": 32, "layers": 2, "drafts": 1, "steps": 3, "sampler": "ddim"},
     "autoencoder": {"width": 8},
     "shape": {
         "width": 16,

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.data.furniture import MATERIALS, Style, furniture, mesh_of, sample_size, solids, tsdf_of
-from echomodel.data.furniture.sizes import size_statistics
+from echomodel.data.furniture.sizes import size_score, size_statistics
 from echomodel.data.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.data.tsdf import mesh_from_tsdf, tsdf_from_mesh
 from echomodel.vocabulary import UnknownWord, vocabulary
@@ -83,6 +83,15 @@ def test_sizes_have_the_percentiles_of_real_rooms(category):
     np.testing.assert_allclose(median, statistics.median, rtol=0.10)
     np.testing.assert_allclose(low, statistics.low, rtol=0.20)
     np.testing.assert_allclose(high, statistics.high, rtol=0.20)
+
+
+def test_scores_of_sizes_undo_the_draw_and_shifts_move_them():
+    rng = np.random.default_rng(3)
+    sizes = np.array([sample_size("wardrobe", rng, shift=(0.5, 0.0, -0.5)) for _ in range(1500)])
+    np.testing.assert_allclose(np.median(size_score("wardrobe", sizes), axis=0), [0.5, 0.0, -0.5], atol=0.12)
+    statistics = size_statistics("wardrobe")
+    ends = np.array([statistics.low, statistics.median, statistics.high])
+    np.testing.assert_allclose(size_score("wardrobe", ends), np.array([[-1.645], [0], [1.645]]) * np.ones(3), atol=1e-3)
 
 
 def test_texture_coordinates_are_metres():

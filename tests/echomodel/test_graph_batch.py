@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -17,7 +19,8 @@ def graphs(draw: st.DrawFn) -> GraphBatch:
     nodes = draw(st.integers(1, 6))
     ends = st.tuples(st.integers(0, nodes - 1), st.integers(0, 15), st.integers(0, nodes - 1))
     triplets = draw(st.lists(ends.filter(lambda t: t[0] != t[2]), max_size=8)) if nodes > 1 else []
-    floor = draw(st.one_of(st.none(), st.just((4.0, 3.0))))
+    corner = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 3.0), (2.0, 2.0), (0.0, 2.0))
+    floor = draw(st.one_of(st.none(), st.just((4.0, 3.0)), st.just(corner)))
     categories = draw(st.lists(st.integers(0, 45), min_size=nodes, max_size=nodes))
     return GraphBatch.single(
         categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, names=[f"n{i}" for i in range(nodes)]
@@ -59,7 +62,7 @@ def test_room_becomes_a_graph() -> None:
         GraphBatch.from_room(RoomBoxes(**{**room.__dict__, "categories": ("sofa_3x", "bookcase")}))
     room = RoomBoxes(**{**room.__dict__, "categories": ("couch", "bookcase")})
     graph = GraphBatch.from_room(room)
-    assert graph.floor.tolist() == [[5.0, 3.0]]
+    assert graph.floor.tolist() == [[[-2.5, -1.5], [2.5, -1.5], [2.5, 1.5], [-2.5, 1.5]]]
     assert graph.room_type.tolist() == [1]
     assert graph.triplets.tolist() == [[0, 1, 1]]
     assert GraphBatch.from_room(room, triplets=[]).triplets.shape == (0, 3)
@@ -74,7 +77,14 @@ def test_room_becomes_a_graph() -> None:
         (GraphBatch.single([1, 2], [[0, 1, 2]]), r"object of triplet 0 is 2, allowed: 0\.\.1"),
         (GraphBatch.single([1, 2], [[1, 1, 1]]), r"triplet 0 \[1, 1, 1\] relates a node to itself"),
         (GraphBatch.single([1], room_type=7), "room type of scene 0 is 7"),
-        (GraphBatch.single([1], floor=(0.0, 2.0)), r"floor of scene 0 is \[0.0, 2.0\] m"),
+        (GraphBatch.single([1], floor=(0.0, 2.0)), r"floor of scene 0 spans \[0.0, 2.0\] m and encloses no area"),
+        (GraphBatch.single([1], floor=(2.0, np.inf)), r"floor of scene 0 has corners .* expected 3 or more, then NaN"),
+        (GraphBatch.single([1], floor=((0, 0), (1, np.nan), (1, 1))), "floor of scene 0 has corners .* then NaN"),
+        (GraphBatch.single([1], floor=((0, 0), (1, 1), (3, 3))), "floor of scene 0 spans .* and encloses no area"),
+        (
+            replace(GraphBatch.single([1], floor=(2, 2)), floor=torch.tensor([[[0.0, 0], [2, 0], [2, 2], [0, 2]]])),
+            r"floor of scene 0 has its middle at \[1.0, 1.0\] m, expected \[0.0, 0.0\]",
+        ),
         (
             GraphBatch.pack([GraphBatch.single([1]), GraphBatch.single([1])]).with_triplets(torch.tensor([[0, 1, 1]])),
             "crosses scenes",
@@ -89,6 +99,10 @@ def test_bad_values_are_named(graph: GraphBatch, text: str) -> None:
 def test_bad_shapes_are_named() -> None:
     one = torch.ones(1).long()
     with pytest.raises(ValueError, match=r"GraphBatch.scene is \(2,\) torch.int64, expected \(1,\)"):
-        GraphBatch(one, torch.zeros(0, 3).long(), torch.zeros(2).long(), one, torch.ones(1, 2))
+        GraphBatch(one, torch.zeros(0, 3).long(), torch.zeros(2).long(), one, torch.ones(1, 4, 2))
+    with pytest.raises(ValueError, match=r"GraphBatch.floor is \(1, 2\) torch.float32, expected \(1, 4, 2\)"):
+        GraphBatch(one, torch.zeros(0, 3).long(), torch.zeros(1).long(), one, torch.ones(1, 2))
+    with pytest.raises(ValueError, match=r"floor has shape \(3,\), expected \(2,\) extents or \(k, 2\) corners"):
+        GraphBatch.single([1], floor=(1.0, 2.0, 3.0))
     with pytest.raises(ValueError, match="at least one graph"):
         GraphBatch.pack([])

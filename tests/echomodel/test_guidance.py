@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.floors import rectangle
 from echomodel.guidance import outside, relation_guided
 from echomodel.rules import verdicts
 
@@ -18,12 +19,14 @@ def start() -> Boxes:
     return Boxes(torch.full((2, 3), 0.5), torch.tensor([[0.5, 0.0, -1.0], [0.0, 0.0, 1.5]]), torch.zeros(2))
 
 
-def guide(boxes: Boxes, level: Tensor, triplets: Tensor = TRIPLETS, floor: Tensor | None = None) -> Boxes:
-    x = boxes.encode(STATISTICS)
+def guide(
+    boxes: Boxes, level: Tensor, triplets: Tensor = TRIPLETS, floor: Tensor | None = None, strength: float = 0.2
+) -> Boxes:
+    x = boxes.encode(STATISTICS.scale())
     pull = relation_guided(
-        lambda x, level: x, triplets, STATISTICS, rules="strict", strength=0.2, rounds=60, floor=floor
+        lambda x, level: x, triplets, STATISTICS.scale(), rules="strict", strength=strength, rounds=60, floor=floor
     )
-    return Boxes.decode(pull(x, level), STATISTICS)
+    return Boxes.decode(pull(x, level), STATISTICS.scale())
 
 
 def test_broken_relations_become_kept() -> None:
@@ -34,7 +37,7 @@ def test_broken_relations_become_kept() -> None:
 
 def test_furniture_moves_aside_and_does_not_shrink() -> None:
     boxes = start()
-    guided = guide(boxes, torch.full((2,), 0.1), TRIPLETS[:2], torch.full((2, 2), 1.2))
+    guided = guide(boxes, torch.full((2,), 0.1), TRIPLETS[:2], rectangle(1.2, 1.2).expand(2, 4, 2))
     assert verdicts(guided, TRIPLETS[:2]).tolist() == [1, 1]
     torch.testing.assert_close(guided.size, boxes.size)
 
@@ -54,16 +57,28 @@ def test_kept_relations_change_nothing() -> None:
 
 
 def test_boxes_are_brought_back_onto_the_floor() -> None:
-    boxes, floor = start(), torch.tensor([[4.0, 3.0], [torch.nan, 2.0]])
-    assert outside(boxes, floor).tolist() == [[0.0, 0.0], [0.0, 0.75]]
+    boxes = start()
+    notched = [(-2.0, -1.5), (0.0, -1.5), (0.0, -0.5), (2.0, -0.5), (2.0, 1.5), (-2.0, 1.5)]
+    floor = torch.stack([torch.tensor(notched), torch.full((6, 2), torch.nan)])
+    missed = outside(boxes, floor)
+    assert missed[0].max() == 0.75  # the first stands in the notch, its back farthest
+    assert missed[1].max() == 0  # nothing is known of the second one's floor
     guided = guide(boxes, torch.full((2,), 0.1), TRIPLETS[:0], floor)
     assert outside(guided, floor).max() < 0.01
-    torch.testing.assert_close(guided.position[0], boxes.position[0])
+    torch.testing.assert_close(guided.position[1], boxes.position[1])
+    torch.testing.assert_close(guided.size, boxes.size)
+
+
+def test_a_box_larger_than_its_floor_stands_in_the_middle() -> None:
+    wide = Boxes(torch.tensor([[2.4, 0.5, 0.5]]), torch.tensor([[0.3, 0.0, 0.0]]), torch.zeros(1))
+    guided = guide(wide, torch.full((1,), 0.1), TRIPLETS[:0], rectangle(2.0, 2.0)[None], strength=0.02)
+    assert guided.position[0, 0].abs() < 0.05
+    torch.testing.assert_close(guided.size, wide.size)
 
 
 def test_nothing_to_measure_leaves_the_denoiser_alone() -> None:
     def predict(x: Tensor, level: Tensor) -> Tensor:
         return x
 
-    same = relation_guided(predict, TRIPLETS[3:], STATISTICS, rules="strict", strength=0.1)
+    same = relation_guided(predict, TRIPLETS[3:], STATISTICS.scale(), rules="strict", strength=0.1)
     assert same is predict

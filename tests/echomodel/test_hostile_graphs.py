@@ -23,7 +23,7 @@ from echomodel.text import ClipTextEncoder, TextEncoderError
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {
     "latent": {"width": 8, "layers": 1},
-    "layout": {"width": 16, "layers": 1, "steps": 2},
+    "layout": {"width": 16, "layers": 2, "drafts": 1, "steps": 2},
     "autoencoder": {"width": 4},
     "shape": {
         "width": 8, "layers": 1, "heads": 2, "echo_width": 8, "steps": 1, "components": 4, "tokens": 2, "candidates": 1,
@@ -143,7 +143,7 @@ def test_a_wild_guess_at_pure_noise_has_finite_sizes_and_gradients() -> None:
     output = torch.full((1, 8), -3.0, requires_grad=True)
     clean = clean_from(output, torch.ones(1, 8), torch.ones(1), "noise")
     assert float(clean.abs().max()) > 400
-    boxes = Boxes.decode(clean, STATISTICS)
+    boxes = Boxes.decode(clean, STATISTICS.scale())
     boxes.size.clamp(0.05, 8.0).sum().backward()
     assert bool(torch.isfinite(boxes.size).all())
     assert output.grad is not None

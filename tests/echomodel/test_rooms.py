@@ -5,10 +5,11 @@ import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
+from echomodel.data.furniture.sizes import size_score
 from echomodel.data.rooms import generate_room, generate_rooms
 from echomodel.data.rooms.builder import Item, overlaps
 from echomodel.data.rooms.floor import sample_floor
-from echomodel.data.rooms.statistics import room_type_statistics
+from echomodel.data.rooms.statistics import room_requests, room_statistics, room_type_statistics
 from echomodel.vocabulary import vocabulary
 
 TYPES = [kind.name for kind in vocabulary().room_types]
@@ -128,3 +129,15 @@ def test_numbers_resemble_real_rooms():
 def test_unknown_room_type_is_named():
     with pytest.raises(ValueError, match="no statistics for room type 'garage': allowed are bedroom"):
         generate_room(np.random.default_rng(0), "garage")
+
+
+def test_sizes_asked_for_give_the_medians_of_real_rooms():
+    asked = room_requests()["size"]
+    assert set(asked) <= set(room_statistics()["sizes"])
+    assert all(len(shift) == 3 and max(map(abs, shift)) <= 1 for shift in asked.values())
+    rooms = generate_rooms(1500, seed=8)
+    categories = np.concatenate([room.categories for room in rooms])
+    sizes = np.concatenate([room.size for room in rooms])
+    for category in ("wardrobe", "coffee_table", "pendant_lamp", "double_bed", "dining_chair", "tv_stand"):
+        scores = np.median(size_score(category, sizes[categories == category]), axis=0)
+        assert np.abs(scores).max() < 0.25, category  # of a standard deviation

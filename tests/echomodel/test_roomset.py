@@ -8,6 +8,7 @@ from echomodel.data import roomset
 from echomodel.data.build import build_data
 from echomodel.data.rooms import generate_rooms, untidied
 from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.floors import centred
 from echomodel.rules import label_relations, verdicts
 
 
@@ -40,7 +41,7 @@ def test_batches_hold_the_rooms_and_their_relations(folder):
     batch = rooms.batch(picked)
     for scene, number in zip(batch.graph.unpack(), picked, strict=True):
         assert np.array_equal(scene.triplets.numpy(), rooms.relations(number))
-        assert scene.floor[0].tolist() == pytest.approx(np.ptp(rooms.room(number).floor_polygon, axis=0), abs=1e-3)
+        assert np.allclose(scene.floor[0], centred(rooms.room(number).floor_polygon), atol=1e-3)
     assert (verdicts(batch.boxes, batch.graph.triplets) != 0).all()
     thinned = rooms.batch(picked, drop=0.5, rng=np.random.default_rng(0)).graph.triplets
     assert 0.4 < len(thinned) / len(batch.graph.triplets) < 0.6

@@ -16,8 +16,8 @@ def test_boxes() -> None:
     numbers = Numbers("boxes")
     statistics = statistics_from_bounds(numbers["stats"].tolist())
     raw = numbers["param7"].float()
-    close(Boxes(raw[:, :3], raw[:, 3:6], raw[:, 6]).encode(statistics), numbers["net_vector"], 2e-6)
-    found = Boxes.decode(numbers["pred"], statistics)
+    close(Boxes(raw[:, :3], raw[:, 3:6], raw[:, 6]).encode(statistics.scale()), numbers["net_vector"], 2e-6)
+    found = Boxes.decode(numbers["pred"], statistics.scale())
     close(torch.cat([found.size, found.position], dim=1), numbers["pred_boxes"], 1e-5)
     close(torch.rad2deg(found.yaw)[:, None], numbers["pred_angle_deg"], 1e-4)
 

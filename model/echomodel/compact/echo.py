@@ -17,15 +17,19 @@ class EchoLayer(nn.Module):
     with x normalised before use and modulated by the noise level. As the last map of the message network is linear it
     is applied to the sum, so that no matrix product runs over pairs except the small one with the predicates.
 
+    Arguments:
+        width: channels of a node.
+        told: channels of `Pairs.told`.
+
     Shapes:
         x (N, width), pairs of the batch, modulation (N, 2 width) or None -> (N, width)
     """
 
-    def __init__(self, width: int, predicates: int) -> None:
+    def __init__(self, width: int, told: int) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(width)
         self.ends = nn.Linear(width, 2 * width)
-        self.told = nn.Linear(2 * predicates, width, bias=False)
+        self.told = nn.Linear(told, width, bias=False)
         self.message = nn.Linear(width, width)
         self.norm_mlp = nn.LayerNorm(width)
         self.mlp = nn.Sequential(nn.Linear(width, 2 * width), nn.SiLU(), nn.Linear(2 * width, width))

@@ -25,9 +25,9 @@ class LatentGraph(nn.Module):
         width, layers = config.latent.width, config.latent.layers
         self.category = nn.Embedding(config.categories, width)
         self.touched = nn.Parameter(torch.randn(width) * 0.1)
-        self.encoder = nn.ModuleList(EchoLayer(width, config.predicates) for _ in range(layers))
+        self.encoder = nn.ModuleList(EchoLayer(width, 2 * config.predicates) for _ in range(layers))
         self.mix = nn.Linear(2 * width, width)
-        self.manipulator = nn.ModuleList(EchoLayer(width, config.predicates) for _ in range(layers))
+        self.manipulator = nn.ModuleList(EchoLayer(width, 2 * config.predicates) for _ in range(layers))
         self.norm = nn.LayerNorm(width)
 
     def forward(

@@ -1,31 +1,48 @@
-"""Layout denoiser: boxes of all objects at once, with an echo in every layer of every step (EchoScene 3.3)."""
+"""Layout denoiser: boxes of all objects at once, with an echo in every layer of every step (EchoScene 3.3).
+
+The first layers draft the boxes. The draft is measured as a person would measure a floor plan: gaps to the walls, and
+how each pair stands to one another. The next layers hear that and refine the draft, as often as the config says.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor, nn
 
+from echomodel.boxes import Boxes, BoxScale
+from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pair_features, wall_features
 from echomodel.compact.echo import EchoLayer, level_features
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
+from echomodel.floors import GRID, plan_features
 from echomodel.graph import GraphBatch
+from echomodel.objectives import clean_from
 
 BOX = 8
+WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie anywhere
 
 
 @dataclass(frozen=True, eq=False)
 class LayoutContext:
-    """What stays the same over all steps: `nodes` (N, width), pairs."""
+    """What stays the same over all steps: `nodes` (N, width), pairs, `floor` (N, K, 2) in metres, and `scale`."""
 
     nodes: Tensor
     pairs: Pairs
+    floor: Tensor
+    scale: BoxScale
 
 
 class LayoutDenoiser(nn.Module):
     """Predicts the objective's target for noisy boxes; each node has its own noise level, 0 = known.
+
+    Arguments:
+        config: its `layout` and what it shares with the other parts.
+
+    Raises:
+        ValueError: a negative number of drafts, or fewer layers than drafts and the last prediction need.
 
     Shapes:
         boxes (N, 8), level (N,) in [0, 1], `LayoutContext` -> (N, 8)
@@ -34,26 +51,34 @@ class LayoutDenoiser(nn.Module):
     def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         layout, width = config.layout, config.layout.width
-        self.frequencies = layout.frequencies
+        self.frequencies, self.objective, self.layers = layout.frequencies, layout.objective, layout.layers
+        each, rest = divmod(layout.layers, max(layout.drafts, 0) + 1)
+        if layout.drafts < 0 or not each:
+            raise ValueError(f"layout.layers {layout.layers} are too few for layout.drafts {layout.drafts}")
         self.category = nn.Embedding(config.categories, width)
         self.room_type = nn.Embedding(config.room_types, width)
         self.rules = nn.Embedding(len(config.rules), width)
-        self.floor = nn.Sequential(nn.Linear(6, width), nn.SiLU(), nn.Linear(width, width))
+        self.floor = nn.Sequential(nn.Linear(6 + GRID**2, width), nn.SiLU(), nn.Linear(width, width))
         self.latent = nn.Linear(config.latent.width, width)
         self.box = nn.Linear(BOX * (1 + 2 * layout.frequencies), width)
         self.known = nn.Parameter(torch.randn(width) * 0.02)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * layout.layers)
-        self.layers = nn.ModuleList(EchoLayer(width, config.predicates) for _ in range(layout.layers))
-        self.norm = nn.LayerNorm(width)
-        self.head = nn.Linear(width, BOX)
+        measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES
+        self.rounds = nn.ModuleList(
+            nn.ModuleList(EchoLayer(width, 2 * config.predicates + PAIR_FEATURES * (n > 0)) for _ in range(layers))
+            for n, layers in enumerate([each + rest] + [each] * layout.drafts)
+        )
+        self.measured = nn.ModuleList(nn.Linear(measured, width) for _ in range(layout.drafts))
+        self.norms = nn.ModuleList(nn.LayerNorm(width) for _ in self.rounds)
+        self.heads = nn.ModuleList(nn.Linear(width, BOX) for _ in self.rounds)
         for table in (self.category, self.room_type, self.rules):
             nn.init.normal_(table.weight, std=0.3)
-        for layer in (self.modulation, self.head):
+        for layer in (self.modulation, *self.heads):
             nn.init.zeros_(layer.weight)
             nn.init.zeros_(layer.bias)
 
-    def context(self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> LayoutContext:
+    def context(self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale) -> LayoutContext:
         """Everything that does not depend on the step.
 
         Arguments:
@@ -61,17 +86,37 @@ class LayoutDenoiser(nn.Module):
             pairs: the merged relations of the graph.
             latent: (N, latent width), output of the graph manipulator.
             rules: (S,) int64, which of the config's rule sets the relations are meant in.
+            scale: what the boxes' numbers stand for, node by node.
         """
-        room = self.room_type(graph.room_type) + self.rules(rules) + self.floor(floor_features(graph.floor))
-        return LayoutContext(self.category(graph.category) + self.latent(latent) + room[graph.scene], pairs)
+        room = self.room_type(graph.room_type) + self.rules(rules) + self.floor(plan_features(graph.floor))
+        nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
+        return LayoutContext(nodes, pairs, graph.floor[graph.scene], scale)
 
     def forward(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> Tensor:
+        return self.drafts(boxes, level, context)[-1]
+
+    def drafts(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> list[Tensor]:
+        """The drafts of the prediction, (N, 8) each, and the prediction, the last of them."""
         known = (level == 0).to(boxes.dtype)[:, None]
         x = context.nodes + self.box(box_features(boxes, self.frequencies)) + known * self.known
-        modulations = self.modulation(self.level(level_features(level))).chunk(len(self.layers), dim=1)
-        for layer, modulation in zip(self.layers, modulations, strict=True):
-            x = layer(x, context.pairs, modulation)
-        return self.head(self.norm(x))
+        modulations = iter(self.modulation(self.level(level_features(level))).chunk(self.layers, dim=1))
+        pairs, out = context.pairs, [torch.zeros_like(boxes)]
+        for number, layers in enumerate(self.rounds):
+            if number:
+                draft = clean_from(out[-1].detach(), boxes, level, self.objective).clamp(-WILDEST, WILDEST)
+                features, pairs = self._measure(draft, context)
+                x = x + self.measured[number - 1](features)
+            for layer in layers:  # type: ignore[attr-defined]
+                x = layer(x, pairs, next(modulations))
+            out.append(out[-1] + self.heads[number](self.norms[number](x)))
+        return out[1:]
+
+    def _measure(self, clean: Tensor, context: LayoutContext) -> tuple[Tensor, Pairs]:
+        """What the nodes (N, F) and the pairs are told about a draft of the boxes."""
+        boxes = measurable(Boxes.decode(clean, context.scale))
+        features = torch.cat([box_features(clean, self.frequencies), wall_features(boxes, context.floor)], dim=1)
+        told = torch.cat([context.pairs.told, pair_features(boxes, context.pairs)], dim=1)
+        return features, replace(context.pairs, told=told)
 
 
 def box_features(boxes: Tensor, frequencies: int) -> Tensor:
@@ -79,10 +124,3 @@ def box_features(boxes: Tensor, frequencies: int) -> Tensor:
     scales = math.pi / 4 * 2.0 ** torch.arange(frequencies, device=boxes.device, dtype=boxes.dtype)
     angles = (boxes[:, :, None] * scales).flatten(1)
     return torch.cat([boxes, torch.sin(angles), torch.cos(angles)], dim=1)
-
-
-def floor_features(floor: Tensor) -> Tensor:
-    """Extents in metres, their logarithms and whether they are known: (S, 2) with NaN -> (S, 6)."""
-    known = torch.isfinite(floor)
-    extent = torch.where(known, floor, torch.ones_like(floor))
-    return torch.cat([extent / 5 * known, extent.log() * known, known.to(floor.dtype)], dim=1)

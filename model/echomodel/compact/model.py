@@ -123,6 +123,8 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
         if header.get("vocabulary") != words:
             raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
+        if "layout" in parts and "drafts" not in raw["layout"]:
+            raise WeightsError(f"{path}: is of an earlier version, whose layout branch did not draft; train it again")
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
         for other in set(PARTS) - set(parts):
             # settings of a part that lies in another file; an older version's may hold fields that are gone

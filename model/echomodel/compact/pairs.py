@@ -21,7 +21,8 @@ class Pairs:
 
     Arguments:
         receiver, sender: (P,) int64, nodes.
-        told: (P, 2R) float32, predicates that hold from receiver to sender, then from sender to receiver.
+        told: (P, 2R) float32, predicates that hold from receiver to sender, then from sender to receiver; a branch may
+            put more channels behind them.
         scale: (N, 1) float32, 1 / sqrt(number of senders), the weight of a node's summed messages.
     """
 

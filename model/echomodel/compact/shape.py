@@ -55,7 +55,7 @@ class ShapeDenoiser(nn.Module):
         self.echo_node = nn.Linear(width, echo)
         self.echo_code = nn.Linear(shape.components, echo)
         self.echo_level = nn.Linear(64, echo) if shape.echo_time else None
-        self.echo_layers = nn.ModuleList(EchoLayer(echo, config.predicates) for _ in range(shape.echo_layers))
+        self.echo_layers = nn.ModuleList(EchoLayer(echo, 2 * config.predicates) for _ in range(shape.echo_layers))
         self.echo_out = nn.Sequential(nn.LayerNorm(echo), nn.Linear(echo, width))
         self.concat = nn.Linear(2 * width, width) if shape.conditioning == "concat" else None
         self.blocks = nn.ModuleList(

@@ -207,6 +207,7 @@ class RoomSet:
         import torch
 
         from echomodel.boxes import Boxes
+        from echomodel.floors import centred, padded
         from echomodel.graph import GraphBatch
 
         rooms = np.asarray(rooms, np.int64)
@@ -215,13 +216,12 @@ class RoomSet:
         corners = [self._part("corners", k) for k in rooms]
         counts = self.counts[rooms]
         triplets = _triplets(bits, counts, None if drop == 0.0 else (drop, rng or np.random.default_rng()))
-        extents = np.array([c.max(0) - c.min(0) for c in corners], np.float32)
         graph = GraphBatch(
             category=torch.from_numpy(objects["category"].astype(np.int64)),
             triplets=torch.from_numpy(triplets),
             scene=torch.from_numpy(np.repeat(np.arange(len(rooms)), counts)),
             room_type=torch.from_numpy(self._table["type"][rooms].astype(np.int64)),
-            floor=torch.from_numpy(extents),
+            floor=padded([centred(c)[None] for c in corners]),
         )
         fields = (torch.from_numpy(np.ascontiguousarray(objects[name])) for name in ("size", "position", "yaw"))
         return RoomBatch(graph, Boxes(*fields), torch.from_numpy(objects["style"].astype(np.int64)), rooms)

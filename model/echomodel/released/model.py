@@ -166,7 +166,7 @@ class ReleasedModel(GraphEncoder):
             noise=lambda step: torch.randn(shape, generator=generator),
             variance=variance,
         )
-        return Boxes.decode(last(states, progress, len(self.layout_tables.betas)), statistics)
+        return Boxes.decode(last(states, progress, len(self.layout_tables.betas)), statistics.scale())
 
     @torch.no_grad()
     def sample_shapes(

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.compact.model import CompactModel
-from echomodel.training.layout_stage import LayoutStage, edited_latent, layout_loss
+from echomodel.training.layout_stage import LayoutStage, edited_latent
 from echomodel.training.rooms import draw_batch
 from echomodel.training.shape_stage import ShapeStage, room_shapes, shape_loss
 
@@ -29,7 +29,7 @@ class JointStage:
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Sum of both branches' losses on one random batch."""
         batch = draw_batch(self.layout.rooms, self.layout.nodes, generator)
-        layout, parts = layout_loss(model, batch, edited_latent(model, batch), generator, self.layout.relation_weight)
+        layout, parts = self.layout.scored(model, batch, generator)
         few = draw_batch(self.layout.rooms, self.shape.batch, generator)
         objects = room_shapes(few, self.shape.shapes)
         clean = self.shape.codes(model)[objects.shape]

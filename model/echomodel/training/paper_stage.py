@@ -167,7 +167,7 @@ def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:
     floor = Boxes(torch.stack([extent[0], torch.tensor(0.0), extent[1]])[None], torch.zeros(1, 3), torch.zeros(1))
     angle = torch.tensor(-1.0)
     scene = torch.cat([torch.tensor(SCENE_BOX), torch.stack([angle.sin(), angle.cos()])])
-    return torch.cat([Boxes.cat([objects, floor]).encode(statistics), scene[None]])
+    return torch.cat([Boxes.cat([objects, floor]).encode(statistics.scale()), scene[None]])
 
 
 def box_bounds(rooms: RoomSet, count: int = 2000) -> BoxStatistics:

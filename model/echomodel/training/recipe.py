@@ -63,6 +63,7 @@ class Recipe:
         scenes, text: `paper` alone: scenes per batch, and where text features come from: `clip` (downloaded once), a
             weights file of CLIP's, or `random` (vectors that only tell texts apart).
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
+        measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes.
@@ -81,6 +82,7 @@ class Recipe:
     scenes: int = 64
     text: str = "clip"
     relation_weight: float = 0.5
+    measure_weight: float = 0.0
     validate_every: int = 2000
     save_every: int = 1000
     log_every: int = 50

@@ -12,6 +12,7 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
 from echomodel.data.roomset import RoomSet
+from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
 from echomodel.roomboxes import RoomBoxes
 
@@ -28,7 +29,7 @@ class PackedRooms:
         category (N,) int64, size, position (N, 3), yaw (N,) float32: as in `Boxes`, room frame.
         style: (N,) int64, style group, -1 = unknown.
         count: (R,) int64 nodes per room.
-        room_type: (R,) int64. floor: (R, 2) float32. rules: (R,) int64, rule set of the labels.
+        room_type: (R,) int64. floor: (R, K, 2) float32, as in `GraphBatch`. rules: (R,) int64, rule set of the labels.
         bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
     """
 
@@ -59,7 +60,7 @@ class PackedRooms:
             style=torch.tensor([s for room in rooms for s in (room.styles or (-1,) * len(room))]),
             count=torch.tensor([len(room) for room in rooms]),
             room_type=torch.cat([g.room_type for g in graphs]),
-            floor=torch.cat([g.floor for g in graphs]),
+            floor=padded([g.floor for g in graphs]),
             rules=torch.full((len(rooms),), rules),
             bits=torch.cat([_bits(g) for g in graphs]),
         )
@@ -74,7 +75,8 @@ class PackedRooms:
             for number, name in enumerate(rules)
             for start in range(0, len(numbers), 500)
         ]
-        return cls(**{f.name: torch.cat([getattr(part, f.name) for part in parts]) for f in fields(cls)})
+        joined = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
+        return cls(**{name: padded(of) if name == "floor" else torch.cat(of) for name, of in joined.items()})
 
     @property
     def boxes(self) -> Boxes:
@@ -122,11 +124,11 @@ def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *
     scene = torch.arange(len(picked)).repeat_interleave(counts)
     holds = (bits[:, None] >> torch.arange(PREDICATES)) & 1 == 1
     position, yaw = rooms.position[nodes].clone(), rooms.yaw[nodes].clone()
-    floor = rooms.floor[picked].clone()
+    floor = trimmed(rooms.floor[picked]).clone()
     pair_scene = torch.arange(len(picked)).repeat_interleave(pair_counts)
     keep = torch.full((len(picked),), 0.5)
     if train:
-        holds = _mirror(holds, position, yaw, scene, pair_scene, generator)
+        holds = _mirror(holds, position, yaw, floor, scene, pair_scene, generator)
         keep = _keep_shares(holds, pair_scene, counts, generator)
         floor[torch.rand(len(picked), generator=generator) < 0.25] = torch.nan
     predicates = holds & (torch.rand(holds.shape, generator=generator) < keep[pair_scene, None])
@@ -158,11 +160,13 @@ def _ranges(starts: Tensor, counts: Tensor) -> Tensor:
 
 
 def _mirror(
-    holds: Tensor, position: Tensor, yaw: Tensor, scene: Tensor, pair_scene: Tensor, generator: torch.Generator
-) -> Tensor:
-    """Flip rooms along x and z (`position`, `yaw` in place) and swap the words that change their meaning."""
+    holds: Tensor, position: Tensor, yaw: Tensor, floor: Tensor, scene: Tensor, pair_scene: Tensor,
+    generator: torch.Generator,
+) -> Tensor:  # fmt: skip
+    """Flip rooms along x and z (`position`, `yaw`, `floor` in place) and swap the words that change their meaning."""
     flip = torch.rand(int(scene[-1]) + 1, 2, generator=generator) < 0.5
     along_x, along_z = flip[:, 0], flip[:, 1]
+    floor *= 1 - 2 * flip[:, None].float()
     position[:, 0] *= 1 - 2 * along_x[scene].float()
     position[:, 2] *= 1 - 2 * along_z[scene].float()
     # the front (sin yaw, cos yaw) of an object is mirrored with the room

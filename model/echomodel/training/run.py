@@ -101,8 +101,8 @@ def _stage(
 def _layout_stage(recipe: Recipe, model: CompactModel, started: tuple[str, ...]) -> LayoutStage:
     rooms, held = (_rooms(recipe, model, held=held) for held in (False, True))
     if "layout" not in started:
-        model.statistics = BoxStatistics.from_boxes(rooms.boxes)
-    return LayoutStage(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen)
+        model.statistics = BoxStatistics.from_boxes(rooms.boxes, rooms.category, recipe.model.categories)
+    return LayoutStage(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, recipe.measure_weight)
 
 
 def _rooms(recipe: Recipe, model: CompactModel, *, held: bool) -> PackedRooms:

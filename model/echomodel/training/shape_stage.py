@@ -108,7 +108,7 @@ def draw_suites(count: int, styles: Tensor, generator: torch.Generator) -> Shape
     graph = GraphBatch(
         category=category, triplets=torch.stack([at[edge], predicate + 13, to[edge]], dim=1), scene=scene,
         room_type=torch.randint(len(vocabulary().room_types), (count,), generator=generator),
-        floor=torch.full((count, 2), torch.nan),
+        floor=torch.full((count, 4, 2), torch.nan),
     )  # fmt: skip
     return ShapeBatch(graph, pairs_of(graph), style * len(coarse) + category)
 

@@ -14,7 +14,7 @@ from echomodel.config import CompactConfig, from_dict
 from echomodel.graph import GraphBatch
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
-SMALL = from_dict(CompactConfig, {"latent": {"width": 16}, "layout": {"width": 32, "layers": 2}})
+SMALL = from_dict(CompactConfig, {"latent": {"width": 16}, "layout": {"width": 32, "layers": 2, "drafts": 1}})
 
 
 def small_model() -> CompactModel:
@@ -39,7 +39,8 @@ def random_graph(nodes: int, triplets: int, seed: int) -> GraphBatch:
 def run(model: CompactModel, graph: GraphBatch, boxes: Tensor, level: Tensor) -> Tensor:
     pairs = pairs_of(graph)
     latent = model.latent(graph.category, pairs)
-    return model.layout(boxes, level, model.layout.context(graph, pairs, latent, torch.zeros_like(graph.room_type)))
+    rules, scale = torch.zeros_like(graph.room_type), model.statistics.scale(graph.category)
+    return model.layout(boxes, level, model.layout.context(graph, pairs, latent, rules, scale))
 
 
 def test_pairs_against_loops() -> None:
@@ -72,7 +73,7 @@ def test_repeated_triplets_count_once() -> None:
 
 def test_echo_layer_against_loops() -> None:
     torch.manual_seed(1)
-    layer, graph = EchoLayer(8, 16), random_graph(5, 8, 4)
+    layer, graph = EchoLayer(8, 32), random_graph(5, 8, 4)
     pairs, x = pairs_of(graph), torch.randn(5, 8)
     normed, rows = layer.norm(x), []
     for i in range(5):
@@ -112,6 +113,31 @@ def test_a_batch_is_its_single_runs() -> None:
             start = stop
 
 
+def test_the_outline_of_the_floor_reaches_the_boxes() -> None:
+    model, plain = small_model(), random_graph(4, 6, 1)
+    notched = [(-2.0, -2.0), (0.0, -2.0), (0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (-2.0, 2.0)]  # of the same extents
+    cut = GraphBatch(plain.category, plain.triplets, plain.scene, plain.room_type, torch.tensor([notched]))
+    boxes, level = torch.randn(4, 8), torch.full((4,), 0.5)
+    assert (run(model, plain, boxes, level) - run(model, cut, boxes, level)).abs().max() > 1e-3
+    together = run(model, GraphBatch.pack([plain, cut]), boxes.repeat(2, 1), level.repeat(2))
+    alone = torch.cat([run(model, graph, boxes, level) for graph in (plain, cut)])
+    torch.testing.assert_close(together, alone, rtol=1e-4, atol=1e-5)
+
+
+def test_drafts_come_before_the_prediction() -> None:
+    model, graph = small_model(), random_graph(4, 6, 1)
+    pairs, boxes, level = pairs_of(graph), torch.randn(4, 8), torch.full((4,), 0.5)
+    latent = model.latent(graph.category, pairs)
+    context = model.layout.context(graph, pairs, latent, torch.zeros(1).long(), model.statistics.scale())
+    drafts = model.layout.drafts(boxes, level, context)
+    assert len(drafts) == 2
+    assert torch.equal(drafts[-1], model.layout(boxes, level, context))
+    for drafts_, layers in ((-1, 3), (3, 3)):
+        settings = {"layout": {"width": 32, "layers": layers, "drafts": drafts_}}
+        with pytest.raises(ValueError, match=f"layout.layers {layers} are too few for layout.drafts {drafts_}"):
+            CompactModel(from_dict(CompactConfig, settings), STATISTICS, ("layout",))
+
+
 def test_node_order_does_not_matter() -> None:
     model, graph = small_model(), random_graph(6, 10, 5)
     order = torch.randperm(6, generator=torch.Generator().manual_seed(0))
@@ -144,7 +170,8 @@ def test_an_edit_acts_through_the_latent_graph_alone() -> None:
     outputs = []
     for source in (graph, edited):
         latent = model.latent(graph.category, pairs_of(source))
-        outputs.append(model.layout(boxes, level, model.layout.context(graph, pairs, latent, rules)))
+        context = model.layout.context(graph, pairs, latent, rules, STATISTICS.scale())
+        outputs.append(model.layout(boxes, level, context))
     assert (outputs[0] - outputs[1]).abs().max() > 1e-4
 
 

@@ -19,7 +19,7 @@ SHAPE = {"width": 16, "layers": 1, "heads": 2, "echo_width": 16, "components": 2
 
 def small_model(**shape: object) -> CompactModel:
     torch.manual_seed(0)
-    raw = {"latent": {"width": 8}, "layout": {"width": 16, "layers": 1}, "shape": {**SHAPE, **shape}}
+    raw = {"latent": {"width": 8}, "layout": {"width": 16, "layers": 1, "drafts": 0}, "shape": {**SHAPE, **shape}}
     model = CompactModel(from_dict(CompactConfig, raw), STATISTICS, ("latent", "autoencoder", "shape"))
     for parameter in model.parameters():
         if not parameter.any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,13 @@ from echomodel.boxes import Boxes
 from echomodel.compact.model import WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.data.build import build_data
+from echomodel.data.rooms.generator import generate_rooms
 from echomodel.data.roomset import RoomSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.rules import verdicts
+from echomodel.guidance import outside
+from echomodel.rules import label_relations, verdicts
+from echomodel.training.layout_stage import measure_distance
 from echomodel.training.logs import read_log
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
@@ -57,6 +61,35 @@ def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
             seen += int((kept >= 0).sum())
             assert not (kept == 0).any()
     assert seen > 1000
+
+
+def test_floors_are_mirrored_with_their_rooms(data: Path) -> None:
+    tidy = [room for room in generate_rooms(40, seed=5) if len(room.floor_polygon) > 4]
+    packed = PackedRooms.build([replace(room, relations=label_relations(room)) for room in tidy], 0)
+    moved = 0
+    for seed in range(3):
+        batch = draw_batch(packed, 200, torch.Generator().manual_seed(seed))
+        known = torch.isfinite(batch.graph.floor[:, 0, 0])[batch.graph.scene]
+        assert float(outside(batch.boxes, batch.graph.floor[batch.graph.scene]).max()) < 0.06
+        moved += int((~known).any()) + int(known.any())
+    assert moved == 6  # some floors are hidden, some are not
+
+
+def test_measures_of_true_boxes_are_met_and_pull_at_places_alone(packed: PackedRooms) -> None:
+    batch = draw_batch(packed, 120, torch.Generator().manual_seed(1))
+    floor, nodes = batch.graph.floor[batch.graph.scene], batch.graph.num_nodes
+    level, free = torch.full((nodes,), 0.2), torch.ones(nodes)
+    free[::3] = 0.0
+    assert measure_distance(batch, batch.boxes, floor, level, free) == 0
+    size = batch.boxes.size.clone().requires_grad_()
+    position = (batch.boxes.position + 0.1 * free[:, None]).requires_grad_()
+    distance = measure_distance(batch, Boxes(size, position, batch.boxes.yaw), floor, level, free)
+    distance.backward()
+    assert distance > 0.01
+    assert size.grad is None
+    assert position.grad is not None
+    assert torch.isfinite(position.grad).all()
+    assert (position.grad.abs().sum(1) > 0).float().mean() > 0.9
 
 
 def test_batches_keep_the_node_budget_and_merge_like_graphs(packed: PackedRooms) -> None:
@@ -162,10 +195,10 @@ def test_weights_files_are_checked(data: Path, tmp_path: Path) -> None:
     with safe_open(path, "pt") as handle:
         tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
         metadata = handle.metadata()
-    tensors["layout.head.weight"] = tensors["layout.head.weight"][:, :3].contiguous()
+    tensors["layout.heads.0.weight"] = tensors["layout.heads.0.weight"][:, :3].contiguous()
     del tensors["latent.mix.bias"]
     save_file(tensors, tmp_path / "bad.safetensors", metadata=metadata)
-    text = r"1 missing \(latent.mix.bias\); 1 misshapen \(layout.head.weight\)"
+    text = r"1 missing \(latent.mix.bias\); 1 misshapen \(layout.heads.0.weight\)"
     with pytest.raises(WeightsError, match=text):
         load_weights([tmp_path / "bad.safetensors"])
 

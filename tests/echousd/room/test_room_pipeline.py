@@ -48,6 +48,17 @@ def test_nearly_equal_sizes_of_a_set_become_equal():
     np.testing.assert_allclose(equal_sizes(*args, size, np.zeros(3, bool)), size)
 
 
+def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
+    corners = ((1.0, 1.0), (5.0, 1.0), (5.0, 4.0), (3.0, 4.0), (3.0, 3.0), (1.0, 3.0))
+    nodes = (Node("stool", "stool"),)
+    SceneGraph(room=RoomSpec("bedroom", floor_polygon=corners), nodes=nodes).to_stage(tmp_path / "room.usda")
+    floor = graph_batch(SceneGraph.from_stage(tmp_path / "room.usda")).floor
+    np.testing.assert_allclose(floor[0], np.array(corners) - [3.0, 2.5], atol=1e-6)
+    sized = graph_batch(SceneGraph(room=RoomSpec("bedroom", size=(4.0, 3.0)), nodes=nodes)).floor
+    assert sized.tolist() == [[[-2, -1.5], [2, -1.5], [2, 1.5], [-2, 1.5]]]
+    assert graph_batch(SceneGraph(room=RoomSpec("bedroom"), nodes=nodes)).floor.isnan().all()
+
+
 def test_what_the_graph_fixes_comes_back():
     graph = small_graph().update_node("wardrobe", size=(1.0, 2.0, 0.5), yaw=0.3)
     graph = graph.update_node("bed", size=(1.4, 0.9, 2.0), position=(0.2, 0.0, 0.1), yaw=0.5)

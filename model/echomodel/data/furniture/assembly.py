@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 
-from echomodel.data.furniture.solids import Solid
+from echomodel.data.furniture.solids import Solid, Tube
 from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
 
 THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
+THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
 MATERIALS = ("wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen")
 
 
@@ -52,7 +53,7 @@ def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
-    """Box-normalised TSDF (64, 64, 64) float32 of the union of the solids, thin parts thickened to about a voxel."""
+    """Box-normalised TSDF (64, 64, 64) float32 of the solids' union, boards of at least one voxel, rods of two."""
     boxes = [solid.mesh()[0] for solid in solids]
     lower = np.min([vertices.min(0) for vertices in boxes], axis=0)
     upper = np.max([vertices.max(0) for vertices in boxes], axis=0)
@@ -69,6 +70,7 @@ def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
         stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
         where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
         x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
-        distance = solid.distance(x, y, z, scale) - max(0.0, THINNEST - solid.inradius(scale))
+        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.material == "leaf" else THINNEST
+        distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
         np.minimum(grid[where], distance, out=grid[where])
     return truncated(grid)

@@ -45,7 +45,7 @@ def plant(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         )
     )
     y0 = foot + pot_h
-    kind = rng.choice(["tree", "blades", "leaves", "cactus"], p=[0.3, 0.28, 0.34, 0.08])
+    kind = rng.choice(["tree", "blades", "leaves", "cactus"], p=[0.38, 0.22, 0.32, 0.08])
     grow = {"tree": _tree, "blades": _blades, "leaves": _leaves, "cactus": _cactus}[kind]
     return parts + grow(y0, h, w / 2, d / 2, rng)
 
@@ -58,7 +58,7 @@ def _tree(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> 
     for _ in range(int(rng.integers(6, 11))):
         direction = rng.normal(size=3)
         direction /= np.linalg.norm(direction)
-        share = rng.uniform(0.35, 0.5)
+        share = rng.uniform(0.45, 0.6)
         half = np.array([a, crown / 2, b]) * share
         centre = np.array([0, top, 0]) + direction * (np.array([a, crown / 2, b]) - half)
         parts.append(Ball(centre=centre, half=half, material="leaf"))
@@ -79,15 +79,15 @@ def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float)
 def _blades(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
     """Long blades that rise from the pot and arch outward."""
     parts: list[Solid] = []
-    count = int(rng.integers(9, 15))
+    count = int(rng.integers(7, 10))
     for i in range(count):
-        yaw = 2 * np.pi * (i + rng.uniform(-0.3, 0.3)) / count
-        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.5, 1.0)
-        tall = (h - y0) * rng.uniform(0.6, 1.0)
+        yaw = 2 * np.pi * (i + rng.uniform(-0.1, 0.1)) / count
+        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.8, 1.0)
+        tall = (h - y0) * (1.0 if i % 2 else 0.75)
         knee = np.array([0, y0 + tall * 0.8, 0]) + spread * 0.4
-        tip = np.array([0, y0 + tall * rng.uniform(0.7, 1.0), 0]) + spread
+        tip = np.array([0, y0 + tall * rng.uniform(0.8, 0.95), 0]) + spread
         root = np.array([0, y0, 0]) + spread * 0.06
-        for start, end, wide in ((root, knee, 0.07), (knee, tip, 0.055)):
+        for start, end, wide in ((root, knee, 0.1), (knee, tip, 0.085)):
             step = end - start
             lift = np.arctan2(step[1], np.hypot(step[0], step[2]))
             parts.append(_leaf(start, np.arctan2(step[0], step[2]), lift, float(np.linalg.norm(step)) * 1.08, wide))
@@ -97,23 +97,21 @@ def _blades(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -
 def _leaves(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
     """Broad leaves at the ends of stems."""
     parts: list[Solid] = []
-    count = int(rng.integers(8, 14))
+    count = int(rng.integers(6, 9))
     for i in range(count):
-        yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05))
+        yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.03, 0.03))
         tall = (h - y0) * (0.35 + 0.6 * i / count)
-        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.35, 0.6)
+        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.4, 0.5)
         end = np.array([0, y0 + tall, 0]) + spread
         parts.append(
             Tube(
                 points=np.array([[0, y0 - 0.02, 0], [spread[0] * 0.4, y0 + tall * 0.65, spread[2] * 0.4], end]),
-                radius=0.01,
+                radius=0.014,
                 material="leaf",
             )
         )
-        length = min(a, b) * rng.uniform(0.65, 0.95)
-        parts.append(
-            _leaf(end - np.array([0, 0.02, 0]), yaw, rng.uniform(-0.5, 0.4), length, length * rng.uniform(0.55, 0.8))
-        )
+        length = min(a, b) * rng.uniform(0.85, 1.0)
+        parts.append(_leaf(end - np.array([0, 0.02, 0]), yaw, rng.uniform(-0.3, 0.2), length, length * 0.75))
     return parts
 
 

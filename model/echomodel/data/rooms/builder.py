@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,12 +53,16 @@ class Builder:
         floor: the empty room.
         rng: source of every draw.
         styles: number of style groups of the shape set that the rooms refer to.
+        size_shift: category -> shift of the sizes to try, as in `sample_size`.
     """
 
-    def __init__(self, floor: Floor, rng: np.random.Generator, styles: int) -> None:
+    def __init__(
+        self, floor: Floor, rng: np.random.Generator, styles: int, size_shift: Mapping[str, Sequence[float]]
+    ) -> None:
         self.floor = floor
         self.rng = rng
         self.styles = styles
+        self.size_shift = size_shift
         self.room_style = int(rng.integers(styles))
         self.items: list[Item] = []
         self.wanted: dict[str, int] = {}
@@ -80,7 +85,8 @@ class Builder:
         return options[-1]
 
     def size(self, category: str) -> Size:
-        x, y, z = sample_size(category, self.rng).tolist()
+        shift = self.size_shift.get(category, (0.0, 0.0, 0.0))
+        x, y, z = sample_size(category, self.rng, shift=shift).tolist()
         return x, y, z
 
     def style(self) -> int:

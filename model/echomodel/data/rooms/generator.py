@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from echomodel.data.rooms.builder import Builder
 from echomodel.data.rooms.floor import sample_floor
 from echomodel.data.rooms.recipes import furnish, wanted
-from echomodel.data.rooms.statistics import RoomTypeStatistics, room_type_statistics
+from echomodel.data.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
 from echomodel.roomboxes import RoomBoxes
 
 # Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
@@ -20,7 +20,7 @@ STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
 
 def generate_room(
     rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room",
-    statistics: RoomTypeStatistics | None = None,
+    statistics: RoomTypeStatistics | None = None, size_shift: Mapping[str, Sequence[float]] | None = None,
 ) -> RoomBoxes:  # fmt: skip
     """Draw one room.
 
@@ -30,6 +30,7 @@ def generate_room(
         styles: number of style groups; objects refer to shape `s<style>_<category>`.
         name: the room's id.
         statistics: what such rooms hold, default that of the real ones.
+        size_shift: which sizes to try (see `room_requests`), default those that give real rooms' sizes.
 
     Returns:
         The room with its floor's bounding box centred at the origin, metres and radians.
@@ -40,8 +41,9 @@ def generate_room(
     if room_type is None:
         room_type = list(MIX)[int(np.searchsorted(np.cumsum(list(MIX.values())), rng.random() * 0.999999))]
     statistics = statistics or room_type_statistics(room_type)
+    size_shift = room_requests()["size"] if size_shift is None else size_shift
     while True:
-        builder = Builder(sample_floor(statistics, rng), rng, styles)
+        builder = Builder(sample_floor(statistics, rng), rng, styles, size_shift)
         builder.wanted = wanted(statistics, builder.floor.area, rng)
         furnish(builder, room_type)
         if len(builder.items) > 1:

@@ -52,7 +52,7 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
     if name not in rooms:
         raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
     raw = rooms[name]
-    asked = _room_requests().get(name, {}) if requests else {}
+    asked = room_requests()["presence"].get(name, {}) if requests else {}
     presence = {}
     for category, entry in raw["presence"].items():
         counts = tuple(int(count) for count in entry["counts"])
@@ -72,7 +72,12 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
     )
 
 
-def _room_requests() -> dict[str, dict[str, float]]:
+@cache
+def room_requests() -> dict[str, dict]:
+    """What to ask for so that rooms come out like real ones (see `calibration`).
+
+    `presence`: room type -> category -> share of rooms; `size`: category -> shift of x, y, z in standard deviations.
+    """
     return json.loads(resources.files("echomodel.data").joinpath("room_requests.json").read_text("utf-8"))
 
 

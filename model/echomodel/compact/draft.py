@@ -1,0 +1,77 @@
+"""What a draft of the boxes says about the room: where each stands to the walls, and each pair to one another."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.compact.pairs import Pairs
+from echomodel.floors import footprint, known, signed_distance, wall_distances
+
+NEAR, ROUND_ABOUT = 0.08, 0.4  # metres: two scales at which a gap is told, beside the gap itself
+FARTHEST = 20.0  # metres
+RATIO = 0.2  # likewise for logarithms of volumes and heights
+WALL_FEATURES = 3 * 12 + 1
+PAIR_FEATURES = 23
+
+
+def measurable(boxes: Boxes) -> Boxes:
+    """The boxes within bounds: a draft from pure noise may lie anywhere, what is measured on it must stay finite."""
+    return Boxes(boxes.size.clamp(0.02, FARTHEST), boxes.position.clamp(-FARTHEST, FARTHEST), boxes.yaw)
+
+
+def wall_features(boxes: Boxes, floor: Tensor) -> Tensor:
+    """Gaps to the walls at several scales, zeros where the floor is unknown: (N, WALL_FEATURES).
+
+    Four gaps along the room's axes from the hull of the box, and eight of its outline to the nearest wall; negative
+    beyond the wall.
+
+    Arguments:
+        boxes: N boxes. floor: (N, K, 2) float32, corners of the floor under each, NaN = unknown.
+    """
+    ahead = wall_distances(boxes.position[:, [0, 2]], floor) - _hull(boxes)[:, [0, 0, 1, 1]]
+    outline = footprint(boxes.size, boxes.position, boxes.yaw)
+    there = known(floor)[:, None].to(ahead.dtype)
+    gaps = torch.cat([ahead, signed_distance(outline, floor)], dim=1) * there
+    return torch.cat([_scales(gaps), there], dim=1)
+
+
+def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
+    """How the sender's box stands to the receiver's, and whether it mirrors it about the room's axes.
+
+    Shapes:
+        N boxes, P pairs -> (P, PAIR_FEATURES)
+    """
+    i, j = pairs.receiver, pairs.sender
+    apart = boxes.position[j] - boxes.position[i]
+    cos, sin = boxes.yaw.cos(), boxes.yaw.sin()
+    hull = _hull(boxes)
+    gap = apart[:, [0, 2]].abs() - hull[i] - hull[j]
+    lateral = cos[i] * apart[:, 0] - sin[i] * apart[:, 2]
+    forward = sin[i] * apart[:, 0] + cos[i] * apart[:, 2]
+    extent = torch.stack([boxes.size.log().sum(1), boxes.size[:, 1].log()], dim=1)
+    larger = extent[j] - extent[i]
+    lift = boxes.position[j, 1] - boxes.position[i, 1] - boxes.size[i, 1]
+    mirrored = (boxes.position[i] + boxes.position[j])[:, [0, 2]]
+    return torch.cat(
+        [
+            apart / 2, torch.tanh(apart / ROUND_ABOUT), torch.tanh(gap / ROUND_ABOUT), torch.tanh(gap / NEAR),
+            torch.tanh(torch.stack([lateral, forward], 1)), torch.tanh(lift / ROUND_ABOUT)[:, None],
+            torch.tanh(mirrored / ROUND_ABOUT), torch.tanh(mirrored / NEAR),
+            larger / 2, torch.tanh(larger / RATIO),
+            torch.stack([sin[j] * cos[i] - cos[j] * sin[i], cos[j] * cos[i] + sin[j] * sin[i]], 1),
+        ],
+        dim=1,
+    )  # fmt: skip
+
+
+def _hull(boxes: Boxes) -> Tensor:
+    """(N, 2) half extents of the boxes along the room's x and z, metres."""
+    cos, sin = boxes.yaw.cos().abs(), boxes.yaw.sin().abs()
+    width, depth = boxes.size[:, 0], boxes.size[:, 2]
+    return torch.stack([cos * width + sin * depth, sin * width + cos * depth], dim=1) / 2
+
+
+def _scales(gaps: Tensor) -> Tensor:
+    return torch.cat([torch.tanh(gaps / 3), torch.tanh(gaps / ROUND_ABOUT), torch.tanh(gaps / NEAR)], dim=1)
