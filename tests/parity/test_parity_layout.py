@@ -50,7 +50,7 @@ def test_tables() -> None:
     numbers = Numbers("layout_tables")
     tables = _tables(numbers.meta)
     for name in numbers.names:
-        close(getattr(tables, name), numbers[name], 0.0, relative=3e-7)  # two units in the last place: square roots differ
+        close(getattr(tables, name), numbers[name], 0.0, relative=3e-7)  # square roots differ by a digit
 
 
 @torch.inference_mode()
