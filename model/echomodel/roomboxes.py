@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.openings import Opening, opening_from_json
+
 CONVENTION = (
     "metres; +Y up; size = (x, y, z) extents in the object frame; position = bottom centre; "
     "yaw about +Y, object front = +Z at yaw 0; floor_polygon = (x, z); equal model = same furniture model"
@@ -32,6 +34,7 @@ class RoomBoxes:
         models: n names; objects with the same name are the same piece of furniture ("" = unknown).
         styles: n style groups; objects with the same non-negative number belong together (-1 = unknown).
         relations: (e, 3) int [subject, predicate id, object], or None where the room is not labelled.
+        openings: doors, windows and passages in the edges of the floor polygon.
     """
 
     id: str
@@ -45,6 +48,7 @@ class RoomBoxes:
     models: tuple[str, ...] = ()
     styles: tuple[int, ...] = ()
     relations: np.ndarray | None = field(default=None)
+    openings: tuple[Opening, ...] = ()
 
     def __len__(self) -> int:
         return len(self.categories)
@@ -66,6 +70,7 @@ class RoomBoxes:
             models=tuple(o.get("model", "") for o in objects),
             styles=tuple(o.get("style", -1) for o in objects),
             relations=None if relations is None else np.asarray(relations, int).reshape(-1, 3),
+            openings=tuple(map(opening_from_json, raw.get("openings", ()))),
         )
 
     def to_json(self, digits: int = 4) -> dict:
@@ -90,6 +95,11 @@ class RoomBoxes:
         }
         if self.relations is not None:
             out["relations"] = self.relations.tolist()
+        if self.openings:
+            out["openings"] = [
+                {key: round(v, digits) if isinstance(v, float) else v for key, v in opening.to_json().items()}
+                for opening in self.openings
+            ]
         return out
 
 
