@@ -19,6 +19,7 @@ from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.room.meshing import FACES, box_mesh, mesh_from_shape
+from echousd.room.reproducible import one_thread, rounded_boxes, rounded_grids
 from echousd.room.room import Provenance, Room, RoomOptions, Verdict
 from echousd.room.shell import box_corners, floor_polygon
 from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
@@ -217,15 +218,9 @@ def sample_boxes(
         extra["steps"] = steps
     if change is not None:
         extra["edit"] = change
-    with (watch or Watch()).stage("layout") as tell:
+    with (watch or Watch()).stage("layout") as tell, one_thread():
         found = echo.sample_layout(batch, generator=_generator(seed, "layout", number), progress=tell, **extra)
-    rows = torch.arange(len(nodes))
-    size, position, yaw = found.size.clone(), found.position + centre, found.yaw.clone()
-    for i, node in zip(rows, nodes, strict=True):
-        size[i] = torch.tensor(node.size) if node.size else size[i]
-        position[i] = torch.tensor(node.position) if node.position else position[i]
-        yaw[i] = torch.tensor(node.yaw) if node.yaw is not None else yaw[i]
-    return Boxes(size, position, yaw)
+    return rounded_boxes(graph, Boxes(found.size, found.position + centre, found.yaw))
 
 
 def sample_shapes(
@@ -241,13 +236,13 @@ def sample_shapes(
     """(n, 64, 64, 64) float32 TSDFs from the shape branch; raises ValueError for a model without one."""
     require_shapes(echo)
     centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
-    with (watch or Watch()).stage("shapes") as tell:
+    with (watch or Watch()).stage("shapes") as tell, one_thread():
         generator = _generator(seed, "shapes", 0)
         extra: dict[str, Any] = {} if change is None else {"edit": change}
         grids = echo.sample_shapes(
             graph_batch(graph), centred, generator=generator, steps=steps, progress=tell, **extra
         )
-        return np.asarray(grids)
+        return rounded_grids(np.asarray(grids))
 
 
 def make_meshes(
@@ -321,7 +316,7 @@ def settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tupl
     """Sampled boxes after equal sizes within style groups and, if wanted, repair; and what could not be met."""
     boxes = _alike(graph, boxes)
     if not repair:
-        return boxes, ()
+        return rounded_boxes(graph, boxes), ()
     from echousd.repair import repair as repaired
 
     with watch.stage("repair"):
@@ -334,7 +329,7 @@ def settled(graph: SceneGraph, boxes: Boxes, repair: bool, watch: Watch) -> tupl
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
     collisions = tuple(f"{a} and {b} collide by {depth:.2f} m" for a, b, depth in found.collisions)
-    return found.boxes, found.conflicts + collisions
+    return rounded_boxes(graph, found.boxes), found.conflicts + collisions
 
 
 def _alike(graph: SceneGraph, boxes: Boxes, judged_by: Boxes | None = None) -> Boxes:
