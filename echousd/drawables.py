@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Ar, Usd, UsdGeom, UsdShade
+from pxr import Usd, UsdGeom, UsdShade
+
+from echousd.stage import values
+from echousd.stage.encoding import StageError
+from echousd.textures import TextureError, read_image
 
 
 @dataclass(frozen=True)
 class Paint:
-    """A UsdPreviewSurface in short: linear colours, and the resolved path of the colour's texture ("" for none)."""
+    """A UsdPreviewSurface in short: linear colours; the colour's texture as resolved path, its shader's prim path."""
 
     name: str = "grey"
     color: tuple[float, float, float] = (0.55, 0.55, 0.55)
@@ -21,6 +24,7 @@ class Paint:
     roughness: float = 0.8
     metallic: float = 0.0
     texture: str = ""
+    image: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,20 +65,18 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
         part = _triangles(mesh)
         if part is not None:
             face, triangles, normals, st = part
-            world = to_world @ np.array(cache.GetLocalToWorldTransform(prim)).T
+            world = to_world @ values.matrix(cache.GetLocalToWorldTransform(prim), prim)
             paints = tuple(_paints(mesh, face, known))
             path, component, category = str(prim.GetPath()), _component(prim), _category(prim)
             yield Drawable(path, component, category, world, triangles, normals, st, paints)
 
 
-def read_image(path: str) -> np.ndarray:
-    """(h, w, 3) uint8 sRGB of an image, from a folder or from inside a usdz; one grey pixel where there is none."""
-    from PIL import Image
-
-    asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
-    if not asset:
-        return np.full((1, 1, 3), 188, np.uint8)
-    return np.asarray(Image.open(io.BytesIO(bytes(asset.GetBuffer()))).convert("RGB"))
+def paint_image(paint: Paint) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of the image that colours a paint; raises StageError naming prim and file."""
+    try:
+        return read_image(paint.texture)
+    except TextureError as error:
+        raise StageError(f"<{paint.image}>: {error}") from None
 
 
 def _visible(prim: Usd.Prim) -> bool:
@@ -85,9 +87,9 @@ def _visible(prim: Usd.Prim) -> bool:
 
 def _category(prim: Usd.Prim) -> str:
     while prim and not prim.IsPseudoRoot():
-        values = prim.GetAttribute("semantics:labels:category")
-        if values and values.Get():
-            return str(values.Get()[0])
+        words = values.texts(prim.GetAttribute("semantics:labels:category"))
+        if words:
+            return words[0]
         prim = prim.GetParent()
     return ""
 
@@ -103,10 +105,9 @@ def _component(prim: Usd.Prim) -> str:
 
 def _triangles(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None] | None:
     """Fan triangles of a mesh: the face that each came from, corners, corner normals, st."""
-    points = np.asarray(mesh.GetPointsAttr().Get() or [], np.float64).reshape(-1, 3)
-    counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get() or [], np.int64)
-    index = np.asarray(mesh.GetFaceVertexIndicesAttr().Get() or [], np.int64)
-    if not len(points) or not len(counts) or counts.sum() != len(index) or index.max(initial=0) >= len(points):
+    arrays = values.mesh_arrays(mesh)
+    points, counts, index = arrays.points, arrays.counts, arrays.indices
+    if not (counts > 2).any():
         return None
     first = np.cumsum(counts) - counts
     fans = np.clip(counts - 2, 0, None)
@@ -132,12 +133,13 @@ def _corner_values(
     """(t, 3, width) values of a primvar (or of the `normals` attribute) at the corners, or None."""
     primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name)
     if primvar and primvar.HasValue():
-        values, interpolation = primvar.ComputeFlattened(), primvar.GetInterpolation()
+        found, interpolation, attribute = _flattened(primvar), primvar.GetInterpolation(), primvar.GetAttr()
     elif name == "normals" and mesh.GetNormalsAttr().HasAuthoredValue():
-        values, interpolation = mesh.GetNormalsAttr().Get(), mesh.GetNormalsInterpolation()
+        attribute = mesh.GetNormalsAttr()
+        found, interpolation = values.given(attribute), mesh.GetNormalsInterpolation()
     else:
         return None
-    table = np.asarray(values, np.float64).reshape(-1, width)
+    table = values.numbers(found, width, values.owner(attribute))
     if interpolation == UsdGeom.Tokens.faceVarying and len(table) == len(index):
         return table[corner]
     if interpolation in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying) and len(table) == points:
@@ -147,12 +149,27 @@ def _corner_values(
     return None
 
 
+def _flattened(primvar: UsdGeom.Primvar) -> Any:
+    """Values of a primvar, one for each of its indices; raises StageError for indices out of range."""
+    found = values.given(primvar.GetAttr())
+    if not primvar.IsIndexed():
+        return found
+    index = values.array(primvar.GetIndicesAttr(), whole=True)
+    if not hasattr(found, "__len__") or (len(index) and (index.min() < 0 or index.max() >= len(found))):
+        count = len(found) if hasattr(found, "__len__") else 0
+        raise StageError(
+            f"{values.owner(primvar.GetIndicesAttr())} reaches from {index.min(initial=0)} to {index.max(initial=0)}, "
+            f"allowed: 0 to {count - 1}"
+        )
+    return np.asarray(found)[index]
+
+
 def _paints(mesh: UsdGeom.Mesh, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
     """Materials of a mesh with the triangles that they colour."""
     paints = [(_bound(mesh.GetPrim(), known), np.arange(len(face)))]
     for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
         chosen = np.zeros(int(face.max(initial=0)) + 1, bool)
-        inside = np.asarray(subset.GetIndicesAttr().Get() or [], int)
+        inside = values.array(subset.GetIndicesAttr(), whole=True)
         chosen[inside[(inside >= 0) & (inside < len(chosen))]] = True
         paints.append((_bound(subset.GetPrim(), known), np.flatnonzero(chosen[face])))
     return paints
@@ -161,8 +178,9 @@ def _paints(mesh: UsdGeom.Mesh, face: np.ndarray, known: dict[str, Paint]) -> li
 def _bound(prim: Usd.Prim, known: dict[str, Paint]) -> Paint:
     material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
     if not material:
-        shown = UsdGeom.Gprim(prim).GetDisplayColorAttr().Get() if prim.IsA(UsdGeom.Gprim) else None
-        return Paint("displayColor", _rgb(shown[0])) if shown else Paint()
+        shown: Any = values.given(UsdGeom.Gprim(prim).GetDisplayColorAttr()) if prim.IsA(UsdGeom.Gprim) else None
+        color = rgb(next(iter(shown), None) if hasattr(shown, "__iter__") else None, None)
+        return Paint("displayColor", color) if color else Paint()
     path = str(material.GetPath())
     if path not in known:
         known[path] = _surface(material)
@@ -173,8 +191,8 @@ def _surface(material: UsdShade.Material) -> Paint:
     shader, _, _ = material.ComputeSurfaceSource()
     if not shader:
         return Paint()
-    values: dict[str, Any] = {}
-    texture = ""
+    found: dict[str, Usd.Attribute] = {}
+    texture = shown = ""
     for name in ("diffuseColor", "emissiveColor", "roughness", "metallic"):
         source = shader.GetInput(name)
         if not source:
@@ -182,20 +200,26 @@ def _surface(material: UsdShade.Material) -> Paint:
         connected = source.GetConnectedSources()[0] if source.HasConnectedSource() else []
         if connected and name == "diffuseColor":
             image = UsdShade.Shader(connected[0].source.GetPrim())
-            file = image.GetInput("file").Get() if image.GetInput("file") else None
+            file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
             texture = str(file.resolvedPath) if file else ""
-        elif not connected and source.Get() is not None:
-            values[name] = source.Get()
+            shown = str(image.GetPath()) if texture else ""
+        elif not connected:
+            found[name] = source.GetAttr()
     return Paint(
         material.GetPrim().GetName(),
-        _rgb(values.get("diffuseColor", (0.18, 0.18, 0.18))),
-        _rgb(values.get("emissiveColor", (0.0, 0.0, 0.0))),
-        float(values.get("roughness", 0.5)),
-        float(values.get("metallic", 0.0)),
+        rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
+        rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)),
+        values.number(found.get("roughness"), 0.5),
+        values.number(found.get("metallic"), 0.0),
         texture,
+        shown,
     )
 
 
-def _rgb(value: Any) -> tuple[float, float, float]:
-    red, green, blue = (float(c) for c in value)
-    return red, green, blue
+def rgb(found: Any, default: Any) -> Any:
+    """Three finite numbers of a colour (of RGB or RGBA), `default` where there are none."""
+    try:
+        red, green, blue = (float(c) for c in tuple(found)[:3])
+    except (TypeError, ValueError):
+        return default
+    return (red, green, blue) if all(abs(c) < 1e6 for c in (red, green, blue)) else default

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import io
-import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
-from echousd.drawables import Drawable, Paint, read_drawables, read_image
+from echousd.drawables import Drawable, Paint, paint_image, read_drawables, rgb
+from echousd.packing import Package, Reach, take_assets
 from echousd.stage import open_stage
+from echousd.stage.values import given
 
 if TYPE_CHECKING:
     import trimesh
@@ -22,7 +24,9 @@ if TYPE_CHECKING:
 ENDINGS = (".usdz", ".glb", ".usda", ".usdc")
 
 
-def export(room: str | Path, out: str | Path, *, arkit: bool = False, force: bool = False) -> Path:
+def export(
+    room: str | Path, out: str | Path, *, arkit: bool = False, force: bool = False, search: Sequence[str | Path] = ()
+) -> Path:
     """Write a room (any stage) as one file.
 
     Arguments:
@@ -30,8 +34,10 @@ def export(room: str | Path, out: str | Path, *, arkit: bool = False, force: boo
         out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
         arkit: usdz with one usdc inside, as Apple's viewers want it.
         force: replace a file that is in the way.
+        search: folders besides the room's own whose layers and images may be taken along.
 
-    Raises ValueError for other endings, a file in the way, a stage that does not open, or a path that is not writable.
+    Raises ValueError for other endings, a file in the way, a stage that does not open, one that names files outside its
+    folder and `search`, or a path that is not writable.
     """
     from echousd.room.assets import layer_bytes
     from echousd.room.save import write_whole
@@ -43,30 +49,32 @@ def export(room: str | Path, out: str | Path, *, arkit: bool = False, force: boo
         raise ValueError(f"{out}: --arkit makes a .usdz, found {out.suffix!r}")
     if out.exists() and not force:
         raise ValueError(f"{out}: exists; choose another file or use --force")
+    stage = open_stage(room)
+    reach = Reach.of(stage, search)
+    reach.check_layers(stage)
     if out.suffix == ".glb":
-        content = glb(open_stage(room))
+        content = glb(stage, reach)
     elif out.suffix == ".usdz":
-        content = usdz(Path(room), arkit=arkit)
+        content = usdz(stage, Package(reach), arkit=arkit)
     else:
-        content = layer_bytes(flat_layer(Path(room)), out.suffix)
+        content = layer_bytes(flat_layer(stage), out.suffix)
     write_whole(out, content)
     return out
 
 
 def flat_layer(
-    path: Path, *, textures: Path | None = None, guides: bool = True, layouts: Room | None = None
+    stage: Usd.Stage, *, package: Package | None = None, guides: bool = True, layouts: Room | None = None
 ) -> Sdf.Layer:
-    """Everything that a stage composes to, in one layer without references, variants or absolute paths.
+    """Everything that a stage composes to, in one layer without references, variants or paths of this machine.
 
     Arguments:
-        path: the stage's root layer.
-        textures: folder that receives copies of the images; without it textured materials get their plain colour.
+        package: receives the images; without it textured materials get their plain colour.
         guides: keep prims of purpose guide (colliders) and physics.
         layouts: the room whose layouts become variants again.
     """
     from echousd.room.compose import place_layouts
 
-    layer = open_stage(path).Flatten(False)
+    layer = stage.Flatten(False)
     stage = Usd.Stage.Open(layer)
     for prim in list(stage.TraverseAll()):
         if prim.IsValid() and not guides and _is_guide(prim):
@@ -76,30 +84,36 @@ def flat_layer(
         for attribute in prim.GetAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Double3 and attribute.GetName().startswith("xformOp:"):
                 _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
-            elif attribute.GetTypeName() == Sdf.ValueTypeNames.Asset and attribute.Get():
-                _take_along(attribute, textures)
     _drop_unused_materials(stage)
+    images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
+    take_assets(layer, package)
+    for image in images:
+        file = image.GetAttribute("inputs:file").Get()
+        if not getattr(file, "path", ""):
+            _paint_plain(image)
     if layouts is not None and len(layouts.layouts) > 1:
         place_layouts(stage, layouts)
     return layer
 
 
-def usdz(path: Path, *, arkit: bool = False) -> bytes:
-    """A usdz package of one flat layer and its textures."""
+def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
+    """A usdz package of one flat layer and its images."""
+    root = package.reach.room
+    layer = flat_layer(stage, package=package, guides=False)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         folder = Path(scratch)
-        layer = flat_layer(path, textures=folder / "textures", guides=False)
-        flat = folder / f"{path.stem}{'.usdc' if arkit else '.usda'}"
+        package.write(folder)
+        flat = folder / f"{root.stem}{'.usdc' if arkit else '.usda'}"
         layer.Export(str(flat))
-        package = folder / "package.usdz"
+        packed = folder / "package.usdz"
         make = UsdUtils.CreateNewARKitUsdzPackage if arkit else UsdUtils.CreateNewUsdzPackage
-        if not make(Sdf.AssetPath(str(flat)), str(package)):
-            raise ValueError(f"{path}: cannot be packed as usdz")
-        return package.read_bytes()
+        if not make(Sdf.AssetPath(str(flat)), str(packed)):
+            raise ValueError(f"{root}: cannot be packed as usdz")
+        return packed.read_bytes()
 
 
-def glb(stage: Usd.Stage) -> bytes:
-    """Binary glTF: one node per component, one mesh per material; y up, metres."""
+def glb(stage: Usd.Stage, reach: Reach) -> bytes:
+    """Binary glTF: one node per component, one mesh per material; y up, metres; images within reach."""
     import trimesh
 
     scene = trimesh.Scene()
@@ -107,6 +121,8 @@ def glb(stage: Usd.Stage) -> bytes:
     for mesh in read_drawables(stage):
         for paint, faces in _own_faces(mesh):
             if paint not in materials:
+                if paint.texture:
+                    reach.check(paint.texture, f"<{paint.image}>")
                 materials[paint] = _pbr(paint)
             part = _part(mesh, faces, materials[paint])
             name = f"{mesh.component}_{paint.name}"
@@ -123,27 +139,29 @@ def _is_guide(prim: Usd.Prim) -> bool:
 
 
 def _as_float(attribute: Usd.Attribute) -> None:
-    value, prim, name = attribute.Get(), attribute.GetPrim(), attribute.GetName()
+    value, prim, name = given(attribute), attribute.GetPrim(), attribute.GetName()
+    if not isinstance(value, Gf.Vec3d):
+        return
     prim.RemoveProperty(name)
     prim.CreateAttribute(name, Sdf.ValueTypeNames.Float3, False).Set(tuple(float(v) for v in value))
 
 
-def _take_along(attribute: Usd.Attribute, textures: Path | None) -> None:
-    source = Path(attribute.Get().resolvedPath or attribute.Get().path)
-    if textures is not None and source.is_file():
-        textures.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, textures / source.name)
-        attribute.Set(Sdf.AssetPath(f"./{textures.name}/{source.name}"))
-        return
-    image = attribute.GetPrim()
-    fallback = image.GetAttribute("inputs:fallback").Get()
+def _is_image(prim: Usd.Prim) -> bool:
+    """Whether a prim is a shader that reads an image."""
+    file = prim.GetAttribute("inputs:file")
+    return prim.GetTypeName() == "Shader" and bool(file) and file.HasAuthoredValue()
+
+
+def _paint_plain(image: Usd.Prim) -> None:
+    """Give the materials that an image without a file coloured its fallback colour instead."""
+    fallback = image.GetAttribute("inputs:fallback")
+    color = rgb(fallback.Get() if fallback else None, (0.5, 0.5, 0.5))
     for shader in image.GetParent().GetChildren():
-        color = shader.GetAttribute("inputs:diffuseColor")
-        if color and any(str(c).startswith(str(image.GetPath())) for c in color.GetConnections()):
-            color.ClearConnections()
-            color.Set(tuple(fallback)[:3] if fallback else (0.5, 0.5, 0.5))
-    attribute.GetPrim().SetActive(False)
-    attribute.Clear()
+        colored = shader.GetAttribute("inputs:diffuseColor")
+        if colored and any(c.GetPrimPath() == image.GetPath() for c in colored.GetConnections()):
+            colored.ClearConnections()
+            colored.Set(color)
+    image.SetActive(False)
 
 
 def _drop_unused_materials(stage: Usd.Stage) -> None:
@@ -186,7 +204,7 @@ def _pbr(paint: Paint) -> Any:
     import trimesh
     from PIL import Image
 
-    textured = Image.open(io.BytesIO(_png(read_image(paint.texture)))) if paint.texture else None
+    textured = Image.open(io.BytesIO(_png(paint_image(paint)))) if paint.texture else None
     return trimesh.visual.material.PBRMaterial(
         name=paint.name,
         baseColorFactor=[1.0, 1.0, 1.0, 1.0] if textured else [*paint.color, 1.0],

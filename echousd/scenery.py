@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pxr import Usd
 
-from echousd.drawables import Drawable, Paint, read_drawables, read_image
+from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
@@ -123,7 +123,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             part["texture"][faces] = -1
             if paint.texture:
                 if paint.texture not in images:
-                    linear = (read_image(paint.texture).astype(np.float32) / 255) ** 2.2
+                    linear = (paint_image(paint).astype(np.float32) / 255) ** 2.2
                     images[paint.texture] = (len(images), linear)
                 part["texture"][faces] = images[paint.texture][0]
         parts.append(part)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pxr import Sdf, Usd, UsdUtils
 
 from echousd.check.findings import Finding, Rule
+from echousd.packing import Reach
 
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
@@ -26,6 +27,28 @@ def relative_paths(stage: Usd.Stage) -> Iterator[Finding]:
             what = "absolute" if ABSOLUTE.match(path) else "written with backslashes"
             where = layer.GetDisplayName()
             yield Finding(_holder(layer, path), f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
+
+
+def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every file that the room names lies below its folder: it stays behind when the folder is sent, or leaks."""
+    if not stage.GetRootLayer().realPath:
+        return
+    reach = Reach.of(stage)
+    told = set()
+    for layer in stage.GetUsedLayers():
+        if layer == stage.GetSessionLayer():
+            continue
+        for path in _asset_paths(layer):
+            if not path or (layer.identifier, path) in told or ABSOLUTE.match(path):
+                continue
+            told.add((layer.identifier, path))
+            full = layer.ComputeAbsolutePath(path)
+            if full and not reach.holds(full):
+                where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
+                is_layer = bool(Sdf.FileFormat.FindByExtension(full))
+                yield Finding(
+                    _holder(layer, path), f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer
+                )
 
 
 def _asset_paths(layer: Sdf.Layer) -> list[str]:
@@ -65,4 +88,7 @@ def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
     return Sdf.Path.absoluteRootPath
 
 
-RULES = (Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),)
+RULES = (
+    Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),
+    Rule("echo:PathsInside", "Files that a room names lie below its folder.", paths_inside),
+)

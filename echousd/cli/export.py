@@ -18,9 +18,13 @@ def register(app: typer.Typer) -> None:
             Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)
         ],
         arkit: Annotated[bool, typer.Option("--arkit", help="usdz for Apple's viewers (a usdc inside).")] = False,
+        search: Annotated[
+            list[Path] | None,
+            typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
+        ] = None,
         force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
     ) -> None:
         """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
         from echousd.export import export as write
 
-        typer.echo(str(write(room, output, arkit=arkit, force=force)))
+        typer.echo(str(write(room, output, arkit=arkit, force=force, search=search or ())))

@@ -85,7 +85,7 @@ def conflicts(
             else:
                 apart.append((other, numbers))
         groups = [*apart, (joined, members)]
-    first = {kind: int(np.argmax(at.kind == kind)) for kind in (RELATION, COLLISION)}
+    first = {kind: first_row(at.kind, kind) for kind in (RELATION, COLLISION)}
     objects_of = dict(zip(violated.tolist(), touched, strict=True))
     every = (
         Conflict(
@@ -107,6 +107,11 @@ def conflicts(
         or not pairs.isdisjoint(conflict.pairs)
         or not outside.isdisjoint(conflict.outside)
     )
+
+
+def first_row(kinds: np.ndarray, kind: int) -> int:
+    """Row of the first constraint of a kind, 0 where there is none: boxes that are all fixed leave nothing to hold."""
+    return int(np.argmax(kinds == kind)) if len(kinds) else 0
 
 
 def sentence(conflict: Conflict, graph: SceneGraph) -> str:

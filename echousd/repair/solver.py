@@ -104,7 +104,7 @@ def solve(
             break
         # Next time colliding pairs part along another axis; what still does not fit first walks through the others.
         stuck = np.flatnonzero((found.at.kind == COLLISION) & (found.at.value < -0.01))
-        colliding = stuck - int(np.argmax(found.at.kind == COLLISION))
+        colliding = stuck - (int(np.argmax(found.at.kind == COLLISION)) if len(stuck) else 0)
         handicap[colliding, found.at.axis[colliding]] += 0.4
         if not len(stuck) or best is not found:
             through = THROUGH

@@ -68,6 +68,7 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
     Raises ValueError for another ending, a file that is in the way, or a path that cannot be written.
     """
     from echousd.export import flat_layer
+    from echousd.stage import open_stage
 
     if path.suffix not in (".usda", ".usdc"):
         raise ValueError(f"{path}: a flat room ends in .usda or .usdc, found {path.suffix or 'no ending'!r}")
@@ -75,7 +76,7 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
         raise ValueError(f"{path}: exists; choose another file or use --force")
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         root = save_layers(room, Path(scratch) / room.name)
-        write_whole(path, layer_bytes(flat_layer(root, layouts=room), path.suffix))
+        write_whole(path, layer_bytes(flat_layer(open_stage(root), layouts=room), path.suffix))
     return path
 
 

@@ -40,6 +40,7 @@ FOUND = {
     "missing_semantics": {"echo:Semantics"},
     "material_outside": {"echo:MaterialsInside"},
     "absolute_path": {"echo:RelativePaths"},
+    "path_outside": {"echo:PathsInside"},
 }
 
 

@@ -237,3 +237,16 @@ def test_bad_input_is_named() -> None:
         repair_boxes(
             ["bed"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3)), floor_polygon=np.zeros((4, 2))
         )
+
+
+def test_fixed_boxes_without_relations_stay_where_they_are() -> None:
+    nodes = (
+        Node("bed", "double_bed", size=(1.6, 0.5, 2.0), position=(0.0, 0.0, 0.0), yaw=0.0),
+        Node("stand", "nightstand", size=(0.5, 0.5, 0.5), position=(0.4, 0.0, 0.4), yaw=0.0),
+    )
+    for count in (1, 2):
+        graph = SceneGraph(RoomSpec("bedroom"), nodes[:count])
+        fixed = boxes(*([getattr(n, field) for n in nodes[:count]] for field in ("size", "position", "yaw")))
+        found = repair(graph, fixed)
+        assert torch.equal(found.boxes.position, fixed.position)
+        assert torch.equal(found.boxes.size, fixed.size)

@@ -1,0 +1,177 @@
+"""What a room may take along into an archive: its own images, and nothing else of this machine."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from pxr import Ar, Sdf, Usd, UsdUtils
+
+from echousd.stage.encoding import StageError
+from echousd.textures import TextureError, file_of, texture_bytes
+
+PACKED = (".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")  # what a usdz may hold beside layers
+SEARCH_PATH = "PXR_AR_DEFAULT_SEARCH_PATH"
+FOLDER = "textures"
+UDIM_TILES = range(1001, 1101)
+
+
+class LeftOut(UserWarning):
+    """A file that no archive may hold; what named it goes without."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Where the files of a room may lie: below its folder (for a usdz: in the file) and in named search paths."""
+
+    room: Path
+    places: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, stage: Usd.Stage, search: Sequence[str | os.PathLike[str]] = ()) -> Reach:
+        """The reach of a stage: of its root layer, of `search` and of OpenUSD's own search path variable."""
+        root = file_of(stage.GetRootLayer().realPath).resolve()
+        own = root if root.suffix == ".usdz" else root.parent
+        named = [*search, *filter(None, os.environ.get(SEARCH_PATH, "").split(os.pathsep))]
+        return cls(root, (own, *(Path(place).resolve() for place in named)))
+
+    def holds(self, path: str) -> bool:
+        """Whether a file, all links followed, lies in reach."""
+        real = file_of(path).resolve()
+        return any(real == place or place in real.parents for place in self.places)
+
+    def check(self, path: str, where: str) -> None:
+        """Raises StageError that names `where` (a prim, a layer) for a file out of reach."""
+        if not self.holds(path):
+            allowed = ", ".join(map(str, self.places))
+            raise StageError(
+                f"{self.room}: {where} names {path!r}, allowed: files in {allowed} (--search DIR adds one)"
+            )
+
+    def check_layers(self, stage: Usd.Stage) -> None:
+        """Raises StageError for a layer of the stage out of reach."""
+        for layer in stage.GetUsedLayers():
+            if not layer.anonymous and layer.realPath:
+                self.check(layer.realPath, f"a layer of <{_first_prim(stage, layer)}>")
+
+
+def _first_prim(stage: Usd.Stage, layer: Sdf.Layer) -> Sdf.Path:
+    """The first prim with an opinion in a layer, the pseudo-root where there is none."""
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
+        if any(spec.layer == layer for spec in prim.GetPrimStack()):
+            return prim.GetPath()
+    return Sdf.Path.absoluteRootPath
+
+
+@dataclass
+class Package:
+    """The files that go into an archive beside the layer: name in the archive -> content.
+
+    Arguments:
+        reach: what may be packed at all.
+        names: path of a file on this machine -> its name in the archive, "" for what is left out.
+    """
+
+    reach: Reach
+    names: dict[str, str] = field(default_factory=dict)
+    content: dict[str, bytes] = field(default_factory=dict)
+
+    def take(self, path: str, where: str) -> str:
+        """The path in the archive of an asset path of a flat layer, "" where there is no such file.
+
+        Raises StageError for a file out of reach or one that cannot be read.
+        """
+        if path not in self.names:
+            self.names[path] = self._tiles(path, where) if "<UDIM>" in path else self._file(path, where)
+        return self.names[path]
+
+    def _file(self, path: str, where: str, name: str = "") -> str:
+        try:
+            there = file_of(path).exists()
+        except (OSError, ValueError):
+            there = False
+        if not there:
+            return ""
+        self.reach.check(path, where)
+        inside = Ar.SplitPackageRelativePathInner(path)[1] or path
+        ending = PurePosixPath(inside).suffix.lower()
+        if ending not in PACKED:
+            told = f"{self.reach.room}: {where} names {path!r}, which is left out (packed: {', '.join(PACKED)})"
+            warnings.warn(told, LeftOut, stacklevel=2)
+            return ""
+        try:
+            content = texture_bytes(path)
+        except TextureError as error:
+            raise StageError(f"{self.reach.room}: {where}: {error}") from None
+        if content is None:
+            return ""
+        name = name or self._unused(PurePosixPath(inside.replace("\\", "/")).name)
+        self.content[name] = content
+        return f"./{FOLDER}/{name}"
+
+    def _tiles(self, path: str, where: str) -> str:
+        before, _, after = path.rpartition("<UDIM>")
+        pattern = self._unused(f"{PurePosixPath(f'{before}0').name[:-1]}<UDIM>{after.rstrip(']')}")
+        packed = [
+            self._file(f"{before}{tile}{after}", where, pattern.replace("<UDIM>", str(tile))) for tile in UDIM_TILES
+        ]
+        return f"./{FOLDER}/{pattern}" if any(packed) else ""
+
+    def _unused(self, name: str) -> str:
+        taken = {used.casefold() for used in self.content} | {
+            PurePosixPath(used).name.casefold() for used in self.names.values()
+        }
+        stem, ending = os.path.splitext(name)  # noqa: PTH122  # a name with `<UDIM>`, no path
+        free, number = name, 2
+        while free.casefold() in taken:
+            free, number = f"{stem}_{number}{ending}", number + 1
+        return free
+
+    def write(self, folder: Path) -> None:
+        """Write the files below `folder`."""
+        for name, content in self.content.items():
+            path = folder / FOLDER / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+
+
+def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
+    """Point every asset path of a flat layer (attributes, arrays, samples, metadata) into the archive, or nowhere.
+
+    Arguments:
+        package: receives the files; None leaves them all out.
+
+    Raises StageError that names the prim or property of a file out of reach.
+    """
+    renamed: dict[str, str] = {}
+    for where, path in asset_paths(layer):
+        renamed[path] = package.take(path, where) if package is not None else ""
+    UsdUtils.ModifyAssetPaths(layer, lambda path: renamed.get(path, ""))
+    return renamed
+
+
+def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[str, str]]:
+    """(where, path) of every asset path in the values and metadata of a layer; where is `<prim or property path>`."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    for at in paths:
+        spec = layer.pseudoRoot if at == Sdf.Path.absoluteRootPath else layer.GetObjectAtPath(at)
+        if spec:
+            for key in spec.ListInfoKeys():
+                for path in _assets_in(spec.GetInfo(key)):
+                    yield f"<{at}>", path
+
+
+def _assets_in(value: object) -> Iterator[str]:
+    if isinstance(value, Sdf.AssetPath):
+        if value.path:
+            yield value.path
+    elif isinstance(value, dict):
+        for key in sorted(value, key=str):
+            yield from _assets_in(value[key])
+    elif isinstance(value, Sdf.AssetPathArray | list | tuple):
+        for entry in value:
+            yield from _assets_in(entry)

@@ -1,0 +1,170 @@
+"""Values on stages, read with doubt: a file may hold any type anywhere, and OpenUSD hands it on as it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+
+from echousd.stage.encoding import StageError
+
+LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
+MAX_CORNERS = 50_000_000  # face corners of one mesh
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """A polygon mesh in its own frame and the stage's unit.
+
+    Arguments:
+        points: (v, 3) float64; counts: (f,) int64 corners of each face; indices: (counts.sum(),) int64 into the points.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    indices: np.ndarray
+
+
+def owner(attribute: Usd.Attribute) -> str:
+    """`file: <prim path>.attribute` for error messages."""
+    layer = attribute.GetStage().GetRootLayer()
+    return f"{layer.realPath or layer.identifier}: <{attribute.GetPath()}>"
+
+
+def given(attribute: Usd.Attribute | None) -> Any:
+    """The default value, None where there is none; raises StageError where OpenUSD cannot read it."""
+    if not attribute:
+        return None
+    try:
+        return attribute.Get()
+    except Tf.ErrorException as error:
+        from echousd.stage.files import said
+
+        raise StageError(f"{owner(attribute)}: a value that cannot be read ({said(error)})") from None
+
+
+def number(attribute: Usd.Attribute | None, default: float = 0.0) -> float:
+    """A finite number; raises StageError for anything else."""
+    found = given(attribute)
+    if found is None or attribute is None:
+        return default
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: one number")
+    if not abs(found) <= LARGEST:
+        raise StageError(f"{owner(attribute)} is {found}, allowed: -{LARGEST:g} to {LARGEST:g}")
+    return float(found)
+
+
+def array(attribute: Usd.Attribute | None, width: int = 1, *, whole: bool = False) -> np.ndarray:
+    """(n, width) float64, or (n,) for width 1; int64 for `whole`; empty where there is no value.
+
+    Raises StageError for other types, NaN, infinities and numbers beyond `LARGEST`.
+    """
+    found = given(attribute)
+    shape = (-1,) if width == 1 else (-1, width)
+    if found is None or attribute is None:
+        return np.zeros(shape if width == 1 else (0, width), np.int64 if whole else np.float64).reshape(shape)
+    return numbers(found, width, owner(attribute), whole=whole)
+
+
+def numbers(found: Any, width: int, where: str, *, whole: bool = False) -> np.ndarray:
+    """What `array` gives, of a value that was read already; `where` stands in the error."""
+    allowed = f"a list of {'whole numbers' if whole else 'numbers' if width == 1 else f'{width} numbers each'}"
+    table = np.asarray(found) if hasattr(found, "__len__") and not isinstance(found, str) else np.asarray("")
+    kinds = "iu" if whole else "iuf"
+    right = table.ndim == (1 if width == 1 else 2) and (width == 1 or table.shape[1] == width)
+    if len(table.shape) and not table.size and not isinstance(found, tuple):
+        table, right = np.zeros((0,) if width == 1 else (0, width), np.int64 if whole else np.float64), True
+    if not right or table.dtype.kind not in kinds:
+        raise StageError(f"{where} is {shown(found)}, allowed: {allowed}")
+    if not whole:
+        table = table.astype(np.float64)
+        bad = ~(np.abs(table) <= LARGEST)
+        if bad.any():
+            raise StageError(f"{where} holds {table[bad][0]:g}, allowed: -{LARGEST:g} to {LARGEST:g}")
+        return table
+    return table.astype(np.int64)
+
+
+def texts(attribute: Usd.Attribute | None) -> tuple[str, ...]:
+    """A list of words, a single one included; empty without a value; raises StageError for anything else."""
+    found = given(attribute)
+    if found is None or attribute is None:
+        return ()
+    words = (found,) if isinstance(found, str) else tuple(found) if hasattr(found, "__iter__") else (None,)
+    if not all(isinstance(word, str) for word in words):
+        raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: words")
+    return words
+
+
+def asset(attribute: Usd.Attribute | None) -> Sdf.AssetPath | None:
+    """An asset path, None without one; raises StageError for anything else."""
+    found = given(attribute)
+    if found is None or isinstance(found, Sdf.AssetPath) or attribute is None:
+        return found
+    raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: an asset path")
+
+
+def matrix(found: Gf.Matrix4d, prim: Usd.Prim) -> np.ndarray:
+    """(4, 4) float64, column vectors, of a transform of `prim`; raises StageError where it is not finite."""
+    table = np.array(found, float).T
+    if not (np.abs(table) <= LARGEST).all():
+        worst = table[~(np.abs(table) <= LARGEST)][0]
+        layer = prim.GetStage().GetRootLayer()
+        raise StageError(
+            f"{layer.realPath or layer.identifier}: <{prim.GetPath()}>: its transform holds {worst:g}, "
+            f"allowed: -{LARGEST:g} to {LARGEST:g}"
+        )
+    return table
+
+
+def mesh_arrays(mesh: UsdGeom.Mesh) -> MeshArrays:
+    """Points and faces; raises StageError for values of other types and for faces that the points cannot make."""
+    points = array(mesh.GetPointsAttr(), 3)
+    counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
+    indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True)
+    if len(counts) and (counts.min() < 0 or counts.sum() != len(indices) or len(indices) > MAX_CORNERS):
+        raise StageError(
+            f"{owner(mesh.GetFaceVertexCountsAttr())} asks for {counts.sum()} corners (least {counts.min()}) and "
+            f"faceVertexIndices has {len(indices)}, allowed: as many, 0 or more each, {MAX_CORNERS} in all"
+        )
+    if len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
+        raise StageError(
+            f"{owner(mesh.GetFaceVertexIndicesAttr())} reaches from {indices.min()} to {indices.max()}, "
+            f"allowed: 0 to {len(points) - 1}"
+        )
+    return MeshArrays(points, counts, indices)
+
+
+def shown(found: Any, most: int = 40) -> str:
+    """A value of an unexpected type in few words: its type and its beginning."""
+    text = " ".join(str(found)[:200].split())
+    return f"{type(found).__name__} {text if len(text) <= most else text[: most - 3] + '...'}"
+
+
+def finite(found: Any) -> bool:
+    """Whether a number, or every number of a list, is neither NaN nor infinite; True for what holds no numbers."""
+    if isinstance(found, float):
+        return math.isfinite(found)
+    try:
+        table = np.asarray(found)
+    except (TypeError, ValueError):
+        return True
+    return table.dtype.kind != "f" or bool(np.isfinite(table).all())
+
+
+@contextmanager
+def reading(stage: Usd.Stage) -> Iterator[None]:
+    """Turn what OpenUSD raises while a stage is read, at any later value, into a StageError that names the file."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        from echousd.stage.files import said
+
+        layer = stage.GetRootLayer()
+        raise StageError(f"{layer.realPath or layer.identifier}: cannot be read ({said(error)})") from None

@@ -1,0 +1,75 @@
+"""Images that stages name: read with doubt, as a stage may name anything."""
+
+from __future__ import annotations
+
+import io
+import stat
+import warnings
+from pathlib import Path
+
+import numpy as np
+from pxr import Ar
+
+MAX_BYTES = 256 * 2**20
+MAX_PIXELS = 8192 * 8192
+# Pillow would also run Ghostscript for EPS; these it decodes itself.
+FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF", "AVIF")
+GREY = 188  # sRGB of what is not there
+
+
+class TextureError(ValueError):
+    """A file that is no image that can be read; the message names it, what was found and what is allowed."""
+
+
+def file_of(path: str) -> Path:
+    """The file on disk that holds an asset: the path itself, or the outermost package of `room.usdz[image.png]`."""
+    return Path(Ar.SplitPackageRelativePathOuter(path)[0])
+
+
+def texture_bytes(path: str) -> bytes | None:
+    """Content of an asset at a resolved path, from a folder or from inside a usdz; None where there is none.
+
+    Raises TextureError for what is no regular file (a pipe would wait for ever), empty or larger than `MAX_BYTES`.
+    """
+    try:
+        found = file_of(path).stat()
+    except (OSError, ValueError):
+        return None
+    if not stat.S_ISREG(found.st_mode):
+        raise TextureError(f"{path}: not a regular file, allowed: an image")
+    asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(path))
+    if not asset:
+        return None
+    size = asset.GetSize()
+    if not 0 < size <= MAX_BYTES:
+        raise TextureError(f"{path}: {size} bytes, allowed for an image: 1 to {MAX_BYTES}")
+    return bytes(asset.GetBuffer())
+
+
+def read_image(path: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of the image at a resolved path; one grey pixel where there is no file.
+
+    Raises TextureError for what `texture_bytes` refuses, what is no image, and more than `MAX_PIXELS` pixels.
+    """
+    from PIL import Image
+
+    content = texture_bytes(path)
+    if content is None:
+        return np.full((1, 1, 3), GREY, np.uint8)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is below
+        try:
+            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
+                width, height = image.size
+                if width * height > MAX_PIXELS:
+                    raise TextureError(
+                        f"{path}: an image of {width} x {height} pixels, allowed: {MAX_PIXELS} (8192 x 8192)"
+                    )
+                return np.asarray(image.convert("RGB"))
+        except TextureError:
+            raise
+        except Image.DecompressionBombError:
+            raise TextureError(f"{path}: an image of too many pixels, allowed: {MAX_PIXELS} (8192 x 8192)") from None
+        except Exception as error:  # decoders fail on damaged files in every way there is
+            reason = str(error) if not isinstance(error, Image.UnidentifiedImageError) else "of no known format"
+            raise TextureError(f"{path}: not an image that can be read ({reason or type(error).__name__})") from None
