@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.vocabulary import vocabulary
 from echousd.check.objects import RoomContents, RoomObject
-from echousd.repair.belonging import support
 from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, inside
 from echousd.repair.repair import DEFAULT_HEIGHT, floor_of_room
 
@@ -95,10 +95,10 @@ def _surface_gap(feet: np.ndarray, bottom: float, other: RoomObject) -> float:
 
 
 def _held(thing: RoomObject, floor: Floor | None, height: float) -> bool:
-    kind = support(thing.node.category)
+    row = vocabulary().category(thing.node.category)
     top = float(thing.position[1] + thing.size[1])
-    if kind == "ceiling":
+    if row.support == "ceiling":
         return height - top <= HANGING
-    if kind == "wall" or thing.node.category in ("tv", "shelf"):
+    if row.support == "wall" or row.hangs:
         return floor is None or float(inside(floor, _footprint(thing))[0].min()) <= LEANING
     return False

@@ -24,20 +24,6 @@ KINDS: dict[str, tuple[str, Any, tuple[str, ...]]] = {
     "comparison": ("#4f8a4a", "dashed", ("bigger_than", "smaller_than", "taller_than", "shorter_than")),
     "likeness": ("#8a5aa8", "dotted", ("same_style_as", "same_super_category_as", "same_material_as")),
 }
-COLOURS = {
-    "bed": "#dbe7f5",
-    "bookshelf": "#ead9c8",
-    "cabinet": "#efe3d3",
-    "chair": "#e2efdc",
-    "desk": "#f3e9c9",
-    "lamp": "#fdf3bf",
-    "nightstand": "#eadcec",
-    "shelf": "#ead9c8",
-    "sofa": "#f6dcd7",
-    "table": "#f3e9c9",
-    "tv_stand": "#d9e2e6",
-    "wardrobe": "#e6d9ea",
-}
 LABELLED = 80  # arrows that still carry their words; more would cover each other
 
 
@@ -113,7 +99,7 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
 def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None:
     from matplotlib.patches import FancyBboxPatch
 
-    colour = COLOURS.get(vocabulary().category(node.category).coarse, "#eeeeee")
+    colour = vocabulary().category(node.category).colour
     across, up = (float(value) for value in place)
     corner = (across - WIDTH / 2, up - HEIGHT / 2)
     shape = FancyBboxPatch(
@@ -211,7 +197,7 @@ def to_dot(graph: SceneGraph) -> str:
 
     lines = [f"digraph {quoted(graph.room.type)} {{", '  node [shape=box, style="rounded,filled", fontname=Helvetica];']
     for node in graph.nodes:
-        colour = COLOURS.get(vocabulary().category(node.category).coarse, "#eeeeee")
+        colour = vocabulary().category(node.category).colour
         label = node.name if node.name == node.category else f"{node.name}\n{node.category}"
         lines.append(f"  {quoted(node.name)} [label={quoted(label)}, fillcolor={quoted(colour)}];")
     for arrow in arrows(graph):

@@ -1,11 +1,10 @@
 """After sampling, boxes are moved and sized as little as possible until the room keeps its graph without collisions."""
 
-from echousd.repair.belonging import WALL_FURNITURE, allowed_overlap
+from echousd.repair.belonging import allowed_overlap
 from echousd.repair.repair import Conflict, RepairedBoxes, RepairResult, repair, repair_boxes
 from echousd.repair.solver import RepairConfig
 
 __all__ = [
-    "WALL_FURNITURE",
     "Conflict",
     "RepairConfig",
     "RepairResult",

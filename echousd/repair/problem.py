@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair.belonging import CARRIERS, WALL_FURNITURE, support
 from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, pair_gaps, pair_indices
 
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
@@ -69,7 +68,7 @@ def pose(
 
     Returns: the problem, position (n, 3) and yaw (n,) to start from.
     """
-    words = tuple(canonical(word) for word in categories)
+    words = tuple(vocabulary().category(word).name for word in categories)
     floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
     n = len(words)
     carrier = carriers(words, size, position, yaw, triplets)
@@ -115,14 +114,6 @@ def axis_handicap(
     return out
 
 
-def canonical(word: str) -> str:
-    """The vocabulary's name for a word, or the word itself."""
-    try:
-        return vocabulary().category(word).name
-    except ValueError:
-        return word
-
-
 def required_order(n: int, triplets: np.ndarray) -> np.ndarray:
     """(n, n, 2) float: sign that left, right, front and behind ask of (second - first) in x and in z."""
     order = np.zeros((n, n, 2))
@@ -141,26 +132,26 @@ def carriers(
     Returns: (n,) int as `Problem.carrier`; never a cycle.
     """
     n = len(categories)
-    kinds = [support(word) for word in categories]
-    out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(kind, FREE) for kind in kinds], int)
+    rows = [vocabulary().category(word) for word in categories]
+    out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(row.support, FREE) for row in rows], int)
     told = triplets[triplets[:, 1] == vocabulary().predicate_id("standing_on")]
     for subject, _, target in told:
         if subject != target and not _reaches(out, int(target), int(subject)):
             out[subject] = target
     for i in range(n):
-        if kinds[i] != "table" or out[i] >= 0:
+        if rows[i].support != "table" or out[i] >= 0:
             continue
         offsets = position[i][[0, 2]] - position[:, [0, 2]]
         local = np.abs(np.einsum("nkd,nd->nk", axes(yaw), offsets)) - 0.5 * size[:, [0, 2]]
         distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.linalg.norm(offsets, axis=1)
         for k in range(n):
-            if k == i or categories[k] not in CARRIERS or _reaches(out, k, i):
+            if k == i or not rows[k].carries or _reaches(out, k, i):
                 distance[k] = np.inf
         best = int(distance.argmin())
         if distance[best] < CARRIER_REACH:
             out[i] = best
         else:
-            out[i] = FREE if position[i, 1] > 0.3 and categories[i] == "tv" else ON_FLOOR
+            out[i] = FREE if position[i, 1] > 0.3 and rows[i].hangs else ON_FLOOR
     return out
 
 
@@ -212,7 +203,8 @@ def lean(
     along = along / length[:, None]
     corner = corners(size, position, yaw)
     for i, word in enumerate(categories):
-        leaning = (word in WALL_FURNITURE and carrier[i] == ON_FLOOR) or support(word) == "wall"
+        row = vocabulary().category(word)
+        leaning = (row.wall and carrier[i] == ON_FLOOR) or row.support == "wall"
         if not leaning:
             continue
         facing = floor.normal @ front[i] > np.cos(WALL_TURN)

@@ -12,14 +12,12 @@ import numpy as np
 import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
-from echousd.room.looks import kind_of, look, palette_for
+from echomodel.vocabulary import vocabulary
+from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks
 from echousd.room.surface import Surface, surface
 
 LICENCE = "Apache-2.0"
-# Solids that may be wrapped in one hull; everything else has room below or inside that other things need.
-LAMPS = {"lamp_below", "table_lamp", "ceiling_lamp", "pendant_lamp", "wall_lamp"}
-CONVEX = frozenset({"cabinet", "plant", "tv", "ottoman", "stool"} | LAMPS)
 COLLIDER_FACES = 400
 
 
@@ -86,7 +84,7 @@ def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
 
 def approximation(category: str) -> str:
     """The UsdPhysics approximation of a category's collider, `convexHull` or `convexDecomposition`."""
-    return "convexHull" if kind_of(category) in CONVEX else "convexDecomposition"
+    return "convexHull" if vocabulary().category(category).solid else "convexDecomposition"
 
 
 def collider(mesh: trimesh.Trimesh, category: str) -> trimesh.Trimesh:

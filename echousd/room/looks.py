@@ -87,6 +87,7 @@ class Part:
     metres: bool = False
 
 
+# How the materials of one kind of furniture are laid out; a category's row in the vocabulary names its own.
 BANDS: Mapping[str, tuple[Part, ...]] = {
     "bed": (Part("wood", 0.24, True), Part("linen")),
     "sofa": (Part("wood", 0.09, True), Part("fabric")),
@@ -99,8 +100,9 @@ BANDS: Mapping[str, tuple[Part, ...]] = {
     "table": (Part("wood"),),
     "coffee_table": (Part("metal", 0.84), Part("wood")),
     "side_table": (Part("metal", 0.86), Part("wood")),
-    "cabinet": (Part("wood"),),
-    "lamp_below": (Part("metal", 0.74), Part("shade")),
+    "cabinet": (Part("wood"),),  # with doors and drawers in front
+    "shelf": (Part("wood"),),
+    "floor_lamp": (Part("metal", 0.74), Part("shade")),
     "table_lamp": (Part("ceramic", 0.48), Part("shade")),
     "ceiling_lamp": (Part("shade", 0.85), Part("metal")),
     "pendant_lamp": (Part("shade", 0.42), Part("metal")),
@@ -108,58 +110,30 @@ BANDS: Mapping[str, tuple[Part, ...]] = {
     "plant": (Part("ceramic", 0.27), Part("leaf")),
     "tv": (Part("screen"),),
 }
-KIND_OF_CATEGORY = {
-    "armchair": "sofa",
-    "lounge_chair": "sofa",
-    "ottoman": "ottoman",
-    "stool": "stool",
-    "dressing_chair": "chair",
-    "office_chair": "office_chair",
-    "bar_stool": "bar_stool",
-    "bench": "bench",
-    "coffee_table": "coffee_table",
-    "side_table": "side_table",
-    "corner_side_table": "side_table",
-    "round_end_table": "side_table",
-    "floor_lamp": "lamp_below",
-    "table_lamp": "table_lamp",
-    "ceiling_lamp": "ceiling_lamp",
-    "pendant_lamp": "pendant_lamp",
-    "wall_lamp": "wall_lamp",
-    "plant": "plant",
-    "tv": "tv",
-}
-KIND_OF_COARSE = {"bed": "bed", "sofa": "sofa", "chair": "chair", "table": "table", "desk": "table"}
 HEADBOARD = 0.09  # metres at the back of a bed that are wood to the top
 FOLD = 0.42  # share of a bed's length, from the foot, that the blanket covers
 FRONT = 0.012  # metres behind the foremost plane that count as the front of a cabinet
 
 
-def kind_of(category: str) -> str:
-    """The row of `BANDS` for a category of the vocabulary; raises `UnknownWord`."""
-    entry = vocabulary().category(category)
-    return KIND_OF_CATEGORY.get(entry.name) or KIND_OF_COARSE.get(entry.coarse, "cabinet")
-
-
 def material_groups(mesh: trimesh.Trimesh, category: str) -> tuple[trimesh.Trimesh, dict[str, np.ndarray]]:
     """Cut a mesh (object frame, metres) along the borders of its materials: (mesh, group -> (m,) face numbers)."""
-    kind = kind_of(category)
+    laid = vocabulary().category(category).look
     lower, upper = mesh.bounds
     height = upper[1] - lower[1]
-    bands = BANDS[kind]
+    bands = BANDS[laid]
     tops = [lower[1] + (min(p.top, 0.5 * height) if p.metres else p.top * height) for p in bands[:-1]]
     for top in tops:
         mesh = cut(mesh, 1, top)
-    if kind == "bed":
+    if laid == "bed":
         mesh = cut(mesh, 2, lower[2] + HEADBOARD)
         mesh = cut(mesh, 2, upper[2] - FOLD * (upper[2] - lower[2]))
     centre = np.asarray(mesh.triangles_center)
     number = np.searchsorted(np.array(tops), centre[:, 1])
     group = np.array([p.group for p in bands], dtype=object)[number]
-    if kind == "bed":
+    if laid == "bed":
         group[(group == "linen") & (centre[:, 2] > upper[2] - FOLD * (upper[2] - lower[2]))] = "blanket"
         group[centre[:, 2] < lower[2] + HEADBOARD] = "wood"
-    elif kind == "cabinet" and category not in ("bookshelf", "shelf"):
+    elif laid == "cabinet":
         normal = mesh.face_normals
         group[(normal[:, 2] > 0.8) & (centre[:, 2] > upper[2] - FRONT - 0.04 * (upper[2] - lower[2]))] = "front"
     return mesh, {str(name): np.flatnonzero(group == name) for name in sorted(set(group))}

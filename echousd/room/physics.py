@@ -9,31 +9,8 @@ import numpy as np
 from pxr import Gf, Usd, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
-from echousd.room.looks import kind_of
 
 GRAVITY = 9.81  # m/s²
-# Mass over the volume of the whole box, kg/m³: furniture is mostly hollow. A wardrobe of 1.6 x 2.2 x 0.6 m: 150 kg.
-BULK_DENSITY = {
-    "bed": 55.0,
-    "sofa": 50.0,
-    "chair": 28.0,
-    "stool": 60.0,
-    "office_chair": 30.0,
-    "ottoman": 70.0,
-    "bench": 60.0,
-    "bar_stool": 40.0,
-    "table": 35.0,
-    "coffee_table": 60.0,
-    "side_table": 60.0,
-    "cabinet": 70.0,
-    "lamp_below": 18.0,
-    "table_lamp": 60.0,
-    "ceiling_lamp": 25.0,
-    "pendant_lamp": 15.0,
-    "wall_lamp": 30.0,
-    "plant": 45.0,
-    "tv": 150.0,
-}
 
 
 @dataclass(frozen=True)
@@ -54,7 +31,7 @@ def movable(category: str) -> bool:
 
 def mass(category: str, size: tuple[float, float, float]) -> float:
     """Estimated mass in kilograms, at least 0.2."""
-    return round(max(0.2, float(np.prod(size)) * BULK_DENSITY[kind_of(category)]), 2)
+    return round(max(0.2, float(np.prod(size)) * vocabulary().category(category).density), 2)
 
 
 def write_physics(stage: Usd.Stage, bodies: Iterable[Body], static_meshes: Iterable[str]) -> None:

@@ -4,43 +4,9 @@ from __future__ import annotations
 
 from echomodel.vocabulary import vocabulary
 
-OF_CATEGORY = {
-    "armchair": "armchair",
-    "bench": "bench",
-    "ceiling_lamp": "light",
-    "coffee_table": "coffee table",
-    "dresser": "chest of drawers",
-    "nightstand": "chest of drawers",
-    "office_chair": "swivel chair",
-    "ottoman": "ottoman",
-    "pendant_lamp": "chandelier",
-    "plant": "plant",
-    "sideboard": "buffet",
-    "stool": "stool",
-    "bar_stool": "stool",
-    "tv": "television receiver",
-    "tv_stand": "cabinet",
-    "wall_lamp": "sconce",
-    "floor": "floor",
-    "wall": "wall",
-}
-OF_COARSE = {
-    "bed": "bed",
-    "bookshelf": "bookcase",
-    "cabinet": "cabinet",
-    "chair": "chair",
-    "desk": "desk",
-    "lamp": "lamp",
-    "shelf": "shelf",
-    "sofa": "sofa",
-    "table": "table",
-    "wardrobe": "wardrobe",
-}
+SHELL = {"floor": "floor", "wall": "wall"}
 
 
-def ade20k(category: str) -> str:
+def ade20k(word: str) -> str:
     """The ADE20K class of a category of the vocabulary, of `floor` or of `wall`; raises `UnknownWord`."""
-    if category in OF_CATEGORY:
-        return OF_CATEGORY[category]
-    entry = vocabulary().category(category)
-    return OF_CATEGORY.get(entry.name) or OF_COARSE[entry.coarse]
+    return SHELL[word] if word in SHELL else vocabulary().category(word).ade20k

@@ -9,16 +9,51 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
+from typing import Any
+
+SUPPORTS = ("floor", "table", "wall", "ceiling")
+ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
 
 
 @dataclass(frozen=True)
 class Category:
-    """A fine object category, its SG-FRONT classes, and what it rests on (`floor`, `table`, `wall` or `ceiling`)."""
+    """Everything that the product knows of a fine object category; code asks the row and lists no words of its own.
+
+    Arguments:
+        coarse, sgfront: its SG-FRONT classes, simple and fine.
+        support: what it rests on, one of `SUPPORTS`.
+        role: what people use it for, one of `ROLES`.
+        look: how its materials are laid out (`echousd.room.looks.BANDS`).
+        density: mass over the volume of the whole box, kg/m³ (furniture is mostly hollow).
+        ade20k: its name among the 150 classes of ADE20K.
+        colour: of its boxes in pictures of graphs, `#rrggbb`.
+        wall: it stands with its back to a wall (in at least four of five real rooms).
+        carries: a lamp, a television or a plant may stand on its top.
+        hangs: it may also hang on a wall.
+        solid: its collider may be one hull; everything else has room below or inside that other things need.
+        access: metres in front that must stay free, so that it can be opened or used.
+        belongs_to: categories that it attends, the likeliest first.
+        admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
+            thing's smaller horizontal side.
+        aliases: what people call it.
+    """
 
     name: str
     coarse: str
     sgfront: str
     support: str
+    role: str
+    look: str
+    density: float
+    ade20k: str
+    colour: str = "#eeeeee"
+    wall: bool = False
+    carries: bool = False
+    hangs: bool = False
+    solid: bool = False
+    access: float = 0.0
+    belongs_to: tuple[str, ...] = ()
+    admits: tuple[tuple[str, float], ...] = ()
     aliases: tuple[str, ...] = ()
 
 
@@ -77,6 +112,8 @@ class Vocabulary:
             index = {word: i for i, entry in enumerate(entries) for word in entry.aliases}
             index.update({entry.name: i for i, entry in enumerate(entries)})
             self._index[kind] = index
+        for row in self.categories:
+            self._check(row)
 
     def category(self, word: str) -> Category:
         """The category called `word` (name or alias, any case, spaces or hyphens); raises `UnknownWord`."""
@@ -101,6 +138,20 @@ class Vocabulary:
     def room_type_id(self, word: str) -> int:
         """Position of a room type."""
         return self._find("room type", word)
+
+    def _check(self, row: Category) -> None:
+        """Raise ValueError where a row names something that does not exist."""
+        names = {entry.name for entry in self.categories}
+        for what, words, allowed in (
+            ("coarse", (row.coarse,), set(self.coarse_categories)),
+            ("support", (row.support,), set(SUPPORTS)),
+            ("role", (row.role,), set(ROLES)),
+            ("belongs_to", row.belongs_to, names),
+            ("admits", tuple(word for word, _ in row.admits), names | set(ROLES)),
+        ):
+            for word in words:
+                if word not in allowed:
+                    raise ValueError(f"category {row.name}: {what} is {word!r}, allowed: {', '.join(sorted(allowed))}")
 
     def _find(self, kind: str, word: str) -> int:
         index = self._index[kind]
@@ -147,8 +198,11 @@ def vocabulary() -> Vocabulary:
     """The vocabulary that ships with the package."""
     raw = json.loads(resources.files("echomodel").joinpath("vocabulary.json").read_text("utf-8"))
 
+    def fixed(value: Any) -> Any:
+        return tuple(fixed(v) for v in value) if isinstance(value, list) else value
+
     def frozen(entry: dict) -> dict:
-        return {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
+        return {key: fixed(value) for key, value in entry.items()}
 
     return Vocabulary(
         categories=tuple(Category(**frozen(entry)) for entry in raw["categories"]),

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import itertools
+import re
+from dataclasses import replace
 
 import pytest
 
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
+from echomodel.vocabulary import ROLES, UnknownWord, normalised, vocabulary
 
 WORDS = vocabulary()
 
@@ -65,6 +67,38 @@ def test_every_category_has_a_coarse_class_and_a_nearest_sgfront_class():
     # "no stool" mapping of the published results: stools count as chairs
     assert fine["stool"].coarse == "chair"
     assert set(SGFRONT_COARSE) == {category.coarse for category in WORDS.categories} | {"_scene_", "floor"}
+
+
+def test_rows_say_what_a_category_is_for():
+    roles = {role: {entry.name for entry in WORDS.categories if entry.role == role} for role in ROLES}
+    assert roles["bed"] == {"double_bed", "kids_bed", "single_bed"}
+    assert roles["light"] == {"ceiling_lamp", "floor_lamp", "pendant_lamp", "table_lamp", "wall_lamp"}
+    assert {"desk", "dining_table", "coffee_table"} <= roles["board"]
+    assert {"chair", "stool", "armchair"} <= roles["seat"]
+    assert "sofa" not in roles["seat"]
+    assert WORDS.category("dining_chair").belongs_to[0] == "dining_table"
+    assert WORDS.category("wardrobe").wall
+    assert WORDS.category("wardrobe").access > 0.5
+    for entry in WORDS.categories:
+        assert 5 < entry.density < 200
+        assert entry.access >= 0
+        assert entry.support == "floor" or not entry.wall
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"role": "throne"}, "category stool: role is 'throne', allowed: bed, board, decor, light, screen, seat"),
+        ({"support": "air"}, "category stool: support is 'air', allowed: ceiling, floor, table, wall"),
+        ({"coarse": "thing"}, "category stool: coarse is 'thing', allowed: _scene_, bed"),
+        ({"belongs_to": ("tabel",)}, "category stool: belongs_to is 'tabel', allowed: armchair, bar_stool"),
+        ({"admits": (("seats", 0.5),)}, "category stool: admits is 'seats', allowed: armchair, bar_stool"),
+    ],
+)
+def test_a_row_that_names_nothing_is_refused(change, text):
+    rows = tuple(replace(row, **change) if row.name == "stool" else row for row in WORDS.categories)
+    with pytest.raises(ValueError, match=re.escape(text)):
+        replace(WORDS, categories=rows)
 
 
 def test_inverses_come_in_pairs_and_agree_with_the_orders():

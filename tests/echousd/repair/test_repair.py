@@ -8,9 +8,9 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.rules import margins, verdicts
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.repair import RepairConfig, repair, repair_boxes
+from echousd.repair import RepairConfig, allowed_overlap, repair, repair_boxes
 from echousd.repair.geometry import floor_from_polygon, inside, separation
 from echousd.repair.relations import relation_margins
 
@@ -250,3 +250,21 @@ def test_fixed_boxes_without_relations_stay_where_they_are() -> None:
         found = repair(graph, fixed)
         assert torch.equal(found.boxes.position, fixed.position)
         assert torch.equal(found.boxes.size, fixed.size)
+
+
+def test_a_category_that_the_vocabulary_does_not_hold_is_refused():
+    """Formerly it silently stood on the floor like a cabinet."""
+    with pytest.raises(UnknownWord, match="unknown category 'wardrob': did you mean wardrobe"):
+        repair_boxes(["wardrob"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3), int))
+
+
+def test_who_may_reach_into_whom():
+    pairs, size = np.array([[0, 1], [1, 0]]), np.array([[0.4, 0.9, 0.5], [1.6, 0.75, 0.9]])
+    for words, share in (
+        (("dining_chair", "dining_table"), 0.65),
+        (("dining_chair", "coffee_table"), 0.0),
+        (("nightstand", "double_bed"), 0.1),
+        (("wardrobe", "double_bed"), 0.0),
+        (("ottoman", "l_shaped_sofa"), 0.5),
+    ):
+        assert allowed_overlap(words, size, pairs) == pytest.approx(share * 0.4)
