@@ -83,7 +83,8 @@ def _model_sampler(
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.echo import EchoModel, GraphEdit
+    from echomodel.echo import EchoModel
+    from echomodel.protocols import GraphEdit
 
     model = EchoModel.load(weights)
     generator = torch.Generator().manual_seed(seed)

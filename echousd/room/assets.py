@@ -7,18 +7,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import fast_simplification
 import numpy as np
-import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
-from echomodel.vocabulary import vocabulary
+from echousd.room.geometry import Geometry
 from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks
+from echousd.room.paths import payload_name, piece_name
 from echousd.room.surface import Surface, surface
-
-LICENCE = "Apache-2.0"
-COLLIDER_FACES = 400
 
 
 def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
@@ -82,39 +78,41 @@ def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
     return mesh
 
 
-def approximation(category: str) -> str:
-    """The UsdPhysics approximation of a category's collider, `convexHull` or `convexDecomposition`."""
-    return "convexHull" if vocabulary().category(category).solid else "convexDecomposition"
+def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any]) -> Sdf.Layer:
+    """`<name>_geo`: a mesh for every part and, as guides, the colliders.
 
-
-def collider(mesh: trimesh.Trimesh, category: str) -> trimesh.Trimesh:
-    """A light mesh for collisions: a hull where the approximation is one, else the shape with few faces."""
-    if approximation(category) == "convexHull":
-        return _reduced(mesh.convex_hull, 120).convex_hull
-    return _reduced(mesh, COLLIDER_FACES)
-
-
-def geometry_layer(name: str, form: Surface, collision: trimesh.Trimesh, data: Mapping[str, Any]) -> Sdf.Layer:
-    """`<name>_geo`: the mesh `<name>_mesh` and, as a guide, `<name>_collider`."""
+    Arguments:
+        name: of the asset.
+        forms: name of a part -> its surface.
+        geometry: whose parts these are, and whose colliders are written.
+        data: customLayerData.
+    """
     stage = new_stage(name, ".usdc", data)
     UsdGeom.Xform.Define(stage, f"/{name}")
-    write_mesh(stage, f"/{name}/{name}_mesh", form)
-    path = f"/{name}/{name}_collider"
-    every = np.arange(len(collision.faces))
-    guide = write_mesh(stage, path, surface(collision, {"collider": every}))
-    guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    for part, form in forms.items():
+        write_mesh(stage, f"/{name}/{piece_name(name, part)}", form)
+    for collider in geometry.colliders:
+        every = np.arange(len(collider.mesh.faces))
+        form = surface(collider.mesh, {"collider": every})
+        guide = write_mesh(stage, f"/{name}/{piece_name(name, collider.name)}", form)
+        guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
     return stage.GetRootLayer()
 
 
 def component_layer(
-    name: str, category: str, style: str, extent: np.ndarray, groups: Sequence[str], data: Mapping[str, Any]
+    name: str,
+    category: str,
+    style: str,
+    extent: np.ndarray,
+    slots: Mapping[str, Sequence[str]],
+    data: Mapping[str, Any],
 ) -> Sdf.Layer:
     """`<name>.usda`: kind, extentsHint, asset info, looks of its own and the payload `./<name>_geo.usdc`.
 
     Arguments:
         name, category, style: words; the style chooses the looks, which a room's materials layer overrides.
         extent: (2, 3) float, metres.
-        groups: material groups of the mesh.
+        slots: name of a part -> its material slots.
         data: customLayerData.
     """
     stage = new_stage(name, ".usda", data)
@@ -125,25 +123,26 @@ def component_layer(
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
-    mesh, palette = f"/{name}/{name}_mesh", palette_for(style)
-    bindings = {f"{mesh}/{group}" if len(groups) > 1 else mesh: group for group in groups}
-    write_looks(stage, {group: look(palette, group) for group in groups}, bindings, f"/{name}/Looks")
+    palette, bindings = palette_for(style), slot_paths(f"/{name}", name, slots)
+    write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
     return without_stage(stage, lambda layer: _add_payload(layer, name))
 
 
-def _add_payload(layer: Sdf.Layer, name: str) -> None:
-    payload = Sdf.Payload(f"./{name}_geo.usdc", Sdf.Path(f"/{name}"))
-    layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)
+def slot_paths(root: str, asset: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Prim path -> material slot: the part's mesh where it has one slot, a subset of it for each of several.
 
-
-def _reduced(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
-    """The mesh with at most about `faces` triangles, used vertices only."""
-    if len(mesh.faces) > faces:
-        points, triangles = fast_simplification.simplify(
-            np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), target_count=faces, agg=5
-        )
-        mesh = trimesh.Trimesh(points, triangles, process=True)
-    out = mesh.copy()
-    out.update_faces(out.nondegenerate_faces())
-    out.remove_unreferenced_vertices()
+    Arguments:
+        root: path of the asset's root prim, or of an object that references it.
+        asset: its name.
+        slots: name of a part -> its material slots.
+    """
+    out: dict[str, str] = {}
+    for part, names in slots.items():
+        mesh = f"{root}/{piece_name(asset, part)}"
+        out |= {f"{mesh}/{slot}" if len(names) > 1 else mesh: slot for slot in names}
     return out
+
+
+def _add_payload(layer: Sdf.Layer, name: str) -> None:
+    payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
+    layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,27 +11,25 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echousd.room import assets, cameras, looks, materials, physics, shell
+from echousd.room.geometry import LICENCE
+from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name, shell_mesh
 from echousd.room.room import Room
-from echousd.room.styles import ROOM_STYLE, style_groups
+from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 
 LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest first
-OBJECTS = "/Room/Objects"
-SHELL = "/Room/Shell"
 
 
 @dataclass(frozen=True)
 class Asset:
-    """One piece of furniture, ready to be written."""
+    """One piece of furniture, ready to be written: part -> its material slots, and the files."""
 
     name: str
-    category: str
-    groups: tuple[str, ...]
+    slots: Mapping[str, Sequence[str]]
     files: Mapping[str, bytes]
-    approximation: str
 
 
 def room_files(room: Room) -> dict[str, bytes]:
@@ -48,7 +46,7 @@ def room_files(room: Room) -> dict[str, bytes]:
         "geometry": geometry_layer(room, shell_surfaces),
         "graph": graph_layer(room),
         "layout": layout_layer(room),
-        "physics": physics_layer(room, made, shell_surfaces),
+        "physics": physics_layer(room, shell_surfaces),
         "materials": materials_layer(room, made, shell_surfaces),
     }
     for name, layer in layers.items():
@@ -64,7 +62,7 @@ def layer_data(room: Room, name: str) -> dict[str, Any]:
         "generator": f"echousd {echousd.__version__}",
         "seed": room.provenance.seed,
         "model": room.provenance.model,
-        "asset_license": assets.LICENCE,
+        "asset_license": LICENCE,
     }
 
 
@@ -85,7 +83,7 @@ def geometry_layer(room: Room, shell_surfaces: Mapping[str, tuple[str, Surface]]
         UsdGeom.ModelAPI.Apply(part).SetExtentsHint([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
         _label(part, "category", kind)
         _label(part, "ade20k", ade20k(kind))
-        assets.write_mesh(stage, f"{SHELL}/{name}/{name}_mesh", form)
+        assets.write_mesh(stage, shell_mesh(name), form)
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
 
 
@@ -125,7 +123,7 @@ def place_layouts(stage: Usd.Stage, room: Room) -> None:
     variants.SetVariantSelection("layout_0")
 
 
-def physics_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
+def physics_layer(room: Room, shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
     """`layers/physics.usda`."""
     stage = _room_stage(room, "physics")
     stage.OverridePrim("/Room")
@@ -134,10 +132,9 @@ def physics_layer(room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping
         asset = room.assets[node.name]
         x, y, z = (float(v) for v in room.boxes.size[number])
         path = f"{OBJECTS}/{node.name}"
-        bodies.append(
-            physics.Body(path, f"{path}/{asset}_collider", made[asset].approximation, node.category, (x, y, z))
-        )
-    static = [f"{SHELL}/{name}/{name}_mesh" for name in shell_surfaces]
+        colliders = {f"{path}/{piece_name(asset, c.name)}": c.approximation for c in room.geometry[node.name].colliders}
+        bodies.append(physics.Body(path, colliders, node.category, (x, y, z)))
+    static = [shell_mesh(name) for name in shell_surfaces]
     physics.write_physics(stage, bodies, static)
     physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
@@ -149,26 +146,22 @@ def materials_layer(
     """`layers/materials.usda`."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")
-    styles = style_groups(room.graph)
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}
 
-    def bind(path: str, groups: tuple[str, ...], style: str) -> None:
+    for node in room.graph.nodes:
+        asset, style = room.assets[node.name], room.styles[node.name]
         slug = "".join(c if c.isalnum() else "_" for c in style)
         palette = looks.palette_for(f"{style} {room.provenance.seed}")
-        for group in groups:
-            name = f"{slug}_{group}" if slug[0].isalpha() else f"style_{slug}_{group}"
-            table[name] = looks.look(palette, group)
-            bindings[f"{path}/{group}" if len(groups) > 1 else path] = name
-
-    for node in room.graph.nodes:
-        asset = room.assets[node.name]
-        bind(f"{OBJECTS}/{node.name}/{asset}_mesh", made[asset].groups, styles[node.name])
+        for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", asset, made[asset].slots).items():
+            name = f"{slug}_{slot}" if slug[0].isalpha() else f"style_{slug}_{slot}"
+            table[name] = looks.look(palette, slot)
+            bindings[path] = name
     boards = looks.floor_color(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"))
     table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
     table["wall"] = looks.Look(looks.linear("ece8e1"), 0.9)
     for name, (kind, _) in shell_surfaces.items():
-        bindings[f"{SHELL}/{name}/{name}_mesh"] = kind
+        bindings[shell_mesh(name)] = kind
     materials.write_looks(stage, table, bindings)
     return stage.GetRootLayer()
 
@@ -224,23 +217,24 @@ def _add_sublayers(layer: Sdf.Layer) -> None:
 
 
 def _asset(room: Room, name: str, user: str) -> Asset:
-    category = room.graph.node(user).category
+    geometry, category = room.geometry[user], room.graph.node(user).category
     if name in room.carried:
-        carried = room.carried[name]
-        return Asset(name, category, carried.groups, carried.files, assets.approximation(category))
-    mesh, groups = looks.material_groups(room.meshes[user], category)
-    form = surface(mesh, groups, atlas=room.options.atlas)
-    collision = assets.collider(room.meshes[user], category)
+        return Asset(name, {part.name: tuple(part.slots) for part in geometry.parts}, room.carried[name])
+    forms = {part.name: surface(part.mesh, part.slots, atlas=room.options.atlas) for part in geometry.parts}
+    slots = {part: tuple(form.groups) for part, form in forms.items()}
+    extents = np.stack([form.extent for form in forms.values()])
+    extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
     data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
-    folder = f"assets/{name}/{name}"
-    geometry = assets.geometry_layer(name, form, collision, data)
-    style = style_groups(room.graph)[user]
-    component = assets.component_layer(name, category, style, form.extent, tuple(form.groups), data)
+    data["asset_license"] = geometry.origin.licence
+    if geometry.origin.credit:
+        data["asset_credit"] = geometry.origin.credit
+    payload = assets.geometry_layer(name, forms, geometry, data)
+    component = assets.component_layer(name, category, room.styles[user], extent, slots, data)
     files = {
-        f"{folder}_geo.usdc": assets.layer_bytes(geometry, ".usdc"),
-        f"{folder}.usda": assets.layer_bytes(component, ".usda"),
+        payload_file(name): assets.layer_bytes(payload, ".usdc"),
+        component_file(name): assets.layer_bytes(component, ".usda"),
     }
-    return Asset(name, category, tuple(form.groups), files, assets.approximation(category))
+    return Asset(name, slots, files)
 
 
 def _shell(room: Room) -> dict[str, tuple[str, Surface]]:

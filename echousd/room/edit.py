@@ -11,14 +11,19 @@ import torch
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
-from echousd.room import pipeline
+from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.models import load_model
+from echousd.room.progress import Listener, StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, Room, RoomOptions
-from echousd.room.styles import free_name
+from echousd.room.sources import DEFAULT, shape_source
+from echousd.room.sources.source import FACES, ShapeRequest
+from echousd.room.styles import asset_names, free_name, style_groups
+from echousd.room.tensors import graph_batch
+from echousd.room.verdicts import relation_verdicts
 
 if TYPE_CHECKING:
-    from echomodel.echo import GraphEdit
-    from echousd.room.pipeline import Echo
+    from echomodel.protocols import GraphEdit, RoomModel
 
 
 def edit(
@@ -26,11 +31,12 @@ def edit(
     graph: SceneGraph,
     *,
     seed: int = 0,
-    shapes: str = "generate",
-    model: Echo | str | Path | None = None,
+    shapes: str = DEFAULT,
+    model: RoomModel | str | Path | None = None,
     repair: bool = True,
     steps: int | None = None,
-    progress: pipeline.Progress | None = None,
+    faces: int = FACES,
+    progress: Listener | None = None,
 ) -> Room:
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -41,62 +47,63 @@ def edit(
         root: root layer of a room that `generate` made.
         graph: what its graph (`read_room(root).graph`) shall become.
         seed: of the new randomness.
-        shapes, model, repair, steps, progress: as for `generate`.
+        shapes, model, repair, steps, faces, progress: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room.
     """
-    if shapes not in pipeline.SHAPES:
-        raise ValueError(f"shapes is {shapes!r}, allowed: {', '.join(pipeline.SHAPES)}")
-    watch = pipeline.Watch(progress)
-    with watch.stage("read"):
+    source, timer = shape_source(shapes), StageTimer(progress)
+    with timer.stage("read"):
         saved = read_room(root)
     fresh, moving = touched(saved.graph, graph)
-    echo, grids = None, None
+    styles = style_groups(graph)
+    model_used: RoomModel | None = None
+    change: GraphEdit | None = None
     layouts: list[Boxes] = []
     notes: tuple[str, ...] = ()
     if fresh or moving:
-        with watch.stage("load"):
-            echo = pipeline.load_model(model)
-            _compare(saved.manifest, echo, given=model is not None, root=Path(root))
+        with timer.stage("load"):
+            model_used = load_model(model)
+            _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
+        if fresh:
+            source.check(model_used)
         change = graph_edit(saved.graph, graph)
     for number, before in enumerate(saved.layouts):
         pinned = _pinned(graph, saved.graph, before, fresh, moving)
         if layouts:  # one furniture in all layouts
-            pinned = pipeline.with_sizes(pinned, layouts[0])
-        if echo is None:
+            pinned = with_sizes(pinned, layouts[0])
+        if model_used is None:
             layouts.append(_boxes_of(pinned))
             continue
-        found = pipeline.sample_boxes(echo, pinned, seed=seed, number=number, steps=steps, change=change, watch=watch)
-        found, told = pipeline.settled(pinned, found, repair, watch)
+        found = sample_boxes(model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer)
+        found, told = finished_boxes(pinned, found, styles, repair, timer)
         layouts.append(found)
         notes = told if number == 0 else notes
-    boxes = layouts[0]
-    if fresh and shapes == "generate" and echo is not None:
-        grids = pipeline.sample_shapes(echo, graph, boxes, seed=seed, steps=steps, change=change, watch=watch)
-    made = _without(graph, set(graph.names) - fresh)
-    rows = torch.tensor([i for i, name in enumerate(graph.names) if name in fresh], dtype=torch.long)
-    meshes, assets = dict(saved.meshes), dict(saved.assets)
-    if made is not None:
-        part = None if grids is None else grids[rows.numpy()]
-        new_meshes, new_assets = pipeline.make_meshes(made, boxes[rows], part, watch=watch)
-        meshes.update(new_meshes)
-        assets.update(new_assets)
+    geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
+    assets = {name: saved.assets[name] for name in geometry}
+    if fresh:
+        wanted = tuple(name for name in graph.names if name in fresh)
+        request = ShapeRequest(
+            graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer
+        )
+        made = source.shapes(request)
+        geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
+        assets |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     assets = _own_names({name: assets[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
     return Room(
         name=manifest["name"],
         graph=graph,
-        boxes=boxes,
-        meshes={name: meshes[name] for name in graph.names},
+        boxes=layouts[0],
+        geometry={name: geometry[name] for name in graph.names},
         assets=assets,
-        floor=pipeline.room_floor(graph, layouts),
-        verdicts=pipeline.judge(graph, boxes),
+        floor=room_floor(graph, layouts),
+        verdicts=relation_verdicts(graph, layouts[0]),
         layouts=tuple(layouts),
         notes=notes,
-        provenance=_provenance(manifest, echo),
+        provenance=_provenance(manifest, model_used),
         options=RoomOptions(manifest["up_axis"], manifest.get("walls", False), manifest.get("atlas", False)),
-        timings=watch.seconds,
+        timings=timer.seconds,
         carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},
     )
 
@@ -119,13 +126,13 @@ def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
 
     An object of another category counts as new.
     """
-    from echomodel.echo import GraphEdit
+    from echomodel.protocols import GraphEdit
 
     old = {node.name: node.category for node in before.nodes}
     added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)
     stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}
     relations = tuple(r for r in before.relations if r.subject in stay and r.object in stay)
-    return GraphEdit(pipeline.graph_batch(after.replaced(relations=relations)).triplets, added)
+    return GraphEdit(graph_batch(after.replaced(relations=relations)).triplets, added)
 
 
 def _pinned(
@@ -157,15 +164,6 @@ def _boxes_of(graph: SceneGraph) -> Boxes:
     )
 
 
-def _without(graph: SceneGraph, names: set[str]) -> SceneGraph | None:
-    """The graph without some objects and their relations; None if nothing is left."""
-    nodes = tuple(node for node in graph.nodes if node.name not in names)
-    if not nodes:
-        return None
-    relations = tuple(r for r in graph.relations if r.subject not in names and r.object not in names)
-    return graph.replaced(nodes=nodes, relations=relations)
-
-
 def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> dict[str, str]:
     """A new asset whose name an asset that stays has already gets another name."""
     kept = {asset for name, asset in assets.items() if name not in fresh}
@@ -177,10 +175,10 @@ def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> 
     return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
 
 
-def _compare(manifest: Mapping[str, Any], echo: Echo, *, given: bool, root: Path) -> None:
+def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, given: bool, root: Path) -> None:
     """Refuse the weights that ship where the room needs others; warn where the room was made with other weights."""
     preset, made_with = manifest["preset"], manifest["model"]
-    if not given and preset != pipeline.preset_of(echo):
+    if not given and preset != echo.preset:
         raise ValueError(
             f"{root}: made with weights of the preset {preset!r} (hash {made_with or 'unknown'}), which do not ship; "
             "name their file (--weights FILE)"
@@ -193,8 +191,8 @@ def _compare(manifest: Mapping[str, Any], echo: Echo, *, given: bool, root: Path
         )
 
 
-def _provenance(manifest: Mapping[str, Any], echo: Echo | None) -> Provenance:
+def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None) -> Provenance:
     preset, model = manifest["preset"], manifest["model"]
     if echo is not None:
-        preset, model = pipeline.preset_of(echo), echo.hash or model
+        preset, model = echo.preset, echo.hash or model
     return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])

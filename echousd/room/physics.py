@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +15,10 @@ GRAVITY = 9.81  # m/s²
 
 @dataclass(frozen=True)
 class Body:
-    """One object for the physics layer: its root, its collider, and what is known about it (size in metres)."""
+    """One object for the physics layer: its root, path -> approximation of its colliders, category, size in metres."""
 
     root: str
-    collider: str
-    approximation: str
+    colliders: Mapping[str, str]
     category: str
     size: tuple[float, float, float]
 
@@ -45,9 +44,10 @@ def write_physics(stage: Usd.Stage, bodies: Iterable[Body], static_meshes: Itera
     scene = UsdPhysics.Scene.Define(stage, "/Room/PhysicsScene")
     scene.CreateGravityMagnitudeAttr(GRAVITY)
     for body in bodies:
-        guide = stage.OverridePrim(body.collider)
-        UsdPhysics.CollisionAPI.Apply(guide)
-        UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(body.approximation)
+        for path, approximation in body.colliders.items():
+            guide = stage.OverridePrim(path)
+            UsdPhysics.CollisionAPI.Apply(guide)
+            UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(approximation)
         if movable(body.category):
             root = stage.OverridePrim(body.root)
             UsdPhysics.RigidBodyAPI.Apply(root)

@@ -14,18 +14,11 @@ from pxr import Usd, UsdGeom
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
+from echousd.room.colliders import approximation
 from echousd.room.folder import find_manifest, recover
+from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
+from echousd.room.paths import OBJECTS, component_file, payload_file, piece_of
 from echousd.stage import open_stage, read_graph
-
-OBJECTS = "/Room/Objects"
-
-
-@dataclass(frozen=True, eq=False)
-class CarriedAsset:
-    """An asset that is used again as it lies on disk: its files (path -> bytes) and its material groups."""
-
-    files: Mapping[str, bytes]
-    groups: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,18 +29,18 @@ class SavedRoom:
         graph: the composed stage's graph, an artist's changes included.
         boxes: N boxes in the order of the graph's nodes, as composed.
         layouts: all arrangements of the variant set `layout`, in its order, or `boxes` alone.
-        meshes: object name -> mesh in its own frame, metres.
+        geometry: object name -> geometry; objects of one asset have one.
         assets: object name -> asset name.
-        carried: asset name -> its files.
+        carried: asset name -> its files as they are, path -> bytes.
         manifest: as `save` wrote it.
     """
 
     graph: SceneGraph
     boxes: Boxes
     layouts: tuple[Boxes, ...]
-    meshes: Mapping[str, trimesh.Trimesh]
+    geometry: Mapping[str, Geometry]
     assets: Mapping[str, str]
-    carried: Mapping[str, CarriedAsset]
+    carried: Mapping[str, Mapping[str, bytes]]
     manifest: Mapping[str, Any]
 
 
@@ -63,28 +56,27 @@ def read_room(root: str | Path) -> SavedRoom:
     if manifest is None:
         raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
     graph = read_graph(stage)
-    size = []
-    meshes: dict[str, trimesh.Trimesh] = {}
-    carried: dict[str, CarriedAsset] = {}
+    geometry: dict[str, Geometry] = {}
+    carried: dict[str, Mapping[str, bytes]] = {}
     assets: dict[str, str] = {}
+    made: dict[str, Geometry] = {}
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
-        mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"{OBJECTS}/{node.name}/{asset}_mesh"))
-        if asset is None or not mesh:
+        found = made.get(asset) or _geometry(
+            stage.GetPrimAtPath(f"{OBJECTS}/{node.name}"), asset, node.category, manifest
+        )
+        if asset is None or found is None:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
-        assets[node.name] = asset
-        if asset not in carried:
-            carried[asset] = _carry(root.parent, asset, mesh)
-            points = np.asarray(mesh.GetPointsAttr().Get(), float)
-            faces = np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
-            meshes[node.name] = trimesh.Trimesh(points, faces, process=False)
-        else:
-            meshes[node.name] = next(meshes[n] for n, a in assets.items() if a == asset)
-        low, high = meshes[node.name].bounds
-        size.append(high - low)
-    sizes = torch.tensor(np.array(size), dtype=torch.float32)
+        if asset not in made:
+            made[asset] = found
+            carried[asset] = {
+                path: (root.parent / path).read_bytes() for path in (payload_file(asset), component_file(asset))
+            }
+        assets[node.name], geometry[node.name] = asset, found
+    bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
+    sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)
     boxes = _boxes(stage, graph, sizes)
-    return SavedRoom(graph, boxes, _layouts(stage, graph, sizes) or (boxes,), meshes, assets, carried, manifest)
+    return SavedRoom(graph, boxes, _layouts(stage, graph, sizes) or (boxes,), geometry, assets, carried, manifest)
 
 
 def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
@@ -111,11 +103,36 @@ def _layouts(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> tuple[B
     return tuple(found)
 
 
-def _carry(folder: Path, asset: str, mesh: UsdGeom.Mesh) -> CarriedAsset:
-    paths = [f"assets/{asset}/{asset}{end}" for end in ("_geo.usdc", ".usda")]
-    files = {path: (folder / path).read_bytes() for path in paths}
-    groups = [child.GetName() for child in mesh.GetPrim().GetChildren() if child.IsA(UsdGeom.Subset)]
-    if not groups:  # one group is bound on the mesh itself, under the name of its only look
-        bound = mesh.GetPrim().GetRelationship("material:binding").GetTargets()
-        groups = [bound[0].name.rsplit("_", 1)[-1]] if bound else ["wood"]
-    return CarriedAsset(files, tuple(groups))
+def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:
+    """Parts and colliders below an object's root; None where there is no mesh of ours."""
+    parts, colliders = [], []
+    for prim in root.GetChildren() if root and asset else ():
+        name = piece_of(asset or "", prim.GetName())
+        if name is None or not prim.IsA(UsdGeom.Mesh):
+            continue
+        form, mesh = _mesh(UsdGeom.Mesh(prim)), UsdGeom.Mesh(prim)
+        if mesh.GetPurposeAttr().Get() == UsdGeom.Tokens.guide:
+            kind = prim.GetAttribute("physics:approximation").Get() or approximation(category)
+            colliders.append(Collider(name, form, kind))
+        else:
+            parts.append(Part(name, form, _slots(mesh, len(form.faces))))
+    if not parts or not colliders:
+        return None
+    told = manifest.get("meshes", {}).get(asset, {})
+    origin = Origin(told.get("source", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
+    return Geometry(tuple(parts), tuple(colliders), origin)
+
+
+def _mesh(mesh: UsdGeom.Mesh) -> trimesh.Trimesh:
+    points = np.asarray(mesh.GetPointsAttr().Get(), float)
+    return trimesh.Trimesh(points, np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), process=False)
+
+
+def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
+    """Material slot -> faces of a mesh that we wrote."""
+    subsets = [UsdGeom.Subset(child) for child in mesh.GetPrim().GetChildren() if child.IsA(UsdGeom.Subset)]
+    if subsets:
+        return {subset.GetPrim().GetName(): np.asarray(subset.GetIndicesAttr().Get()) for subset in subsets}
+    # one slot is bound on the mesh itself, under the name of its only look
+    bound = mesh.GetPrim().GetRelationship("material:binding").GetTargets()
+    return {bound[0].name.rsplit("_", 1)[-1] if bound else "wood": np.arange(faces)}

@@ -6,18 +6,21 @@ import tempfile
 import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import trimesh
 
+from echousd.room.styles import style_groups
+
 if TYPE_CHECKING:
     from pxr import Usd
 
     from echomodel.boxes import Boxes
     from echousd.graph import SceneGraph
-    from echousd.room.reading import CarriedAsset
+    from echousd.room.geometry import Geometry
 
 
 @dataclass(frozen=True)
@@ -75,20 +78,20 @@ class Room:
         name: valid identifier; file and default prim's asset name.
         graph: the graph that was asked for.
         boxes: N boxes in the order of `graph.nodes`.
-        meshes: object name -> mesh in the object's frame, metres, filling its box.
-        assets: object name -> name of the asset that it references; objects with one asset have one mesh.
+        geometry: object name -> parts and colliders in the object's frame, metres, filling its box.
+        assets: object name -> name of the asset that it references; objects with one asset have one geometry.
         floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
         verdicts: one per relation of the graph.
         layouts: all arrangements of the same furniture; the first is `boxes`.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
-        carried: assets that are written again byte for byte, see `echousd.room.reading`.
+        carried: asset name -> its files (path -> bytes), which are written again as they are.
     """
 
     name: str
     graph: SceneGraph
     boxes: Boxes
-    meshes: Mapping[str, trimesh.Trimesh]
+    geometry: Mapping[str, Geometry]
     assets: Mapping[str, str]
     floor: np.ndarray
     verdicts: tuple[Verdict, ...] = ()
@@ -97,12 +100,22 @@ class Room:
     provenance: Provenance = Provenance()
     options: RoomOptions = RoomOptions()
     timings: Mapping[str, float] = field(default_factory=dict)
-    carried: Mapping[str, CarriedAsset] = field(default_factory=dict)
+    carried: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the objects, in the order of the boxes."""
         return tuple(node.name for node in self.graph.nodes)
+
+    @property
+    def meshes(self) -> dict[str, trimesh.Trimesh]:
+        """Object name -> all its parts as one mesh in the object's frame, metres, filling its box."""
+        return {name: geometry.mesh for name, geometry in self.geometry.items()}
+
+    @cached_property
+    def styles(self) -> dict[str, str]:
+        """Object name -> its style, see `echousd.room.styles.style_groups`."""
+        return style_groups(self.graph)
 
     @property
     def asset_users(self) -> dict[str, str]:
@@ -134,7 +147,7 @@ class Room:
         for number, name in enumerate(self.names):
             asset, pose = self.assets[name], self.pose(number)
             if asset not in scene.geometry:
-                scene.geometry[asset] = self.meshes[name]
+                scene.geometry[asset] = self.geometry[name].mesh
             scene.graph.update(frame_to=name, matrix=pose, geometry=asset)
         return scene
 

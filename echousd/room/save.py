@@ -16,6 +16,7 @@ import echousd
 from echousd.room import folder as folders
 from echousd.room.assets import layer_bytes
 from echousd.room.compose import LAYERS, room_files
+from echousd.room.geometry import Geometry
 from echousd.room.room import Room
 
 
@@ -136,12 +137,16 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
         "graph": json.loads(room.graph.to_json()),
         "assets": dict(room.assets),
-        "meshes": {
-            asset: {"faces": len(room.meshes[user].faces), "watertight": bool(room.meshes[user].is_watertight)}
-            for asset, user in sorted(room.asset_users.items())
-        },
+        "meshes": {asset: _mesh_facts(room.geometry[user]) for asset, user in sorted(room.asset_users.items())},
         "files": dict(sorted(files.items())),
     }
+
+
+def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
+    origin = geometry.origin
+    credit = {"credit": origin.credit} if origin.credit else {}
+    facts = {"faces": geometry.faces, "watertight": geometry.watertight}
+    return {**facts, "source": origin.source, "licence": origin.licence, **credit}
 
 
 def _keep_root(path: Path, current: bytes, fresh: bytes) -> bytes:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,25 +17,12 @@ from echomodel.compact.wholeness import bearing, group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
+from echomodel.protocols import GraphEdit, StepListener
 from echomodel.released.packed import PackedLinear
 from echomodel.samplers import Predict, guided, sample
 
-Progress = Callable[[int, int], None]
 SAME_STYLE, SAME_MATERIAL = 13, 15
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
-
-
-@dataclass(frozen=True, eq=False)
-class GraphEdit:
-    """How a graph came about by editing another one over the same nodes (EchoScene 3.2).
-
-    Arguments:
-        before: (E, 3) int64, the triplets before the edit.
-        added: (N,) bool, nodes that were not there before; triplets of `before` do not touch them.
-    """
-
-    before: Tensor
-    added: Tensor
 
 
 class EchoModel:
@@ -110,7 +95,7 @@ class EchoModel:
         guidance: float = 1.0,
         relation_guidance: float | None = None,
         noise: Tensor | None = None,
-        progress: Progress | None = None,
+        progress: StepListener | None = None,
     ) -> Boxes:
         """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`.
 
@@ -187,7 +172,7 @@ class EchoModel:
         guidance: float = 1.0,
         noise: Tensor | None = None,
         candidates: int | None = None,
-        progress: Progress | None = None,
+        progress: StepListener | None = None,
     ) -> Tensor:
         """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style become equal.
 
@@ -358,7 +343,7 @@ def _repeated(values: Tensor | None, count: int) -> Tensor | None:
     return None if values is None else torch.cat([values] * count)
 
 
-def _part_of(progress: Progress | None, attempt: int, tries: int) -> Progress | None:
+def _part_of(progress: StepListener | None, attempt: int, tries: int) -> StepListener | None:
     """Progress of one of several draws as progress of all."""
     if progress is None:
         return None

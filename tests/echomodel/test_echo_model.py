@@ -10,8 +10,9 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
-from echomodel.echo import EchoModel, GraphEdit, equal_furniture, touched_nodes
+from echomodel.echo import EchoModel, equal_furniture, touched_nodes
 from echomodel.graph import GraphBatch
+from echomodel.protocols import GraphEdit
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {

@@ -50,7 +50,7 @@ class StandIn:
     `edits` are the graph edits that it was told of.
     """
 
-    hash = "standin"
+    hash, preset, has_shapes = "standin", "compact", True
 
     def __init__(self, shift: float = 0.0) -> None:
         self.shift = shift

@@ -24,7 +24,7 @@ from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
-    from echomodel.echo import GraphEdit, Progress
+    from echomodel.protocols import GraphEdit, StepListener
 
 DECODED = 2  # shapes at a time: one takes 67 MB for every feature map of 64 channels
 
@@ -85,7 +85,7 @@ class ReleasedEcho:
         known: Boxes | None = None,
         known_mask: Tensor | None = None,
         edit: GraphEdit | None = None,
-        progress: Progress | None = None,
+        progress: StepListener | None = None,
     ) -> Boxes:
         """Boxes by the published 1,000 ancestral steps.
 
@@ -115,7 +115,7 @@ class ReleasedEcho:
         generator: torch.Generator,
         steps: int | None = None,
         edit: GraphEdit | None = None,
-        progress: Progress | None = None,
+        progress: StepListener | None = None,
     ) -> Tensor:
         """Signed distances of all objects, turned so that their front is +Z and their surface lies at zero.
 

@@ -2,6 +2,7 @@ import hashlib
 import json
 import warnings
 
+import numpy as np
 import pytest
 import torch
 from pxr import Usd
@@ -34,7 +35,10 @@ def test_room_reads_back(root):
     assert saved.assets == room.assets
     for name in ("size", "position", "yaw"):
         torch.testing.assert_close(getattr(saved.boxes, name), getattr(room.boxes, name), atol=2e-4, rtol=0)
-    assert saved.carried["bed"].groups == ("blanket", "linen", "wood")
+    (part,), (before,) = saved.geometry["bed"].parts, room.geometry["bed"].parts
+    assert list(part.slots) == ["blanket", "linen", "wood"]
+    for slot, faces in before.slots.items():
+        np.testing.assert_array_equal(part.slots[slot], faces)
 
 
 def test_edit_without_change_keeps_every_byte_of_the_assets_and_looks(root):

@@ -6,8 +6,9 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.room.pipeline import graph_batch, judge
 from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
+from echousd.room.tensors import graph_batch
+from echousd.room.verdicts import relation_verdicts
 
 
 def chairs(*relations, styles=(None, None, None)):
@@ -100,7 +101,7 @@ def test_verdicts_are_those_of_the_rules():
     assert by["nightstand_left", "same_style_as"].margin is None
     assert by["wardrobe", "taller_than"].margin > 0
     flat = Boxes(room.boxes.size * torch.tensor([1, 0.1, 1]), room.boxes.position, room.boxes.yaw)
-    assert {v.predicate: v.state for v in judge(room.graph, flat)}["standing_on"] == "broken"
+    assert {v.predicate: v.state for v in relation_verdicts(room.graph, flat)}["standing_on"] == "broken"
     assert len(graph_batch(room.graph).triplets) == 5
 
 
@@ -117,7 +118,7 @@ def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
 
 
 class NoShapes(StandIn):
-    sample_shapes = None
+    has_shapes = False
 
 
 class Empty(StandIn):
@@ -128,7 +129,7 @@ class Empty(StandIn):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: generate, boxes"),
+        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: sdf, boxes"),
         ({"samples": 0}, "samples is 0, allowed: 1 to 1000"),
         ({"seed": -1}, "seed is -1, allowed: 0 or more"),
         ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),

@@ -1,0 +1,96 @@
+"""The geometry of one piece of furniture: parts with material slots, colliders, and where it all comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+
+LICENCE = "Apache-2.0"  # of everything that EchoUSD itself makes
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a piece of furniture comes from.
+
+    Arguments:
+        source: name of the shape source, see `echousd.room.sources`.
+        licence: SPDX identifier of its licence.
+        credit: who must be named, empty where nobody must.
+    """
+
+    source: str
+    licence: str = LICENCE
+    credit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a piece of furniture.
+
+    Arguments:
+        name: unique in its geometry; the prim is called `<asset>_<name>`.
+        mesh: in the object's frame, metres.
+        slots: material slot (a group of `echousd.room.looks`) -> (m,) int face numbers; together every face once.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    slots: Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Collider:
+    """What a piece of furniture collides with.
+
+    Arguments:
+        name: unique in its geometry; the prim is called `<asset>_<name>`.
+        mesh: in the object's frame, metres.
+        approximation: UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    approximation: str
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """The geometry of one piece of furniture; objects that share an asset share this object.
+
+    Arguments:
+        parts: at least one.
+        colliders: at least one; together they cover all parts.
+        origin: provenance and licence.
+    """
+
+    parts: tuple[Part, ...]
+    colliders: tuple[Collider, ...]
+    origin: Origin
+
+    def __post_init__(self) -> None:
+        names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]
+        if not self.parts or not self.colliders or len(set(names)) < len(names):
+            raise ValueError(f"geometry has the pieces {names}, need parts and colliders, each with a name of its own")
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """All parts as one mesh."""
+        if len(self.parts) == 1:
+            return self.parts[0].mesh
+        whole = trimesh.util.concatenate([part.mesh for part in self.parts])
+        assert isinstance(whole, trimesh.Trimesh)
+        return whole
+
+    @property
+    def faces(self) -> int:
+        """Triangles of all parts."""
+        return sum(len(part.mesh.faces) for part in self.parts)
+
+    @property
+    def watertight(self) -> bool:
+        """Whether every part is closed."""
+        return all(bool(part.mesh.is_watertight) for part in self.parts)

@@ -1,0 +1,37 @@
+"""Where things stand in a room: prim paths and names, files of an asset."""
+
+from __future__ import annotations
+
+OBJECTS = "/Room/Objects"
+SHELL = "/Room/Shell"
+
+
+def piece_name(asset: str, piece: str) -> str:
+    """Name of the prim of a part or collider; unique in the room, because some importers keep only names."""
+    return f"{asset}_{piece}"
+
+
+def piece_of(asset: str, prim: str) -> str | None:
+    """The part or collider that a prim's name says, None if it is not named for this asset."""
+    piece = prim.removeprefix(f"{asset}_")
+    return None if piece == prim else piece
+
+
+def shell_mesh(part: str) -> str:
+    """Path of the mesh of a part of the shell."""
+    return f"{SHELL}/{part}/{piece_name(part, 'mesh')}"
+
+
+def payload_name(asset: str) -> str:
+    """File name of an asset's geometry, beside its component layer."""
+    return f"{asset}_geo.usdc"
+
+
+def payload_file(asset: str) -> str:
+    """Path of an asset's geometry in the room's folder."""
+    return f"assets/{asset}/{payload_name(asset)}"
+
+
+def component_file(asset: str) -> str:
+    """Path of an asset's component layer in the room's folder."""
+    return f"assets/{asset}/{asset}.usda"

@@ -1,0 +1,32 @@
+"""How far a run is, and how long each of its stages took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+Listener = Callable[[str, int, int], None]  # (stage, done, total)
+
+
+@dataclass
+class StageTimer:
+    """Measures the stages of one run and tells a listener how far each is."""
+
+    listener: Listener | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str, total: int = 1) -> Iterator[Callable[[int, int], None]]:
+        """Time a stage; what it yields takes (done, total)."""
+        started = time.perf_counter()
+        self.tell(name, 0, total)
+        yield lambda done, of: self.tell(name, done, of)
+        self.tell(name, total, total)
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - started
+
+    def tell(self, name: str, done: int, total: int) -> None:
+        """Pass on how far a stage is."""
+        if self.listener is not None:
+            self.listener(name, done, total)

@@ -1,0 +1,64 @@
+"""Shapes of the model's shape branch: signed distances on a grid, meshed, cleaned and fitted in their boxes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from echomodel.boxes import Boxes
+from echousd.room.geometry import Geometry, Origin
+from echousd.room.meshing import mesh_from_shape
+from echousd.room.reproducible import one_thread, rounded_grids
+from echousd.room.sources.solid import solid_geometry
+from echousd.room.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.room.tensors import floor_centre, graph_batch, seeded
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
+
+ORIGIN = Origin("sdf")
+
+
+class SignedDistances:
+    """The source `sdf` (EchoScene 3.4); needs a model with a shape branch."""
+
+    title = "shapes from the model"
+
+    def check(self, model: RoomModel | None) -> None:
+        """Raises ValueError for a model without a shape branch."""
+        if model is None or not model.has_shapes:
+            raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
+
+    def shapes(self, request: ShapeRequest) -> Shapes:
+        """Meshes of sampled shapes; objects of an edited graph that stay are sampled along, the others hear them."""
+        grids = sampled_grids(request)
+        size = np.asarray(request.boxes.size, float)
+
+        def make(row: int) -> Geometry:
+            node = request.graph.nodes[row]
+            try:
+                mesh = mesh_from_shape(grids[row], size[row], faces=request.faces).mesh
+            except ValueError as error:
+                raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
+            return solid_geometry(mesh, node.category, ORIGIN)
+
+        return per_asset(request, make, lambda row: grids[row] < 0)
+
+
+def sampled_grids(request: ShapeRequest) -> np.ndarray:
+    """(n, 64, 64, 64) float32 TSDFs of all objects; raises ValueError for a model without a shape branch."""
+    SOURCE.check(request.model)
+    assert request.model is not None
+    graph, boxes = request.graph, request.boxes
+    centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
+    extra: dict[str, Any] = {} if request.change is None else {"edit": request.change}
+    with request.timer.stage("shapes") as tell, one_thread():
+        grids = request.model.sample_shapes(
+            graph_batch(graph), centred,
+            generator=seeded(request.seed, "shapes"), steps=request.steps, progress=tell, **extra,
+        )  # fmt: skip
+        return rounded_grids(np.asarray(grids))
+
+
+SOURCE = SignedDistances()

@@ -1,0 +1,15 @@
+"""Geometry of furniture that is known as one solid: cut along the borders of its materials, with one collider."""
+
+from __future__ import annotations
+
+import trimesh
+
+from echousd.room.colliders import collider
+from echousd.room.geometry import Geometry, Origin, Part
+from echousd.room.looks import material_groups
+
+
+def solid_geometry(mesh: trimesh.Trimesh, category: str, origin: Origin) -> Geometry:
+    """The geometry of one mesh (object frame, metres) whose category says which materials it has where."""
+    cut, slots = material_groups(mesh, category)
+    return Geometry((Part("mesh", cut, slots),), (collider(mesh, category),), origin)

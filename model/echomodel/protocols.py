@@ -1,0 +1,86 @@
+"""What every model of rooms can do, whatever its preset: the pipeline, edits and scores know no more of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.graph import GraphBatch
+
+StepListener = Callable[[int, int], None]  # (steps done, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class GraphEdit:
+    """How a graph came about by editing another one over the same nodes (EchoScene 3.2).
+
+    Arguments:
+        before: (E, 3) int64, the triplets before the edit.
+        added: (N,) bool, nodes that were not there before; triplets of `before` do not touch them.
+    """
+
+    before: Tensor
+    added: Tensor
+
+
+class RoomModel(Protocol):
+    """Boxes for a scene graph and, where it has the branch, shapes for the boxes."""
+
+    @property
+    def preset(self) -> str:
+        """`compact`, `paper` or `released`."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """Short hash of the weights, empty for weights without a file."""
+        ...
+
+    @property
+    def has_shapes(self) -> bool:
+        """Whether `sample_shapes` works."""
+        ...
+
+    def sample_layout(
+        self,
+        graph: GraphBatch,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        known: Boxes | None = None,
+        known_mask: Tensor | None = None,
+        edit: GraphEdit | None = None,
+        progress: StepListener | None = None,
+    ) -> Boxes:
+        """Boxes of N objects in the frame of `Boxes`, the floor's middle at the origin (EchoScene 3.3).
+
+        Arguments:
+            graph: S scenes, N nodes.
+            generator: source of all randomness.
+            steps: sampling steps, None = the model's own; raises ValueError where they cannot be chosen.
+            known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
+            edit: what was changed in the graph, None = nothing.
+            progress: called with (steps done, steps).
+        """
+        ...
+
+    def sample_shapes(
+        self,
+        graph: GraphBatch,
+        boxes: Boxes,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        edit: GraphEdit | None = None,
+        progress: StepListener | None = None,
+    ) -> Tensor:
+        """(N, R, R, R) float32 signed distances on the box-normalised grid, negative inside (EchoScene 3.4).
+
+        Raises ValueError for a model without a shape branch.
+        """
+        ...
