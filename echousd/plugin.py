@@ -54,9 +54,9 @@ def register() -> None:
 
 
 def is_active() -> bool:
-    """Whether USD knows EchoSceneGraph, EchoRelation and EchoNodeAPI in this process (loads pxr)."""
+    """Whether USD knows EchoSceneGraph, EchoOpening, EchoRelation and EchoNodeAPI in this process (loads pxr)."""
     from pxr import Usd
 
     registry = Usd.SchemaRegistry()
-    typed = (registry.FindConcretePrimDefinition(name) for name in ("EchoSceneGraph", "EchoRelation"))
+    typed = (registry.FindConcretePrimDefinition(name) for name in ("EchoSceneGraph", "EchoOpening", "EchoRelation"))
     return all(typed) and registry.FindAppliedAPIPrimDefinition("EchoNodeAPI") is not None

@@ -19,6 +19,8 @@ NEW_EXAMPLES = """Examples:
 
     echousd new bedroom.usda --room bedroom --count nightstand=2 --count desk=1 --size 4 3.5
 
+    echousd new bedroom.usda --room bedroom --size 4 3.5 --door 'south 0.3' --window 'north 1.2 1.6'
+
     echousd new bedroom.yaml --room bedroom     (a text to edit by hand)"""
 
 GRAPH_EXAMPLES = """Examples:
@@ -73,11 +75,22 @@ def new(
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Extents of the floor, metres.")
     ] = None,
     height: Annotated[float | None, typer.Option(metavar="M", help="Height of the room, metres.")] = None,
+    door: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WALL ...",
+            help="A door: wall, metres from its first corner, width, hinge=, swing=, height=, name=.",
+        ),
+    ] = None,
+    window: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WALL ...", help="A window: wall, metres from its first corner, width, sill=, height=."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite OUT.")] = False,
 ) -> None:
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
-    from echousd.graph.text import relation_from_text
+    from echousd.graph.text import relation_from_text, with_openings
 
     if (source is None) == (room is None):
         raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
@@ -93,6 +106,9 @@ def new(
     else:
         assert room is not None
         made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())), stated)
+    words = [("door", text) for text in door or ()] + [("window", text) for text in window or ()]
+    if words:
+        made = made.replaced(room=with_openings(made.room, words))
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -189,10 +205,16 @@ def _words(token: str) -> str:
     return token.replace("_", " ")
 
 
+KINDS = ("door", "window", "passage")
+
+
 def _heading(made: SceneGraph, path: str) -> str:
     extents, height = made.room.extents, made.room.height
     known = [f"{extents[0]:.4g} x {extents[1]:.4g} m"] if extents else []
     known += [f"{height:.4g} m high"] if height else []
+    for kind in KINDS:
+        count = sum(opening.kind == kind for opening in made.room.openings)
+        known += [f"{count} {kind}{'s' * (count != 1)}"] if count else []
     return ", ".join([f"{path} {_summary(made)}".strip(), *known])
 
 
@@ -213,10 +235,14 @@ def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
     from rich.text import Text
     from rich.tree import Tree
 
+    from echousd.graph.openings import sentence
+
     stated: dict[str, list[Relation]] = {node.name: [] for node in made.nodes}
     for relation in made.relations:
         stated[relation.subject].append(relation)
     tree = Tree(Text(_heading(made, path), style="bold"), guide_style="dim")
+    for opening in made.room.openings:
+        tree.add(Text(sentence(opening), style="green"))
     for node in made.nodes:
         label = Text(node.name, style="bold cyan")
         if node.category != node.name:
@@ -239,10 +265,13 @@ def _print_table(console: Console, made: SceneGraph, path: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from echousd.graph.openings import sentence
+
     objects = Table("object", "category", "fixed and free data", box=box.SIMPLE_HEAD)
     for node in made.nodes:
         objects.add_row(*map(Text, (node.name, node.category, ", ".join(_facts(node)))))
     relations = Table("subject", "predicate", "object", "confidence", box=box.SIMPLE_HEAD)
     for relation in made.relations:
         relations.add_row(*map(Text, (*relation.triple, f"{relation.confidence:.3g}")))
-    console.print(Text(_heading(made, path), style="bold"), objects, relations, sep="\n")
+    console.print(Text(_heading(made, path), style="bold"), *map(sentence, made.room.openings), sep="\n")
+    console.print(objects, relations, sep="\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from echousd.graph.openings import sentence
 from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
 
 
@@ -63,7 +64,7 @@ class GraphDiff:
 
     def lines(self) -> list[str]:
         """One readable line a step: `+` new, `-` gone, `~` changed."""
-        said = [f"~ room: {_fields(*self.room)}"] if self.room else []
+        said = _room_lines(*self.room) if self.room else []
         said += [f"- object {node.name} ({node.category})" for node in self.removed]
         said += [f"+ object {node.name} ({node.category})" for node in self.added]
         said += [f"~ object {old.name}: {_fields(old, new)}" for old, new in self.changed]
@@ -78,8 +79,19 @@ def same(one: Node, other: Node) -> bool:
     return one == other and kinds[0] == kinds[1]
 
 
-def _fields(old: Any, new: Any) -> str:
-    pairs = [(name, getattr(old, name), getattr(new, name)) for name in type(old).model_fields]
+def _room_lines(old: RoomSpec, new: RoomSpec) -> list[str]:
+    fields = _fields(old, new, but=("openings",))
+    said = [f"~ room: {fields}"] if fields else []
+    was, will = {o.name: o for o in old.openings}, {o.name: o for o in new.openings}
+    said += [f"- {sentence(o)}" for name, o in was.items() if name not in will]
+    said += [f"+ {sentence(o)}" for name, o in will.items() if name not in was]
+    said += [f"~ {sentence(was[n])} -> {sentence(o)}" for n, o in will.items() if n in was and was[n] != o]
+    return said or ["~ room: another order of the openings"]
+
+
+def _fields(old: Any, new: Any, but: tuple[str, ...] = ()) -> str:
+    names = [name for name in type(old).model_fields if name not in but]
+    pairs = [(name, getattr(old, name), getattr(new, name)) for name in names]
     return ", ".join(f"{name} {_short(a)} -> {_short(b)}" for name, a, b in pairs if a != b or repr(a) != repr(b))
 
 

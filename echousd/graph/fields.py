@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
 
+from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 
 MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
@@ -102,6 +103,17 @@ def _corners(value: Any) -> tuple[Point, ...]:
     return corners
 
 
+def _openings(value: Any) -> tuple[Opening, ...]:
+    found = []
+    for entry in _items(value):
+        if not isinstance(entry, Opening | Mapping):
+            raise ValueError(f"found {shown(entry)}, allowed: an opening with name, kind, edge, offset, width, height")
+        opening = entry if isinstance(entry, Opening) else opening_from_json(entry)
+        identifier(opening.name)
+        found.append(opening)
+    return tuple(found)
+
+
 def _attributes(value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise ValueError(f"found {shown(value)}, allowed: names with a text, a number or true/false each")
@@ -169,6 +181,7 @@ Attributes: TypeAlias = Annotated[dict[str, Scalar], BeforeValidator(_attributes
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Extents: TypeAlias = Annotated[Point | None, _optional(_numbers(2, _positive, "two positive numbers [x, z], metres"))]
 Corners: TypeAlias = Annotated[tuple[Point, ...] | None, _optional(_corners)]
+Openings: TypeAlias = Annotated[tuple[Opening, ...], BeforeValidator(_openings)]
 Height: TypeAlias = Annotated[float | None, _optional(_positive)]
 
 

@@ -6,8 +6,10 @@ import os
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from echomodel.openings import check_openings, rectangle
 from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, check_triples, listed
@@ -55,12 +57,15 @@ class RoomSpec(_Model):
         floor_polygon: at least three corners (x, z), metres.
         size: (x, z) extents of the floor, metres; with a polygon, those of its bounding box.
         height: metres.
+        openings: doors, windows and passages in the walls; wall i is the edge from corner i of the floor to the next,
+            of a rectangle the one at -z, +x, +z and -x.
     """
 
     type: field.RoomTypeWord
     floor_polygon: field.Corners = None
     size: field.Extents = None
     height: field.Height = None
+    openings: field.Openings = ()
 
     def __init__(self, type: str, **fields: Any) -> None:
         super().__init__(type=type, **fields)
@@ -75,12 +80,24 @@ class RoomSpec(_Model):
             found = field.bounding_extents(self.floor_polygon)
             if max(abs(a - b) for a, b in zip(found, self.size, strict=True)) > 1e-3:
                 raise ValueError(f"size is {self.size} but floor_polygon spans {found}; leave one of them out")
+        for position in range(len(self.openings)):
+            try:
+                check_openings(self.openings[: position + 1], self.corners, self.height)
+            except ValueError as error:
+                raise GraphError(str(error), ("openings", position)) from None
         return self
 
     @property
     def extents(self) -> field.Point | None:
         """(x, z) extents of the floor's bounding box in metres, None where nothing is known."""
         return field.bounding_extents(self.floor_polygon) if self.floor_polygon else self.size
+
+    @property
+    def corners(self) -> np.ndarray | None:
+        """(k, 2) float, the floor's corners (x, z) in metres, None where nothing is known."""
+        if self.floor_polygon:
+            return np.asarray(self.floor_polygon, float)
+        return rectangle(*self.size) if self.size else None
 
 
 class Node(_Model):

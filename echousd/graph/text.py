@@ -3,6 +3,7 @@
 room: bedroom
 objects: {bed: double_bed, wardrobe: wardrobe, lamp: {category: table_lamp, style: oak}}
 relations: [bed left of wardrobe, lamp close by bed]
+doors: [{wall: south, offset: 0.6}]
 """
 
 from __future__ import annotations
@@ -10,18 +11,20 @@ from __future__ import annotations
 import difflib
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal
 
 import yaml
 
+from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph.consistency import GraphError
 from echousd.graph.fields import IDENTIFIER, shown
+from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
 from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
 
-TOP_KEYS = ("room", "objects", "nodes", "relations")
+TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
 def graph_from_text(text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
@@ -69,7 +72,7 @@ def graph_from_plain(data: Any) -> SceneGraph:
         types = ", ".join(kind.name for kind in vocabulary().room_types)
         raise GraphError(f"room is missing, allowed: one of {types}, or a mapping with type")
     key = "nodes" if "nodes" in data else "objects"
-    room = _built(RoomSpec, _fields(data["room"], "type", ("room",)), ("room",))
+    room = _room(data)
     nodes = [_built(Node, fields, ("nodes", i)) for i, fields in enumerate(_objects(data.get(key), key))]
     stated = data.get("relations")
     if not isinstance(stated, list | None):
@@ -80,6 +83,27 @@ def graph_from_plain(data: Any) -> SceneGraph:
         _built(Relation, _relation(entry, ("relations", i)), ("relations", i)) for i, entry in enumerate(stated or ())
     ]
     return SceneGraph(room, tuple(nodes), tuple(relations))
+
+
+def _room(data: Mapping[str, Any]) -> RoomSpec:
+    """The room with its doors, windows and passages, which may stand beside it or within it."""
+    fields = _fields(data["room"], "type", ("room",))
+    words = [*listed_words(fields, ("room",)), *listed_words(data, ())]
+    room = _built(RoomSpec, {key: value for key, value in fields.items() if key not in LISTS}, ("room",))
+    for kind, entry, about in words:
+        try:
+            room = with_openings(room, [(kind, entry)])
+        except GraphError as error:
+            raise GraphError(str(error), about) from None
+    return room
+
+
+def with_openings(room: RoomSpec, words: Iterable[tuple[str, Any]]) -> RoomSpec:
+    """The room with more openings, each as (kind, what a person writes); raises `GraphError`."""
+    for kind, entry in words:
+        one = opening_from_words(entry, kind, room, [opening.name for opening in room.openings])
+        room = room.replaced(openings=(*room.openings, one))
+    return room
 
 
 def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
@@ -186,6 +210,8 @@ def _stated(model: RoomSpec | Node | Relation) -> dict[str, Any]:
 
 
 def _lists(value: Any) -> Any:
+    if isinstance(value, Opening):
+        return stated(value)
     return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
 
 

@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING, Any
 from pxr import Gf, Sdf, Vt
 
 if TYPE_CHECKING:
+    from echomodel.openings import Opening
     from echousd.graph import Node, RoomSpec
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"
+OPENING_TYPE = "EchoOpening"
+TYPES = (GRAPH_TYPE, RELATION_TYPE, OPENING_TYPE)
 NODE_API = "EchoNodeAPI"
 LABELS_API = "SemanticsLabelsAPI:category"
 LABELS = "semantics:labels:category"
 
 GRAPH_NAME = "SceneGraph"
 OBJECTS_NAME = "Objects"
+OPENINGS_NAME = "Openings"
 
 ROOM = "echo:room"
 VOCABULARY = "echo:vocabulary"
@@ -26,6 +30,24 @@ ROOM_TYPE = "echo:roomType"
 FLOOR_POLYGON = "echo:floorPolygon"
 FLOOR_SIZE = "echo:floorSize"
 HEIGHT = "echo:height"
+
+KIND = "echo:kind"
+EDGE = "echo:edge"
+OFFSET = "echo:offset"
+WIDTH = "echo:width"
+SILL = "echo:sill"
+HINGE = "echo:hinge"
+SWING = "echo:swing"
+OPENING_FIELDS = {
+    KIND: "kind",
+    EDGE: "edge",
+    OFFSET: "offset",
+    WIDTH: "width",
+    HEIGHT: "height",
+    SILL: "sill",
+    HINGE: "hinge",
+    SWING: "swing",
+}
 
 SUBJECT = "echo:subject"
 PREDICATE = "echo:predicate"
@@ -47,6 +69,13 @@ VALUE_TYPES = {
     FLOOR_POLYGON: _TYPES.Double2Array,
     FLOOR_SIZE: _TYPES.Double2,
     HEIGHT: _TYPES.Double,
+    KIND: _TYPES.Token,
+    EDGE: _TYPES.Int,
+    OFFSET: _TYPES.Double,
+    WIDTH: _TYPES.Double,
+    SILL: _TYPES.Double,
+    HINGE: _TYPES.Token,
+    SWING: _TYPES.Token,
     PREDICATE: _TYPES.Token,
     CONFIDENCE: _TYPES.Double,
     CATEGORY: _TYPES.Token,
@@ -73,6 +102,13 @@ def room_values(room: RoomSpec) -> dict[str, Any]:
     if room.height is not None:
         values[HEIGHT] = float(room.height)
     return values
+
+
+def opening_values(opening: Opening) -> dict[str, Any]:
+    """The authored properties of an EchoOpening; what is at its default and says nothing of the kind is left out."""
+    unsaid = {SILL: 0.0, **({} if opening.kind == "door" else {HINGE: "left", SWING: "in"})}
+    values = {name: getattr(opening, field) for name, field in OPENING_FIELDS.items()}
+    return {name: value for name, value in values.items() if unsaid.get(name) != value}
 
 
 def node_values(node: Node) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
+from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage import encoding as usd
@@ -16,12 +17,13 @@ from echousd.stage.encoding import StageError
 
 @dataclass
 class RoomPrims:
-    """The prims of one room: its own, its scene graph's, and those of nodes and relations in the stage's order."""
+    """The prims of one room: its own, its scene graph's, and those of its nodes, relations and openings in order."""
 
     room: Usd.Prim
     graph: Usd.Prim
     nodes: list[Usd.Prim] = field(default_factory=list)
     relations: list[Usd.Prim] = field(default_factory=list)
+    openings: list[Usd.Prim] = field(default_factory=list)
 
 
 def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
@@ -78,10 +80,13 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     graphs: list[Usd.Prim] = []
     nodes: list[Usd.Prim] = []
     relations: list[Usd.Prim] = []
+    openings: list[Usd.Prim] = []
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
         type_name = prim.GetTypeName()
         if type_name == usd.RELATION_TYPE:
             relations.append(prim)
+        elif type_name == usd.OPENING_TYPE:
+            openings.append(prim)
         elif type_name == usd.GRAPH_TYPE:
             graphs.append(prim)
         elif usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
@@ -90,7 +95,8 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     if len(rooms) < len(graphs):
         raise StageError(f"{source(stage)}: two EchoSceneGraph prims describe the same room, allowed: one per room")
     by_graph = {prims.graph.GetPath(): prims for prims in rooms.values()}
-    for owners, found, member in ((rooms, nodes, "nodes"), (by_graph, relations, "relations")):
+    members = ((rooms, nodes, "nodes"), (by_graph, relations, "relations"), (by_graph, openings, "openings"))
+    for owners, found, member in members:
         known: dict[Sdf.Path, RoomPrims | None] = {}  # by parent, as siblings are many
         for prim in found:
             parent = prim.GetPath().GetParentPath()
@@ -133,7 +139,7 @@ def room_graph(prims: RoomPrims) -> SceneGraph:
     read = (relation_of(prim, names) for prim in prims.relations)
     relations = tuple(relation for relation in read if relation)
     try:
-        return SceneGraph(room=room_spec(prims.graph), nodes=nodes, relations=relations)
+        return SceneGraph(room=room_spec(prims), nodes=nodes, relations=relations)
     except GraphError as error:
         raise StageError(f"{place(prims.graph)}: {error}") from None
 
@@ -154,14 +160,25 @@ def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
     return names
 
 
-def room_spec(graph: Usd.Prim) -> RoomSpec:
-    """The `RoomSpec` that an EchoSceneGraph prim holds."""
+def read_opening(prim: Usd.Prim) -> Opening:
+    """The opening that an EchoOpening prim states, called like the prim; raises StageError."""
+    said = {field: value(prim, name) for name, field in usd.OPENING_FIELDS.items()}
+    try:
+        return opening_from_json({"name": prim.GetName(), **{k: v for k, v in said.items() if v is not None}})
+    except ValueError as error:
+        raise StageError(f"{place(prim)}: {error}") from None
+
+
+def room_spec(prims: RoomPrims) -> RoomSpec:
+    """The `RoomSpec` that an EchoSceneGraph prim and its openings hold."""
+    graph = prims.graph
     words = value(graph, usd.VOCABULARY)
     if words not in (None, usd.VOCABULARY_NAME):
         raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
     corners, size, height = (value(graph, name) for name in (usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT))
     try:
-        return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height)
+        openings = tuple(map(read_opening, prims.openings))
+        return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height, openings=openings)
     except GraphError as error:
         raise StageError(f"{place(graph)}: {error}") from None
 

@@ -11,11 +11,12 @@ from typing import Any
 
 from pxr import Sdf, Usd
 
+from echomodel.openings import Opening
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, the_room, value
-from echousd.stage.write import apply_apis, author_node, author_relation, define, put
+from echousd.stage.write import apply_apis, author_node, author_opening, author_relation, define, put
 
 Edit = Callable[[], Any]
 _OWN_INFO = {"specifier", "typeName", "apiSchemas", "active"}
@@ -31,7 +32,8 @@ def update_graph(target: Usd.Stage | Sdf.Layer, graph: SceneGraph, room: str | N
     stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
     prims = the_room(stage, room)
     editor = _Editor(stage, prims)
-    edits = [*editor.room_edits(graph), *editor.node_edits(graph), *editor.relation_edits(graph)]
+    edits = [*editor.room_edits(graph), *editor.opening_edits(graph)]
+    edits += [*editor.node_edits(graph), *editor.relation_edits(graph)]
     with Sdf.ChangeBlock():
         for edit in edits:
             edit()
@@ -70,6 +72,23 @@ class _Editor:
     def room_edits(self, graph: SceneGraph) -> list[Edit]:
         names = (usd.ROOM_TYPE, usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT)
         return self.value_edits(self.prims.graph, usd.room_values(graph.room), names)
+
+    def opening_edits(self, graph: SceneGraph) -> list[Edit]:
+        wanted = {opening.name: opening for opening in graph.room.openings}
+        held = {prim.GetName(): prim for prim in self.prims.openings}
+        edits: list[Edit] = [self.removal(prim) for name, prim in held.items() if name not in wanted]
+        for name, opening in wanted.items():
+            values = usd.opening_values(opening)
+            path = self.prims.graph.GetPath().AppendChild(usd.OPENINGS_NAME).AppendChild(name)
+            prim = held.get(name) or self.stage.GetPrimAtPath(path)
+            if prim:
+                edits += [*self.value_edits(prim, values, tuple(usd.OPENING_FIELDS)), *self.activation(prim)]
+            else:
+                edits.append(partial(self.new_opening, path, opening))
+        return edits
+
+    def new_opening(self, path: Sdf.Path, opening: Opening) -> None:
+        author_opening(define(self.layer, self.spec_path(path.GetParentPath()), "Scope"), opening)
 
     def node_edits(self, graph: SceneGraph) -> list[Edit]:
         wanted = {node.name: node for node in graph.nodes}
@@ -233,6 +252,11 @@ class _Editor:
                 [related[t].GetName() for t in related],
                 [related[r.triple].GetName() for r in graph.relations],
                 prims.relations,
+            ),
+            (
+                [prim.GetName() for prim in prims.openings],
+                [opening.name for opening in graph.room.openings],
+                prims.openings,
             ),
         )
         for have, want, siblings in wanted:

@@ -9,6 +9,7 @@ from pxr import Sdf, Usd
 from echousd.stage import encoding as usd
 
 if TYPE_CHECKING:
+    from echomodel.openings import Opening
     from echousd.graph import Node, Relation, SceneGraph
 
 LAYER_DOC = """Scene graph of a room: what it holds and how its objects relate.
@@ -22,8 +23,9 @@ def graph_layer(graph: SceneGraph, *, root: str = "/Room", identifier: str = ".u
     """A new anonymous layer that holds `graph` at the prim path `root` and nothing else.
 
     Authors: `root` (Xform, kind assembly, defaultPrim), `SceneGraph` (EchoSceneGraph) with one EchoRelation per
-    relation, `Objects` (Xform, kind group) with one Xform + EchoNodeAPI + SemanticsLabelsAPI:category per node,
-    upAxis Y, metersPerUnit 1. `identifier` is the anonymous layer's tag; its extension chooses usda or usdc.
+    relation and, below `Openings`, one EchoOpening per opening, `Objects` (Xform, kind group) with one Xform +
+    EchoNodeAPI + SemanticsLabelsAPI:category per node, upAxis Y, metersPerUnit 1. `identifier` is the anonymous
+    layer's tag; its extension chooses usda or usdc.
     """
     layer = Sdf.Layer.CreateAnonymous(identifier)
     layer.documentation = LAYER_DOC
@@ -85,12 +87,30 @@ def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:
         relate(graph_spec, usd.ROOM, scene_path)
         for name, value in usd.room_values(graph.room).items():
             put(graph_spec, name, value)
+        author_openings(graph_spec, graph.room.openings)
         author_relations(graph_spec, graph.relations, objects_path)
         objects = define(layer, room.AppendChild(usd.OBJECTS_NAME), "Xform")
         if not objects.kind:
             objects.kind = "group"
         for node in graph.nodes:
             author_node(objects, node)
+
+
+def author_openings(parent: Sdf.PrimSpec, openings: tuple[Opening, ...]) -> None:
+    """One EchoOpening prim per opening in a scope below `parent`."""
+    if not openings:
+        return
+    scope = define(parent.layer, parent.path.AppendChild(usd.OPENINGS_NAME), "Scope")
+    for opening in openings:
+        author_opening(scope, opening)
+
+
+def author_opening(parent: Sdf.PrimSpec, opening: Opening) -> Sdf.PrimSpec:
+    """One EchoOpening prim below `parent`, called like the opening."""
+    spec = define(parent.layer, parent.path.AppendChild(opening.name), usd.OPENING_TYPE)
+    for name, value in usd.opening_values(opening).items():
+        put(spec, name, value)
+    return spec
 
 
 def author_relations(parent: Sdf.PrimSpec, relations: tuple[Relation, ...], objects: Sdf.Path) -> None:

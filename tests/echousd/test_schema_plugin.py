@@ -44,7 +44,7 @@ def test_regenerating_gives_the_committed_bytes(tmp_path):
 def test_every_attribute_ends_its_documentation_with_range_and_unit():
     layer = Sdf.Layer.FindOrOpen(str(SCHEMAS / "schema.usda"))
     classes = [spec for spec in layer.rootPrims if spec.name != "GLOBAL"]
-    assert [spec.name for spec in classes] == ["EchoSceneGraph", "EchoRelation", "EchoNodeAPI"]
+    assert [spec.name for spec in classes] == ["EchoSceneGraph", "EchoOpening", "EchoRelation", "EchoNodeAPI"]
     for spec in classes:
         assert len(spec.documentation) > 80, spec.name
         for prop in spec.properties:
@@ -77,7 +77,7 @@ def test_the_schema_knows_the_words_of_the_vocabulary():
 
 def test_what_is_authored_is_what_the_schema_says():
     registry = Usd.SchemaRegistry()
-    definitions = [registry.FindConcretePrimDefinition(n) for n in (encoding.GRAPH_TYPE, encoding.RELATION_TYPE)]
+    definitions = [registry.FindConcretePrimDefinition(n) for n in encoding.TYPES]
     definitions.append(registry.FindAppliedAPIPrimDefinition(encoding.NODE_API))
     declared = {name: d.GetSchemaAttributeSpec(name) for d in definitions for name in d.GetPropertyNames()}
     for name, value_type in encoding.VALUE_TYPES.items():
@@ -96,7 +96,7 @@ class TestSchemas:
         return Usd.Stage.CreateInMemory()
 
     def test_typed_prims(self, stage):
-        for name in ("EchoSceneGraph", "EchoRelation"):
+        for name in ("EchoSceneGraph", "EchoOpening", "EchoRelation"):
             prim = stage.DefinePrim(f"/{name}", name)
             assert prim.IsA(name)
             assert not prim.IsA("Xformable")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import strategies as st
 
+from echomodel.openings import Opening, edge_lengths
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 
@@ -23,16 +25,39 @@ scalars = st.one_of(
 
 
 @st.composite
+def openings(draw: st.DrawFn, corners: np.ndarray | None, height: float | None) -> tuple[Opening, ...]:
+    """Up to three openings, each in a third of its own of a drawn wall that is long enough."""
+    lengths = np.full(4, 9.0) if corners is None else edge_lengths(corners)
+    walls = draw(st.lists(st.sampled_from(range(len(lengths))), max_size=3))
+    named = draw(st.lists(names, min_size=len(walls), max_size=len(walls), unique=True))
+    made = []
+    for third, (name, wall) in enumerate(zip(named, walls, strict=True)):
+        room = float(lengths[wall]) / 3
+        if room < 0.2 or (height or 1.0) < 0.3:
+            continue
+        width = draw(st.floats(0.1, room * 0.9))
+        offset = third * room + draw(st.floats(0, (room - width) * 0.9))
+        kind = draw(st.sampled_from(["door", "window", "passage"]))
+        hinge, swing = draw(st.sampled_from(["left", "right"])), draw(st.sampled_from(["in", "out"]))
+        sill = draw(st.floats(0, (height or 1.0) * 0.4)) if kind == "window" else 0.0
+        top = draw(st.floats(0.1, (height or 9) / 2))
+        made.append(Opening(name, kind, wall, offset, width, top, sill, hinge, swing))
+    return tuple(made)
+
+
+@st.composite
 def rooms(draw: st.DrawFn) -> RoomSpec:
-    """A room with a polygon, with extents or with neither."""
+    """A room with a polygon, with extents or with neither, and up to three openings."""
     kind = draw(st.sampled_from([kind.name for kind in WORDS.room_types]))
     height = draw(st.none() | metres)
     width, depth = draw(metres), draw(metres)
     floor = draw(st.sampled_from(["none", "size", "polygon"]))
     if floor == "polygon":
         corners = ((0.0, 0.0), (width, 0.0), (width, depth), (0.0, depth))
-        return RoomSpec(kind, floor_polygon=corners, height=height)
-    return RoomSpec(kind, size=(width, depth) if floor == "size" else None, height=height)
+        room = RoomSpec(kind, floor_polygon=corners, height=height)
+    else:
+        room = RoomSpec(kind, size=(width, depth) if floor == "size" else None, height=height)
+    return room.replaced(openings=draw(openings(room.corners, height)))
 
 
 @st.composite
