@@ -33,6 +33,7 @@ class LayoutConfig:
         width: channels of a node.
         layers: echo layers.
         drafts: how often the prediction so far is measured and told to the next layers.
+        measures: which set of measures that is: 2, with openings, headings and both ends of a pair.
         frequencies: octaves of the Fourier features of the noisy box.
         objective: what the network is trained to predict; `flow` is rectified flow.
         steps: default number of sampling steps.
@@ -42,8 +43,9 @@ class LayoutConfig:
     """
 
     width: int = 192
-    layers: int = 6
-    drafts: int = 2
+    layers: int = 8
+    drafts: int = 3
+    measures: int = 2
     frequencies: int = 4
     objective: Objective = "velocity"
     steps: int = 20

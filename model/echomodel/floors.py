@@ -56,8 +56,13 @@ def known(floor: Tensor) -> Tensor:
 
 def area(floor: Tensor) -> Tensor:
     """(S,) float32, square metres; 0 for corners on a line and where the floor is unknown."""
+    return signed_area(floor).abs()
+
+
+def signed_area(floor: Tensor) -> Tensor:
+    """(S,) float32, square metres, positive where the inside lies at (-dz, dx) of a wall (dx, dz)."""
     start, end = edges(floor)
-    return (start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]).sum(1).abs() / 2
+    return (start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]).sum(1) / 2
 
 
 def extents(floor: Tensor) -> Tensor:
@@ -90,6 +95,22 @@ def signed_distance(points: Tensor, floor: Tensor) -> Tensor:
     distance = (off - t[..., None] * along).square().sum(-1).amin(-1).clamp_min(1e-12).sqrt()
     distance = torch.where(_inside(points, start, end), distance, -distance)
     return torch.where(known(floor)[:, None], distance, torch.zeros_like(distance))
+
+
+def nearest_wall(points: Tensor, floor: Tensor) -> Tensor:
+    """(M,) heading in radians of what stands at each point with its back to the wall nearest to it, 0 where unknown.
+
+    Arguments:
+        points: (M, 2) float32, x and z. floor: (M, K, 2) float32.
+    """
+    start, end = edges(floor)
+    along, off = end - start, points[:, None] - start
+    length = along.square().sum(-1)
+    t = ((off * along).sum(-1) / length.clamp_min(1e-9)).clamp(0, 1)
+    distance = (off - t[..., None] * along).square().sum(-1) + (length < 1e-9) * FAR**2
+    wall = along.gather(1, distance.argmin(1)[:, None, None].expand(-1, 1, 2))[:, 0]
+    turn = torch.where(signed_area(floor) > 0, 1.0, -1.0)  # which side of the wall is inside
+    return torch.atan2(-wall[:, 1] * turn, wall[:, 0] * turn)
 
 
 def _inside(points: Tensor, start: Tensor, end: Tensor) -> Tensor:

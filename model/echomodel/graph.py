@@ -10,6 +10,8 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import area, centred, extents, padded, trimmed
+from echomodel.openingrows import ROW, opening_rows, padded_rows
+from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 
@@ -26,6 +28,7 @@ class GraphBatch:
         floor: (S, K, 2) float32, x and z of each floor's corners about the centre of their bounding box, metres; padded
             with NaN, all NaN = unknown.
         names: N node names, or None.
+        openings: (S, O, ROW) float32, doors and windows (`echomodel.openingrows`), padded with NaN; None = none.
 
     Raises:
         ValueError: a tensor has the wrong shape, dtype or device.
@@ -37,15 +40,19 @@ class GraphBatch:
     room_type: Tensor
     floor: Tensor
     names: tuple[str, ...] | None = None
+    openings: Tensor = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         nodes, scenes = len(self.category), len(self.room_type)
+        if self.openings is None:
+            object.__setattr__(self, "openings", self.floor.new_zeros(scenes, 0, ROW))
         expected: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
             "category": ((nodes,), torch.int64),
             "triplets": ((len(self.triplets), 3), torch.int64),
             "scene": ((nodes,), torch.int64),
             "room_type": ((scenes,), torch.int64),
             "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), torch.float32),
+            "openings": ((scenes, self.openings.shape[1] if self.openings.ndim == 3 else 0, ROW), torch.float32),
         }
         for name, (shape, dtype) in expected.items():
             tensor = getattr(self, name)
@@ -66,10 +73,12 @@ class GraphBatch:
         room_type: int = 0,
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
         names: Sequence[str] | None = None,
+        openings: Sequence[Opening] = (),
     ) -> GraphBatch:
         """One scene graph from plain lists; arguments as in the class.
 
-        `floor` is None where unknown, two extents (x, z) of a rectangle, or corners in any frame.
+        `floor` is None where unknown, two extents (x, z) of a rectangle, or corners in any frame. `openings` lie in the
+        edges of its corners, those of `echomodel.openings.rectangle` for extents; where it is unknown they are too.
         """
         nodes = torch.as_tensor(category, dtype=torch.int64).reshape(-1)
         return cls(
@@ -77,8 +86,9 @@ class GraphBatch:
             triplets=torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
             scene=torch.zeros_like(nodes),
             room_type=torch.tensor([room_type]),
-            floor=centred(floor)[None],
+            floor=(corners := centred(floor))[None],
             names=None if names is None else tuple(names),
+            openings=opening_rows(() if floor is None else openings, corners.numpy())[None],
         )
 
     @classmethod
@@ -91,6 +101,7 @@ class GraphBatch:
             torch.as_tensor([] if relations is None else relations, dtype=torch.int64).reshape(-1, 3),
             room_type=words.room_type_id(room.room_type),
             floor=room.floor_polygon if len(room.floor_polygon) else None,
+            openings=room.openings,
         )
 
     @classmethod
@@ -113,6 +124,7 @@ class GraphBatch:
             room_type=torch.cat([graph.room_type for graph in graphs]),
             floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
+            openings=padded_rows([graph.openings for graph in graphs]),
         )
 
     def unpack(self) -> list[GraphBatch]:
@@ -130,6 +142,7 @@ class GraphBatch:
                     room_type=self.room_type[number : number + 1],
                     floor=trimmed(self.floor[number : number + 1]),
                     names=None if self.names is None else self.names[start : start + count],
+                    openings=_there(self.openings[number : number + 1]),
                 )
             )
             start += count
@@ -197,6 +210,11 @@ class GraphBatch:
             middle = (used.amax(0) + used.amin(0)) / 2 if len(used) else used.new_zeros(2)
             if float(middle.abs().max()) > 1e-3:
                 raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
+
+
+def _there(rows: Tensor) -> Tensor:
+    """The rows (1, O, ROW) of one scene without padding."""
+    return rows[:, : int(torch.isfinite(rows[0, :, 0]).sum())]
 
 
 def _within(what: str, values: Tensor, size: int) -> None:

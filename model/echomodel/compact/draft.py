@@ -7,13 +7,14 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs
-from echomodel.floors import footprint, known, signed_distance, wall_distances
+from echomodel.floors import SIDES, footprint, known, nearest_wall, signed_distance, wall_distances
 
 NEAR, ROUND_ABOUT = 0.08, 0.4  # metres: two scales at which a gap is told, beside the gap itself
 FARTHEST = 20.0  # metres
 RATIO = 0.2  # likewise for logarithms of volumes and heights
-WALL_FEATURES = 3 * 12 + 1
-PAIR_FEATURES = 23
+WALL_FEATURES = 3 * 12 + 1 + 4
+PAIR_FEATURES = 23 + 24
+BACK = SIDES.index((0, -1))  # middle of the back of a footprint
 
 
 def measurable(boxes: Boxes) -> Boxes:
@@ -25,7 +26,8 @@ def wall_features(boxes: Boxes, floor: Tensor) -> Tensor:
     """Gaps to the walls at several scales, zeros where the floor is unknown: (N, WALL_FEATURES).
 
     Four gaps along the room's axes from the hull of the box, and eight of its outline to the nearest wall; negative
-    beyond the wall.
+    beyond the wall. Then how it is turned to the wall next to its back, as sine and cosine of the angle and of four
+    times that angle, which is zero for all that stands straight.
 
     Arguments:
         boxes: N boxes. floor: (N, K, 2) float32, corners of the floor under each, NaN = unknown.
@@ -34,7 +36,9 @@ def wall_features(boxes: Boxes, floor: Tensor) -> Tensor:
     outline = footprint(boxes.size, boxes.position, boxes.yaw)
     there = known(floor)[:, None].to(ahead.dtype)
     gaps = torch.cat([ahead, signed_distance(outline, floor)], dim=1) * there
-    return torch.cat([_scales(gaps), there], dim=1)
+    turn = boxes.yaw - nearest_wall(outline[:, BACK], floor)
+    turned = torch.stack([turn.sin(), turn.cos(), (4 * turn).sin(), (4 * turn).cos()], dim=1) * there
+    return torch.cat([_scales(gaps), there, turned], dim=1)
 
 
 def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
@@ -61,9 +65,32 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
             torch.tanh(mirrored / ROUND_ABOUT), torch.tanh(mirrored / NEAR),
             larger / 2, torch.tanh(larger / RATIO),
             torch.stack([sin[j] * cos[i] - cos[j] * sin[i], cos[j] * cos[i] + sin[j] * sin[i]], 1),
+            _seen_from(boxes, i, j), _seen_from(boxes, j, i),
+            torch.tanh(_across(boxes, j, i)),
+            torch.stack([(4 * (boxes.yaw[i] - boxes.yaw[j])).sin(), (4 * (boxes.yaw[i] - boxes.yaw[j])).cos()], 1),
         ],
         dim=1,
     )  # fmt: skip
+
+
+def _across(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
+    """(P, 2) metres to the side and to the front of i at which j stands."""
+    apart = (boxes.position[j] - boxes.position[i])[:, [0, 2]]
+    cos, sin = boxes.yaw[i].cos(), boxes.yaw[i].sin()
+    return torch.stack([cos * apart[:, 0] - sin * apart[:, 1], sin * apart[:, 0] + cos * apart[:, 1]], 1)
+
+
+def _seen_from(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
+    """Where j stands in the frame of i, the gaps between the two there, and the way from i's front to j: (P, 10)."""
+    place = _across(boxes, i, j)
+    turn = boxes.yaw[j] - boxes.yaw[i]
+    cos, sin = turn.cos().abs(), turn.sin().abs()
+    width, depth = boxes.size[j, 0], boxes.size[j, 2]
+    half = torch.stack([cos * width + sin * depth, sin * width + cos * depth], 1) / 2
+    gap = place.abs() - half - boxes.size[i][:, [0, 2]] / 2
+    way = place / place.square().sum(1, keepdim=True).clamp_min(1e-4).sqrt()
+    scales = [torch.tanh(numbers / scale) for numbers in (place, gap) for scale in (ROUND_ABOUT, NEAR)]
+    return torch.cat([*scales, way], 1)
 
 
 def _hull(boxes: Boxes) -> Tensor:

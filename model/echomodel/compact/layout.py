@@ -1,7 +1,8 @@
 """Layout denoiser: boxes of all objects at once, with an echo in every layer of every step (EchoScene 3.3).
 
-The first layers draft the boxes. The draft is measured as a person would measure a floor plan: gaps to the walls, and
-how each pair stands to one another. The next layers hear that and refine the draft, as often as the config says.
+The first layers draft the boxes. The draft is measured as a person would measure a floor plan: gaps to the walls, to
+doors and windows, and how each pair stands to one another. The next layers hear that and refine the draft, as often as
+the config says.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from echomodel.config import CompactConfig
 from echomodel.floors import GRID, plan_features
 from echomodel.graph import GraphBatch
 from echomodel.objectives import clean_from
+from echomodel.openingrows import OPENING_FEATURES, PLAN, clearances, room_features
 
 BOX = 8
 WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie anywhere
@@ -27,11 +29,13 @@ WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie 
 
 @dataclass(frozen=True, eq=False)
 class LayoutContext:
-    """What stays the same over all steps: `nodes` (N, width), pairs, `floor` (N, K, 2) in metres, and `scale`."""
+    """What stays the same over all steps: `nodes` (N, width), pairs, `floor` (N, K, 2) and `openings` (N, O, ROW) in
+    metres, and `scale`."""
 
     nodes: Tensor
     pairs: Pairs
     floor: Tensor
+    openings: Tensor
     scale: BoxScale
 
 
@@ -59,12 +63,14 @@ class LayoutDenoiser(nn.Module):
         self.room_type = nn.Embedding(config.room_types, width)
         self.rules = nn.Embedding(len(config.rules), width)
         self.floor = nn.Sequential(nn.Linear(6 + GRID**2, width), nn.SiLU(), nn.Linear(width, width))
+        self.opening = nn.Sequential(nn.Linear(PLAN, width), nn.SiLU(), nn.Linear(width, width))
+        self.tidy = nn.Embedding(2, width)
         self.latent = nn.Linear(config.latent.width, width)
         self.box = nn.Linear(BOX * (1 + 2 * layout.frequencies), width)
         self.known = nn.Parameter(torch.randn(width) * 0.02)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * layout.layers)
-        measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES
+        measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES + OPENING_FEATURES
         self.rounds = nn.ModuleList(
             nn.ModuleList(EchoLayer(width, 2 * config.predicates + PAIR_FEATURES * (n > 0)) for _ in range(layers))
             for n, layers in enumerate([each + rest] + [each] * layout.drafts)
@@ -74,11 +80,14 @@ class LayoutDenoiser(nn.Module):
         self.heads = nn.ModuleList(nn.Linear(width, BOX) for _ in self.rounds)
         for table in (self.category, self.room_type, self.rules):
             nn.init.normal_(table.weight, std=0.3)
-        for layer in (self.modulation, *self.heads):
+        nn.init.zeros_(self.tidy.weight)
+        for layer in (self.modulation, self.opening[-1], *self.heads):  # type: ignore[assignment]
             nn.init.zeros_(layer.weight)
             nn.init.zeros_(layer.bias)
 
-    def context(self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale) -> LayoutContext:
+    def context(
+        self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale, tidy: Tensor
+    ) -> LayoutContext:
         """Everything that does not depend on the step.
 
         Arguments:
@@ -87,10 +96,13 @@ class LayoutDenoiser(nn.Module):
             latent: (N, latent width), output of the graph manipulator.
             rules: (S,) int64, which of the config's rule sets the relations are meant in.
             scale: what the boxes' numbers stand for, node by node.
+            tidy: (S,) int64, 1 for rooms as one would show them, 0 for rooms in disorder.
         """
         room = self.room_type(graph.room_type) + self.rules(rules) + self.floor(plan_features(graph.floor))
+        openings, there = room_features(graph.openings)
+        room = room + self.tidy(tidy) + (self.opening(openings) * there[..., None]).sum(1)
         nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
-        return LayoutContext(nodes, pairs, graph.floor[graph.scene], scale)
+        return LayoutContext(nodes, pairs, graph.floor[graph.scene], graph.openings[graph.scene], scale)
 
     def forward(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> Tensor:
         return self.drafts(boxes, level, context)[-1]
@@ -114,7 +126,8 @@ class LayoutDenoiser(nn.Module):
     def _measure(self, clean: Tensor, context: LayoutContext) -> tuple[Tensor, Pairs]:
         """What the nodes (N, F) and the pairs are told about a draft of the boxes."""
         boxes = measurable(Boxes.decode(clean, context.scale))
-        features = torch.cat([box_features(clean, self.frequencies), wall_features(boxes, context.floor)], dim=1)
+        walls, openings = wall_features(boxes, context.floor), clearances(boxes, context.openings)
+        features = torch.cat([box_features(clean, self.frequencies), walls, openings], dim=1)
         told = torch.cat([context.pairs.told, pair_features(boxes, context.pairs)], dim=1)
         return features, replace(context.pairs, told=told)
 

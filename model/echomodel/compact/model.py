@@ -26,6 +26,7 @@ _SHARED = ("categories", "predicates", "room_types", "rules")
 FORMAT = "echousd-compact-1"
 _MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser}
 PARTS = tuple(_MADE)
+MEASURES = 2  # set of measures of the drafts that this version computes
 
 
 class WeightsError(ValueError):
@@ -125,6 +126,11 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
         if "layout" in parts and "drafts" not in raw["layout"]:
             raise WeightsError(f"{path}: is of an earlier version, whose layout branch did not draft; train it again")
+        if "layout" in parts and raw["layout"].get("measures", 1) != MEASURES:
+            raise WeightsError(
+                f"{path}: is of an earlier version, whose layout branch knew no doors and windows; start a training "
+                "from it with the recipe's field 'warm'"
+            )
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
         for other in set(PARTS) - set(parts):
             # settings of a part that lies in another file; an older version's may hold fields that are gone

@@ -19,7 +19,7 @@ class DataRecipe:
     name: str
     rooms: int
     styles: int
-    untidy: float = 0.3
+    untidy: float = 0.2
 
 
 RECIPES = {

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echomodel.metrics.room_figures import footprints
+from echomodel.openings import segment, swing_area
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import UnknownWord, vocabulary
 
@@ -45,6 +46,11 @@ def plot_rooms(
         axes.set_aspect("equal")
         if len(room.floor_polygon):
             axes.fill(*room.floor_polygon.T, facecolor="whitesmoke", edgecolor="black", linewidth=1.2)
+        for opening in room.openings:
+            colour = {"door": "saddlebrown", "window": "deepskyblue", "passage": "white"}[opening.kind]
+            axes.plot(*segment(room.floor_polygon, opening).T, color=colour, linewidth=3)
+            if len(swing := swing_area(room.floor_polygon, opening)):
+                axes.plot(*np.vstack([swing, swing[:1]]).T, color=colour, linewidth=0.6)
         corners = footprints(room)
         for i in np.argsort(room.position[:, 1] if len(room) else []):
             coarse = _coarse(room.categories[i])

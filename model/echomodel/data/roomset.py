@@ -1,7 +1,8 @@
 """Sets of labelled rooms on disk: sharded, memory-mapped, about half a kilobyte a room, read as rooms or as batches.
 
-A folder holds `rooms.json` (what the set is, written last) and shards `rooms-0000.bin`: a header, then four tables, one
-entry per room, object, floor corner and ordered pair of objects. A pair carries one bit per predicate and rule set.
+A folder holds `rooms.json` (what the set is, written last) and shards `rooms-0000.bin`: a header, then five tables, one
+entry per room, object, floor corner, opening and ordered pair of objects. A pair carries one bit per predicate and rule
+set.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.data.rooms import generate_rooms, untidied
+from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -24,17 +26,22 @@ if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.graph import GraphBatch
 
-MAGIC = b"ECHOROM1"
+MAGIC = b"ECHOROM2"
 RULES = ("strict", "sgfront")
 ROOM = np.dtype(
-    [("objects", "<u4"), ("corners", "<u4"), ("pairs", "<u4"), ("type", "u1"), ("held_out", "u1"), ("height", "<f4")]
+    [("objects", "<u4"), ("corners", "<u4"), ("openings", "<u4"), ("pairs", "<u4"), ("type", "u1"), ("held_out", "u1"),
+     ("untidy", "u1"), ("height", "<f4")]
 )  # fmt: skip
 OBJECT = np.dtype(
     [("category", "u1"), ("style", "<i2"), ("size", "<f4", 3), ("position", "<f4", 3), ("yaw", "<f4")]
 )  # fmt: skip
 CORNER = np.dtype(("<f4", 2))
+OPENING = np.dtype(
+    [("kind", "u1"), ("hinge", "u1"), ("swing", "u1"), ("edge", "<u2"), ("offset", "<f4"), ("width", "<f4"),
+     ("height", "<f4"), ("sill", "<f4")]
+)  # fmt: skip
 PAIR = np.dtype(("<u2", len(RULES)))
-TABLES = (("rooms", ROOM), ("objects", OBJECT), ("corners", CORNER), ("pairs", PAIR))
+TABLES = (("rooms", ROOM), ("objects", OBJECT), ("corners", CORNER), ("openings", OPENING), ("pairs", PAIR))
 ROOMS_PER_SHARD = 1000
 HELD_OUT_EVERY = 20  # every twentieth room is kept out of training
 DIGITS = 4  # a tenth of a millimetre
@@ -73,29 +80,34 @@ def build_rooms(
         last = min(first + ROOMS_PER_SHARD, count)
         if not path.exists():
             rooms: list[RoomBoxes] = []
+            shaken: list[bool] = []
             for start in range(first, last, 100):
                 drawn = generate_rooms(min(100, last - start), seed, styles=styles, start=start)
-                rooms += [_maybe_untidied(room, seed, start + k, untidy) for k, room in enumerate(drawn)]
+                shaken += [_is_untidied(seed, start + k, untidy) for k in range(len(drawn))]
+                rooms += [_untidied(r, seed, start + k) if shaken[-len(drawn) + k] else r for k, r in enumerate(drawn)]
                 if progress:
                     progress(start + min(100, last - start), count)
-            write_shard(path, rooms, first)
+            write_shard(path, rooms, first, shaken)
         elif progress:
             progress(last, count)
     _write_json(folder / "rooms.json", plan)
     return RoomSet(folder)
 
 
-def write_shard(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first: int = 0) -> None:
+def write_shard(
+    path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first: int = 0, untidy: Sequence[bool] = ()
+) -> None:
     """Label rooms (by all rule sets) and write them as one shard, complete or not at all; `first` is the number of the
-    first room in its set. Raises `UnknownWord` for a category or room type that the vocabulary does not hold."""
+    first room in its set, `untidy` says which were shaken (none where it is empty). Raises `UnknownWord` for a category
+    or room type that the vocabulary does not hold."""
     words, path = vocabulary(), Path(path)
     rooms = [_rounded(room) for room in rooms]
     labels = {rules: label_rooms(rooms, rules=rules) for rules in RULES}
     tables: dict[str, list[np.ndarray]] = {name: [] for name, _ in TABLES}
     for k, room in enumerate(rooms):
         n = len(room)
-        entry = (n, len(room.floor_polygon), n * n, words.room_type_id(room.room_type),
-                 _held_out(first + k), room.height)  # fmt: skip
+        entry = (n, len(room.floor_polygon), len(room.openings), n * n, words.room_type_id(room.room_type),
+                 _held_out(first + k), bool(untidy and untidy[k]), room.height)  # fmt: skip
         objects = np.zeros(n, OBJECT)
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
@@ -107,6 +119,7 @@ def write_shard(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first:
         tables["rooms"].append(np.array([entry], ROOM))
         tables["objects"].append(objects)
         tables["corners"].append(np.asarray(room.floor_polygon, "<f4"))
+        tables["openings"].append(np.array([_entry(opening) for opening in room.openings], OPENING))
         tables["pairs"].append(pairs)
     joined = [np.ascontiguousarray(np.concatenate(tables[name])).astype(dtype.base) for name, dtype in TABLES]
     part = path.with_suffix(".part")
@@ -139,7 +152,7 @@ class RoomSet:
     Arguments:
         directory: folder with `rooms.json` and its shards.
 
-    Attributes: `held_out` (n,) bool, `counts` (n,) objects per room, `info`, the content of `rooms.json`. Raises
+    Attributes: `held_out`, `untidy` (n,) bool, `counts` (n,) objects per room, `info`, the content of `rooms.json`. Raises
     ValueError for a folder without a finished set or with a damaged shard.
     """
 
@@ -160,9 +173,10 @@ class RoomSet:
         # Where each room's entries begin within its shard.
         self._begin = {
             name: np.concatenate([np.cumsum(table[name], dtype=np.int64) - table[name] for table in rooms])
-            for name in ("objects", "corners", "pairs")
+            for name in ("objects", "corners", "openings", "pairs")
         }
         self.held_out = self._table["held_out"].astype(bool)
+        self.untidy = self._table["untidy"].astype(bool)
         self.counts = self._table["objects"].astype(np.int64)
 
     def __len__(self) -> int:
@@ -189,6 +203,7 @@ class RoomSet:
             models=tuple(f"s{style}_{name}" if style >= 0 else "" for style, name in zip(styles, names, strict=True)),
             styles=styles,
             relations=self.relations(number, rules=rules),
+            openings=_openings(self._part("openings", number)),
         )
 
     def relations(self, number: int, *, rules: str = "strict") -> np.ndarray:
@@ -209,11 +224,13 @@ class RoomSet:
         from echomodel.boxes import Boxes
         from echomodel.floors import centred, padded
         from echomodel.graph import GraphBatch
+        from echomodel.openingrows import opening_rows, padded_rows
 
         rooms = np.asarray(rooms, np.int64)
         objects = np.concatenate([self._part("objects", k) for k in rooms])
         bits = np.concatenate([self._part("pairs", k)[:, _column(rules)] for k in rooms])
         corners = [self._part("corners", k) for k in rooms]
+        openings = [_openings(self._part("openings", k)) for k in rooms]
         counts = self.counts[rooms]
         triplets = _triplets(bits, counts, None if drop == 0.0 else (drop, rng or np.random.default_rng()))
         graph = GraphBatch(
@@ -222,6 +239,7 @@ class RoomSet:
             scene=torch.from_numpy(np.repeat(np.arange(len(rooms)), counts)),
             room_type=torch.from_numpy(self._table["type"][rooms].astype(np.int64)),
             floor=padded([centred(c)[None] for c in corners]),
+            openings=padded_rows([opening_rows(o, c)[None] for o, c in zip(openings, corners, strict=True)]),
         )
         fields = (torch.from_numpy(np.ascontiguousarray(objects[name])) for name in ("size", "position", "yaw"))
         return RoomBatch(graph, Boxes(*fields), torch.from_numpy(objects["style"].astype(np.int64)), rooms)
@@ -240,10 +258,28 @@ def _held_out(number: int) -> bool:
     return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
 
 
-def _maybe_untidied(room: RoomBoxes, seed: int, number: int, share: float) -> RoomBoxes:
-    """The room, or with probability `share` its untidy version; held-out rooms stay tidy."""
-    rng = np.random.Generator(np.random.PCG64([seed, number, 1]))
-    return room if _held_out(number) or rng.random() >= share else untidied(room, rng)
+def _is_untidied(seed: int, number: int, share: float) -> bool:
+    """With probability `share`; held-out rooms stay tidy."""
+    return not _held_out(number) and np.random.Generator(np.random.PCG64([seed, number, 1])).random() < share
+
+
+def _untidied(room: RoomBoxes, seed: int, number: int) -> RoomBoxes:
+    return untidied(room, np.random.Generator(np.random.PCG64([seed, number, 2])))
+
+
+def _entry(opening: Opening) -> tuple:
+    words = KINDS.index(opening.kind), HINGES.index(opening.hinge), SWINGS.index(opening.swing)
+    return (*words, opening.edge, opening.offset, opening.width, opening.height, opening.sill)
+
+
+def _openings(entries: np.ndarray) -> tuple[Opening, ...]:
+    found: list[Opening] = []
+    for entry in entries:
+        kind = KINDS[entry["kind"]]
+        numbers = (round(float(entry[name]), DIGITS) for name in ("offset", "width", "height", "sill"))
+        words = HINGES[entry["hinge"]], SWINGS[entry["swing"]]
+        found.append(Opening(numbered(kind, [o.name for o in found]), kind, int(entry["edge"]), *numbers, *words))
+    return tuple(found)
 
 
 def _rounded(room: RoomBoxes) -> RoomBoxes:

@@ -10,6 +10,7 @@ from echomodel.compact.draft import measurable, pair_features, wall_features
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import layout_predictor
 from echomodel.objectives import add_noise, clean_from, draw_levels, target
+from echomodel.openingrows import clearances
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import sample
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
@@ -17,6 +18,7 @@ from echomodel.vocabulary import vocabulary
 
 EMPHASIS = {5: 4.0, 6: 2.0, 7: 4.0, 12: 8.0}  # rare relations that must hit a small region: close by, above, on, mirror
 DRAFT = 0.3  # weight of each draft's own denoising loss
+OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
 SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
 
 
@@ -51,7 +53,7 @@ def layout_loss(
     level = draw_levels(batch.graph.num_scenes, generator)[batch.graph.scene] * ~known
     noise = torch.randn(clean.shape, generator=generator)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
-    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale)
+    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale, batch.tidy)
     outputs = model.layout.drafts(noisy, level, context)
     free, wanted = (~known).float(), target(clean, noise, level, objective)
     errors = [((guess - wanted).square().mean(1) * free).sum() / free.sum().clamp_min(1) for guess in outputs]
@@ -83,6 +85,8 @@ def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Ten
     own = weight * free
     boxes, truth = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw)), measurable(batch.boxes)
     walls = (wall_features(boxes, floor) - wall_features(truth, floor)).abs().mean(1)
+    openings = batch.graph.openings[batch.graph.scene]
+    walls = walls + OPENINGS * (clearances(boxes, openings) - clearances(truth, openings)).abs().mean(1)
     both = torch.minimum(weight[pairs.receiver], weight[pairs.sender]) * free[pairs.receiver]
     between = (pair_features(boxes, pairs) - pair_features(truth, pairs)).abs().mean(1)
     return (walls * own).sum() / own.sum().clamp_min(1) + (between * both).sum() / both.sum().clamp_min(1)

@@ -14,9 +14,13 @@ from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, re
 from echomodel.data.roomset import RoomSet
 from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
+from echomodel.openingrows import padded_rows
 from echomodel.roomboxes import RoomBoxes
 
 PREDICATES = 16
+DENSE = 0.4  # share of the training rooms whose graphs tell 30 to 100 % of all relations
+UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.25, 0.2
+SELDOM = 0.3  # weight of sizes and styles among the relations that a sparse graph tells
 SWAPS_X = ((3, 4),)  # mirrored along x: front <-> behind
 SWAPS_Z = ((1, 2),)  # mirrored along z: left <-> right
 
@@ -29,7 +33,8 @@ class PackedRooms:
         category (N,) int64, size, position (N, 3), yaw (N,) float32: as in `Boxes`, room frame.
         style: (N,) int64, style group, -1 = unknown.
         count: (R,) int64 nodes per room.
-        room_type: (R,) int64. floor: (R, K, 2) float32, as in `GraphBatch`. rules: (R,) int64, rule set of the labels.
+        room_type: (R,) int64. floor: (R, K, 2), openings: (R, O, ROW) float32, as in `GraphBatch`. rules: (R,) int64, rule
+            set of the labels. tidy: (R,) int64, 0 for rooms that were shaken.
         bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
     """
 
@@ -41,15 +46,18 @@ class PackedRooms:
     count: Tensor
     room_type: Tensor
     floor: Tensor
+    openings: Tensor
     rules: Tensor
+    tidy: Tensor
     bits: Tensor
 
     def __len__(self) -> int:
         return len(self.count)
 
     @classmethod
-    def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> PackedRooms:
-        """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled."""
+    def build(cls, rooms: Sequence[RoomBoxes], rules: int, untidy: np.ndarray | None = None) -> PackedRooms:
+        """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled, `untidy` (R,)
+        bool which were shaken."""
         graphs = [GraphBatch.from_room(room) for room in rooms]
         boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
         return cls(
@@ -61,7 +69,9 @@ class PackedRooms:
             count=torch.tensor([len(room) for room in rooms]),
             room_type=torch.cat([g.room_type for g in graphs]),
             floor=padded([g.floor for g in graphs]),
+            openings=padded_rows([g.openings for g in graphs]),
             rules=torch.full((len(rooms),), rules),
+            tidy=torch.ones(len(rooms), dtype=torch.int64) if untidy is None else torch.from_numpy(~untidy).long(),
             bits=torch.cat([_bits(g) for g in graphs]),
         )
 
@@ -71,12 +81,13 @@ class PackedRooms:
         mask = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
         numbers = (mask == held).nonzero()[0]
         parts = [
-            cls.build([rooms.room(int(n), rules=name) for n in numbers[start : start + 500]], number)
+            cls.build([rooms.room(int(n), rules=name) for n in some], number, rooms.untidy[some])
             for number, name in enumerate(rules)
-            for start in range(0, len(numbers), 500)
+            for some in np.split(numbers, range(500, len(numbers), 500))
         ]
+        join = {"floor": padded, "openings": padded_rows}
         joined = {f.name: [getattr(part, f.name) for part in parts] for f in fields(cls)}
-        return cls(**{name: padded(of) if name == "floor" else torch.cat(of) for name, of in joined.items()})
+        return cls(**{name: join.get(name, torch.cat)(of) for name, of in joined.items()})
 
     @property
     def boxes(self) -> Boxes:
@@ -90,7 +101,7 @@ class LayoutBatch:
 
     Arguments:
         predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
-        rules: (S,) int64. style: (N,) int64.
+        rules, tidy: (S,) int64. style: (N,) int64.
         before: relations of the pseudo graph before the edit (EchoScene 3.2, inverse strategy).
         added, touched: (N,) bool, nodes missing from the pseudo graph, and all nodes that the edit meets.
     """
@@ -100,6 +111,7 @@ class LayoutBatch:
     pairs: Pairs
     predicates: Tensor
     rules: Tensor
+    tidy: Tensor
     style: Tensor
     before: Pairs
     added: Tensor
@@ -124,24 +136,27 @@ def make_batch(rooms: PackedRooms, picked: Tensor, generator: torch.Generator, *
     scene = torch.arange(len(picked)).repeat_interleave(counts)
     holds = (bits[:, None] >> torch.arange(PREDICATES)) & 1 == 1
     position, yaw = rooms.position[nodes].clone(), rooms.yaw[nodes].clone()
-    floor = trimmed(rooms.floor[picked]).clone()
+    floor, openings = trimmed(rooms.floor[picked]).clone(), rooms.openings[picked].clone()
     pair_scene = torch.arange(len(picked)).repeat_interleave(pair_counts)
-    keep = torch.full((len(picked),), 0.5)
-    if train:
-        holds = _mirror(holds, position, yaw, floor, scene, pair_scene, generator)
-        keep = _keep_shares(holds, pair_scene, counts, generator)
-        floor[torch.rand(len(picked), generator=generator) < 0.25] = torch.nan
-    predicates = holds & (torch.rand(holds.shape, generator=generator) < keep[pair_scene, None])
     receiver, sender, scale = ordered_pairs(counts)
+    if train:
+        holds = _mirror(holds, position, yaw, floor, openings, scene, pair_scene, generator)
+        blind = torch.rand(len(picked), 2, generator=generator)
+        floor[blind[:, 0] < UNKNOWN_FLOOR] = torch.nan
+        openings[(blind[:, 0] < UNKNOWN_FLOOR) | (blind[:, 1] < UNKNOWN_OPENINGS)] = torch.nan
+    boxes = Boxes(rooms.size[nodes], position, yaw)
+    if train:
+        predicates = _thinned(holds, boxes, receiver, sender, pair_scene, counts, generator)
+    else:
+        predicates = holds & (torch.rand(holds.shape, generator=generator) < 0.5)
     pairs = Pairs(receiver, sender, _told(predicates.float(), receiver, sender, counts), scale)
     graph = GraphBatch(
         category=rooms.category[nodes], triplets=torch.zeros(0, 3, dtype=torch.int64), scene=scene,
-        room_type=rooms.room_type[picked], floor=floor,
+        room_type=rooms.room_type[picked], floor=floor, openings=openings,
     )  # fmt: skip
     before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
-    boxes = Boxes(rooms.size[nodes], position, yaw)
-    style, rules = rooms.style[nodes], rooms.rules[picked]
-    return LayoutBatch(graph, boxes, pairs, predicates, rules, style, before, added, touched)
+    kinds = {"rules": rooms.rules[picked], "tidy": rooms.tidy[picked], "style": rooms.style[nodes]}
+    return LayoutBatch(graph, boxes, pairs, predicates, before=before, added=added, touched=touched, **kinds)
 
 
 def _bits(graph: GraphBatch) -> Tensor:
@@ -160,13 +175,15 @@ def _ranges(starts: Tensor, counts: Tensor) -> Tensor:
 
 
 def _mirror(
-    holds: Tensor, position: Tensor, yaw: Tensor, floor: Tensor, scene: Tensor, pair_scene: Tensor,
+    holds: Tensor, position: Tensor, yaw: Tensor, floor: Tensor, openings: Tensor, scene: Tensor, pair_scene: Tensor,
     generator: torch.Generator,
 ) -> Tensor:  # fmt: skip
-    """Flip rooms along x and z (`position`, `yaw`, `floor` in place) and swap the words that change their meaning."""
+    """Flip rooms along x and z (`position`, `yaw`, `floor`, `openings` in place) and swap the words that change their
+    meaning."""
     flip = torch.rand(int(scene[-1]) + 1, 2, generator=generator) < 0.5
     along_x, along_z = flip[:, 0], flip[:, 1]
     floor *= 1 - 2 * flip[:, None].float()
+    openings[..., :6] *= (1 - 2 * flip[:, None].float()).repeat(1, 1, 3)
     position[:, 0] *= 1 - 2 * along_x[scene].float()
     position[:, 2] *= 1 - 2 * along_z[scene].float()
     # the front (sin yaw, cos yaw) of an object is mirrored with the room
@@ -181,14 +198,60 @@ def _mirror(
     return holds
 
 
-def _keep_shares(holds: Tensor, pair_scene: Tensor, counts: Tensor, generator: torch.Generator) -> Tensor:
-    """Share of relations to keep per room: half of the rooms as dense as SG-FRONT, half as sparse as graphs by hand."""
-    total = torch.zeros(len(counts)).index_add_(0, pair_scene, holds.sum(1).float())
-    dense = 0.3 + 0.7 * torch.rand(len(counts), generator=generator)
-    per_object = 4 * torch.rand(len(counts), generator=generator)
-    sparse = (per_object * counts / total.clamp_min(1)).clamp(max=1)
-    choice = torch.rand(len(counts), generator=generator)
-    return torch.where(choice < 0.6, dense, sparse)
+def _thinned(
+    holds: Tensor, boxes: Boxes, receiver: Tensor, sender: Tensor, pair_scene: Tensor, counts: Tensor,
+    generator: torch.Generator,
+) -> Tensor:  # fmt: skip
+    """(P, 16) bool, the relations that the graph tells: some rooms as dense as SG-FRONT, others as sparse as by hand.
+
+    By hand people relate what stands close together, so sparse graphs tell near pairs first, each by one relation.
+    """
+    scenes = len(counts)
+    dense = torch.rand(scenes, generator=generator) < DENSE
+    share = (0.3 + 0.7 * torch.rand(scenes, generator=generator)) * dense
+    kept = holds & (torch.rand(holds.shape, generator=generator) < share[pair_scene, None])
+    kind, amount = torch.rand(scenes, generator=generator), torch.rand(scenes, generator=generator)
+    each = torch.where(kind < 0.1, 0.0, torch.where(kind < 0.75, 0.4 + 1.6 * amount, 2 + 2 * amount))
+    told = (each * counts).round().long() * ~dense
+    ranked = near_first(holds & ~dense[pair_scene, None], boxes, receiver, sender, counts, generator)
+    place = torch.arange(len(ranked))
+    of = pair_scene[ranked[:, 0]]
+    first = torch.full((scenes,), len(ranked)).scatter_reduce(0, of, place, "amin")
+    chosen = ranked[place - first[of] < told[of]]
+    kept[chosen[:, 0], chosen[:, 1]] = True
+    return kept
+
+
+def near_first(
+    holds: Tensor, boxes: Boxes, receiver: Tensor, sender: Tensor, counts: Tensor, generator: torch.Generator
+) -> Tensor:
+    """(M, 2) int64, pair and predicate of every relation that holds, scene by scene, the nearest pairs' first.
+
+    All unordered pairs are told one relation before any is told a second; which one is drawn, places before sizes.
+
+    Arguments:
+        holds: (P, 16) bool over the ordered pairs `receiver`, `sender` (P,) of scenes with `counts` (S,) nodes.
+    """
+    found = holds.nonzero()
+    if not len(found):
+        return found
+    pair, predicate = found.unbind(1)
+    one, other = receiver[pair], sender[pair]
+    joined = torch.minimum(one, other) * len(boxes) + torch.maximum(one, other)
+    weight = torch.where((predicate >= 8) & (predicate != 12), SELDOM, 1.0)
+    luck = torch.rand(len(found), generator=generator) ** (1 / weight)
+    order = torch.argsort(luck, descending=True)
+    order = order[torch.argsort(joined[order], stable=True)]
+    new = torch.ones(len(order), dtype=torch.bool)
+    new[1:] = joined[order][1:] != joined[order][:-1]
+    place = torch.arange(len(order))
+    turn = place - torch.where(new, place, torch.zeros_like(place)).cummax(0).values
+    apart = (boxes.position[one] - boxes.position[other])[:, [0, 2]].norm(dim=1)
+    reach = boxes.size[:, [0, 2]].amin(1) / 2
+    gap = (apart - reach[one] - reach[other]).clamp_min(0)[order] * (1 + 0.3 * luck[order])
+    scene = torch.arange(len(counts)).repeat_interleave(counts)[one[order]]
+    key = scene.double() * 1e4 + turn.clamp(max=40) * 1e2 + gap.clamp(max=90)
+    return found[order[torch.argsort(key)]]
 
 
 def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:

@@ -21,6 +21,7 @@ from echomodel.training.rooms import PackedRooms
 from echomodel.training.shape_stage import ShapeStage
 from echomodel.training.shapes import encoded_set
 from echomodel.training.trainer import Report, Trainer, TrainingStage
+from echomodel.training.warm import warm_start
 
 _NO_BOXES = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
 
@@ -55,6 +56,8 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
             getattr(model, part).load_state_dict(getattr(given, part).state_dict())
         if "layout" in given.parts:
             model.statistics = given.statistics
+    for path in recipe.warm:
+        started += warm_start(model, Path(path))
     stage = _stage(recipe, model, started, resume, components)
     return Trainer(recipe, model, stage, folder, resume=resume, report=report)
 

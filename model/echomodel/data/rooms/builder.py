@@ -11,9 +11,14 @@ import numpy as np
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.data.rooms.floor import Floor, Wall
 
-TALL = 1.25  # metres; taller things do not stand before windows
 HALF_PI = math.pi / 2
 Size = tuple[float, float, float]
+# Metres before doors, drawers and shelves that stay free.
+ACCESS = {
+    "wardrobe": 0.6, "cabinet": 0.5, "children_cabinet": 0.5, "dresser": 0.5, "sideboard": 0.45, "bookshelf": 0.45,
+    "shelf": 0.4, "wine_cabinet": 0.45, "tv_stand": 0.4, "console_table": 0.35, "dressing_table": 0.5, "desk": 0.5,
+}  # fmt: skip
+BODY = 1.8  # metres that a free zone is high
 
 
 @dataclass(slots=True)
@@ -65,6 +70,7 @@ class Builder:
         self.size_shift = size_shift
         self.room_style = int(rng.integers(styles))
         self.items: list[Item] = []
+        self.zones: list[tuple[Item, Item]] = []  # what stays free, and whose it is
         self.wanted: dict[str, int] = {}
 
     # -- draws ---------------------------------------------------------------------------------------------------
@@ -106,13 +112,29 @@ class Builder:
             return False
         if doors and any(x0 < d[2] and x1 > d[0] and z0 < d[3] and z1 > d[1] for d in self.floor.doors):
             return False
-        if item.size[1] > TALL and any(x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1] for w in self.floor.windows):
+        for w, top in self.floor.windows:
+            if item.size[1] > top and x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1]:
+                return False
+        if any(overlaps(item, other, play) for other in self.items if other not in ignore):
             return False
-        return not any(overlaps(item, other, play) for other in self.items if other not in ignore)
+        if any(overlaps(item, zone, 0.03) for zone, owner in self.zones if owner not in ignore):
+            return False
+        zone = front_zone(item)
+        return zone is None or self.clear(zone, ignore)
+
+    def clear(self, zone: Item, ignore: tuple[Item, ...] = ()) -> bool:
+        """Whether a zone lies on the floor and nothing stands in it."""
+        rectangle = (zone.x - zone.hull_x, zone.z - zone.hull_z, zone.x + zone.hull_x, zone.z + zone.hull_z)
+        if not self.floor.holds(*rectangle):
+            return False
+        return not any(overlaps(zone, other, 0.03) for other in self.items if other not in ignore)
 
     def add(self, item: Item, style: int) -> Item:
         item.style = style
         self.items.append(item)
+        zone = front_zone(item)
+        if zone is not None:
+            self.zones.append((zone, item))
         return item
 
     def put(
@@ -186,8 +208,8 @@ class Builder:
         return self.add(found[0], style)
 
     def wall_gap(self) -> float:
-        """Gap between a back and its wall: a few centimetres, sometimes a hand's breadth."""
-        return abs(self.rng.normal(0.03, 0.025)) if self.rng.random() < 0.9 else self.uniform(0.08, 0.4)
+        """Gap between a back and its wall: a few centimetres."""
+        return min(abs(self.rng.normal(0.02, 0.02)), 0.07)
 
     def somewhere(
         self, category: str, *, size: Size | None = None, yaw: float | None = None, style: int | None = None,
@@ -204,6 +226,15 @@ class Builder:
             if placed:
                 return placed
         return None
+
+
+def front_zone(item: Item) -> Item | None:
+    """What must stay free before an item, as an item; None where it has no front to open."""
+    depth = ACCESS.get(item.category)
+    if depth is None or item.y > 0:
+        return None
+    x, z = item.local(0.0, item.size[2] / 2 + depth / 2)
+    return Item("", (0.9 * item.size[0], BODY, depth), x, 0.0, z, item.yaw)
 
 
 def overlaps(a: Item, b: Item, play: float) -> bool:

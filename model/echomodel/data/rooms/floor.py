@@ -8,9 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from echomodel.data.rooms.statistics import RoomTypeStatistics, quantile
+from echomodel.openings import STEP, WINDOW_DEPTH, Opening, numbered, overlap
 
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
-DOOR_DEPTH = 0.6
+SHARED_JAMB = 0.1  # metres of wall between two openings
+OUTWARDS, PASSAGES = 0.15, 0.12  # shares of the doors that open out of the room, and that have no leaf
+TALL, LOW = 1.15, 0.5  # metres; what is higher does not stand before windows, or before those that reach the floor
+FRENCH = 0.15  # share of the windows that reach down to the floor
 ARM = 0.3  # share of the larger rooms' outlines that have a corridor as an arm
 CORRIDOR = 1.0  # what a cut must leave of a side
 
@@ -19,7 +23,7 @@ CORRIDOR = 1.0  # what a cut must leave of a side
 class Wall:
     """A straight wall: start (x, z), unit direction, length, and the yaw of something that stands with its back to it.
 
-    The inward normal is (sin yaw, cos yaw).
+    The inward normal is (sin yaw, cos yaw); `edge` is the number of the polygon's corner at its start.
     """
 
     x: float
@@ -28,6 +32,7 @@ class Wall:
     dz: float
     length: float
     yaw: float
+    edge: int
 
     def point(self, along: float, away: float) -> tuple[float, float]:
         """The point `along` metres from the start and `away` metres into the room."""
@@ -45,8 +50,9 @@ class Floor:
         half_x, half_z: metres.
         cuts: rectangles outside the room.
         walls: the sides of the polygon.
+        openings: doors, passages and windows.
         doors: rectangles that must stay free.
-        windows: rectangles before which nothing tall may stand.
+        windows: rectangles before which nothing may stand that is higher than the number behind each, metres.
         height: metres.
     """
 
@@ -56,8 +62,9 @@ class Floor:
     height: float
     cuts: tuple[Rectangle, ...] = ()
     walls: tuple[Wall, ...] = ()
+    openings: tuple[Opening, ...] = ()
     doors: tuple[Rectangle, ...] = ()
-    windows: tuple[Rectangle, ...] = ()
+    windows: tuple[tuple[Rectangle, float], ...] = ()
     area: float = field(default=0.0)
 
     def holds(self, x0: float, z0: float, x1: float, z1: float, play: float = 0.04) -> bool:
@@ -103,11 +110,18 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
     walls = _walls(polygon)
     area = 4 * half_x * half_z - sum(w * d for w, d in sizes)
     height = float(np.round(quantile(statistics.height, rng.standard_normal()), 2))
-    doors = [_opening(walls, rng.uniform(0.8, 1.0), DOOR_DEPTH, rng) for _ in range(1 + (area > 18) + (area > 30))]
-    windows = [_opening(walls, rng.uniform(1.0, 2.0), 0.35, rng) for _ in range(1 + (area > 25))]
+    openings: list[Opening] = []
+    for _ in range(1 + (area > 18) + (area > 30)):
+        _open(openings, "passage" if openings and rng.random() < PASSAGES else "door", walls, height, rng)
+    for _ in range(1 + (area > 25)):
+        _open(openings, "window", walls, height, rng)
+    at = {wall.edge: wall for wall in walls}
+    windows = [_before(at[o.edge], o, WINDOW_DEPTH) for o in openings if o.kind == "window"]
+    tops = [TALL if o.sill > 0.5 else LOW for o in openings if o.kind == "window"]
     return Floor(
-        half_x, half_z, polygon, height, removed, walls,
-        tuple(d for d in doors if d), tuple(w for w in windows if w), area,
+        half_x, half_z, polygon, height, removed, walls, tuple(openings),
+        tuple(_before(at[o.edge], o, needed(o)) for o in openings if o.kind != "window"),
+        tuple(zip(windows, tops, strict=True)), area,
     )  # fmt: skip
 
 
@@ -181,24 +195,46 @@ def _trace(half_x: float, half_z: float, sizes: list[tuple[float, float]]) -> tu
 
 def _walls(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
     walls = []
-    for (x0, z0), (x1, z1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+    for edge, ((x0, z0), (x1, z1)) in enumerate(zip(polygon, (*polygon[1:], polygon[0]), strict=True)):
         length = math.hypot(x1 - x0, z1 - z0)
         if length < 1e-6:
             continue
         dx, dz = (x1 - x0) / length, (z1 - z0) / length
-        walls.append(Wall(x0, z0, dx, dz, length, math.atan2(-dz, dx)))  # inside is where the turn goes
+        walls.append(Wall(x0, z0, dx, dz, length, math.atan2(-dz, dx), edge))  # inside is where the turn goes
     return tuple(walls)
 
 
-def _opening(walls: tuple[Wall, ...], width: float, depth: float, rng: np.random.Generator) -> Rectangle | None:
-    """The rectangle before a door or window at a random place, or None where no wall is long enough."""
+def needed(opening: Opening) -> float:
+    """How deep the floor before a door or passage stays free, metres: its leaf's way, or a step."""
+    return opening.width if opening.kind == "door" and opening.swing == "in" else STEP
+
+
+def _open(openings: list[Opening], kind: str, walls: tuple[Wall, ...], height: float, rng: np.random.Generator) -> None:
+    """Add a door, passage or window at a random free place, or nothing where no wall is long enough."""
+    width = {"door": rng.uniform(0.8, 1.0), "passage": rng.uniform(0.9, 1.6), "window": rng.uniform(1.0, 2.0)}[kind]
+    sill, top = 0.0, 2.0 if kind == "door" else 2.1
+    if kind == "window":
+        top = rng.uniform(2.0, 2.3)
+        sill = 0.0 if rng.random() < FRENCH else rng.uniform(0.8, 1.0)
+    width, sill, top = round(width, 2), round(sill, 2), round(min(top, height - 0.1), 2)
+    hinge, swing = ("left", "right")[rng.integers(2)], "out" if rng.random() < OUTWARDS else "in"
     fits = [wall for wall in walls if wall.length > width + 0.1]
     if not fits:
-        return None
+        return
     weights = np.cumsum([wall.length for wall in fits])
-    wall = fits[int(np.searchsorted(weights, rng.random() * weights[-1]))]
-    free = wall.length - width
-    # Doors and windows like the end of a wall.
-    start = free * rng.random() if rng.random() < 0.25 else (0.08 if rng.random() < 0.5 else free - 0.08)
-    a, b = wall.point(start, 0.0), wall.point(start + width, depth)
+    for _ in range(6):
+        wall = fits[int(np.searchsorted(weights, rng.random() * weights[-1]))]
+        free = wall.length - width
+        # Doors and windows like the end of a wall.
+        start = free * rng.random() if rng.random() < 0.25 else (0.08 if rng.random() < 0.5 else free - 0.08)
+        name = numbered(kind, [other.name for other in openings])
+        one = Opening(name, kind, wall.edge, round(start, 3), width, round(top - sill, 2), sill, hinge, swing)
+        if all(overlap(one, other) < -SHARED_JAMB for other in openings if other.edge == one.edge):
+            openings.append(one)
+            return
+
+
+def _before(wall: Wall, opening: Opening, depth: float) -> Rectangle:
+    """The rectangle of `depth` metres before an opening."""
+    a, b = wall.point(opening.offset, 0.0), wall.point(opening.end, depth)
     return (min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1]))

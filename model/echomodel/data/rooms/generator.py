@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from echomodel.data.rooms.builder import Builder
 from echomodel.data.rooms.floor import sample_floor
 from echomodel.data.rooms.recipes import furnish, wanted
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
+from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 
 # Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
@@ -90,4 +92,10 @@ def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
         yaw=(yaw + math.pi) % (2 * math.pi) - math.pi,
         models=tuple(f"s{item.style}_{item.category}" for item in chosen),
         styles=tuple(item.style for item in chosen),
+        openings=tuple(_seen_in_a_mirror(o) if mirror < 0 else o for o in builder.floor.openings),
     )
+
+
+def _seen_in_a_mirror(opening: Opening) -> Opening:
+    """The opening of a mirrored room, whose corners keep their order."""
+    return replace(opening, hinge="left" if opening.hinge == "right" else "right")

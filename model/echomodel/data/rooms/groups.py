@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from echomodel.data.rooms.builder import HALF_PI, Builder, Item, Size
+from echomodel.data.rooms.builder import BODY, HALF_PI, Builder, Item, Size
 
 SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa", "sofa", "chaise_longue_sofa", "lazy_sofa")
 VANITY_SEATS = ("dressing_chair", "stool", "chair", "dining_chair", "ottoman")
 LOW_ROOM = 3.7
+GET_IN = 0.45  # metres beside a bed
 BEDS = ("double_bed", "single_bed", "kids_bed")
 
 
@@ -41,8 +42,11 @@ def bed_group(room: Builder, category: str) -> Item | None:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
         x, z = wall.point(along, size[2] / 2 + room.wall_gap())
         bed = room.put(category, size, x, z, wall.yaw, style, doors=attempt < 24)
-        if bed:
+        if bed and (_sides_kept_free(room, bed) or attempt > 24):
             break
+        if bed:
+            room.items.remove(bed)
+            bed = None
     if bed is None:
         return None
     if vanity:
@@ -56,6 +60,20 @@ def bed_group(room: Builder, category: str) -> Item | None:
             if room.beside(bed, foot, piece, room.rng.normal(0, 0.05), forward, turn, style):
                 room.take(foot)
     return bed
+
+
+def _sides_kept_free(room: Builder, bed: Item) -> bool:
+    """Keep the floor free along one long side of a bed, or along both, where a person gets in."""
+    sides = []
+    for side in (-1, 1):
+        x, z = bed.local(side * (bed.size[0] / 2 + GET_IN / 2), 0.22 * bed.size[2])
+        zone = Item("", (GET_IN, BODY, 0.5 * bed.size[2]), x, 0.0, z, bed.yaw)
+        if room.clear(zone):
+            sides.append(zone)
+    if len(sides) == 2 and (bed.size[0] < 1.4 or room.chance(0.15)):
+        sides.pop(int(room.chance(0.5)))
+    room.zones += [(zone, bed) for zone in sides]
+    return bool(sides)
 
 
 def _vanity(room: Builder, bed: Item, style: int) -> None:
@@ -74,9 +92,9 @@ def _vanity(room: Builder, bed: Item, style: int) -> None:
 def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -> None:
     if count == 0:
         return
-    gap = abs(room.rng.normal(0.0, 0.1)) - 0.085 if room.chance(0.85) else room.uniform(0.1, 0.4)
+    gap = room.uniform(-0.05, 0.04) if room.chance(0.7) else room.uniform(0.04, 0.12)
     lateral = bed.size[0] / 2 + size[0] / 2 + gap
-    shift = room.uniform(-0.14, 0.02) if room.chance(0.75) else room.uniform(0, 0.2)
+    shift = room.uniform(-0.06, 0.04) if room.chance(0.85) else room.uniform(0.04, 0.12)
     forward = -bed.size[2] / 2 + size[2] / 2 + shift
     sides = [1, -1] if room.chance(0.5) else [-1, 1]
     placed = 0
@@ -88,11 +106,9 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
                 break
         if placed == count:
             return
-    if count > 2:
-        room.against_wall("nightstand", size=size, style=style)
 
 
-def television(room: Builder, anchor: Item, nearest: float = 0.15, farthest: float = 9.0) -> Item | None:
+def television(room: Builder, anchor: Item, nearest: float = 0.3, farthest: float = 9.0) -> Item | None:
     """A tv stand at the wall that the anchor (a bed or sofa) faces, `nearest` to `farthest` metres off."""
     size = room.size("tv_stand")
     style = room.style()
@@ -125,7 +141,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
     wants_tv = room.wanted.get("tv_stand", 0) > 0
     sofa = None
     sides = 0.4 if any(room.wanted.get(table) for table in ("side_table", "round_end_table", "floor_lamp")) else 0.15
-    pulled = room.chance(0.45)
+    pulled = room.chance(0.2)
     for attempt in range(30):
         spot = room.wall_spot(size[0], 0.3 if category == "l_shaped_sofa" else 0.02, sides if attempt < 20 else 0.0)
         if spot is None:
@@ -136,7 +152,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
             end = 0.3 + abs(room.rng.normal(0.0, 0.9))
             along = size[0] / 2 + (min(end, spare) if room.chance(0.5) else max(spare - end, 0.0))
         distance, _ = room.floor.opposite(wall, along)
-        gap = abs(room.rng.normal(0.03, 0.05)) if room.chance(0.8) else room.uniform(0.1, 0.8)
+        gap = room.wall_gap()
         low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
         if attempt < 14 and not (low < distance < high):
             continue
@@ -173,8 +189,8 @@ def _coffee_table(room: Builder, sofa: Item, style: int) -> Item | None:
     turn = room.pick([0.0, math.pi, HALF_PI, -HALF_PI], [0.6, 0.24, 0.09, 0.07])
     depth = size[2] if abs(math.cos(turn)) > 0.5 else size[0]
     for attempt in range(8):
-        gap = 0.32 + room.rng.normal(0.0, 0.13) + 0.04 * attempt - inner
-        lateral = room.rng.normal(0.0, 0.1 if room.chance(0.7) else 0.35)
+        gap = min(max(0.38 + room.rng.normal(0.0, 0.06), 0.3), 0.5) - inner
+        lateral = min(max(room.rng.normal(0.0, 0.08), -0.2), 0.2)
         if inner:
             lateral += room.pick([-1, 1], [1, 1]) * sofa.size[0] * 0.12
         forward = sofa.size[2] / 2 + depth / 2 + gap
@@ -238,7 +254,7 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
                     forward = forward_table + reach * 0.6 + size[2] / 2 + room.uniform(0.3, 0.7)
                     turn = math.pi
                 if askew:  # towards the middle of the group
-                    turn = math.atan2(-lateral, forward_table - forward) + room.rng.normal(0.0, 0.3)
+                    turn = math.atan2(-lateral, forward_table - forward) + room.rng.normal(0.0, 0.06)
                 if stray:
                     turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.45, 0.28, 0.13, 0.14])
                 if room.beside(sofa, category, size, lateral, forward, turn, chair_style):
@@ -263,8 +279,6 @@ def _side_tables(room: Builder, sofa: Item, style: int) -> None:
                 lateral = side * (sofa.size[0] / 2 + size[0] / 2 + gap)
                 forward = room.rng.normal(-0.02, 0.1) if attempt < 3 else -sofa.size[2] / 2 + size[2] / 2
                 turn = room.pick([0.0, -HALF_PI, HALF_PI, math.pi], [0.42, 0.25, 0.19, 0.14])
-                if category == "floor_lamp" and room.chance(0.45):
-                    turn += room.uniform(0.12, 0.8)
                 if room.beside(sofa, category, size, lateral, forward, turn, style):
                     room.wanted[category] -= 1
                     break
@@ -335,13 +349,11 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
         places = places[:2] if room.chance(0.5) else places[2:]
     along = length / 2 + size[2] / 2 - tuck
     places += [(along, 0.0, -HALF_PI), (-along, 0.0, HALF_PI)]
-    askew = room.chance(0.06)
     for lateral, forward, turn in places:
         if count <= 0:
             return
-        turn += room.rng.normal(0.0, 0.35) if askew else 0.0
         lateral, forward = lateral + room.rng.normal(0, 0.015), forward + room.rng.normal(0, 0.015)
-        if room.beside(table, category, size, lateral, forward, turn, style, ignore=(table,), doors=False):
+        if room.beside(table, category, size, lateral, forward, turn, style, ignore=(table,)):
             count -= 1
 
 
@@ -352,7 +364,7 @@ def desk_group(
     style = room.style()
     size = room.size(category)
     desk = None
-    if category == "desk" and room.chance(0.42):
+    if category == "desk" and room.chance(0.15):
         desk = room.somewhere(category, size=size, style=style, clearance=0.3)
     desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=20, yaw=yaw)
     desk = desk or room.against_wall(category, size=size, style=style, corner=0.45, tries=12)
@@ -367,8 +379,7 @@ def seat_at(room: Builder, desk: Item, seats: tuple[str, ...], style: int) -> No
     seat = next((s for s in seats if room.wanted.get(s)), None)
     if seat:
         chair = room.size(seat)
-        forward = desk.size[2] / 2 + chair[2] / 2 - room.rng.normal(0.08, 0.1)
-        lateral = room.rng.normal(0.0, 0.12)
-        turn = math.pi if room.chance(0.85) else math.pi + room.rng.normal(0.0, 0.5)
-        if room.beside(desk, seat, chair, lateral, forward, turn, style, ignore=(desk,), doors=False):
+        forward = desk.size[2] / 2 + chair[2] / 2 - min(max(room.rng.normal(0.08, 0.08), -0.05), 0.25)
+        lateral = min(max(room.rng.normal(0.0, 0.08), -0.2), 0.2)
+        if room.beside(desk, seat, chair, lateral, forward, math.pi, style, ignore=(desk,), doors=False):
             room.wanted[seat] -= 1

@@ -100,6 +100,8 @@ def _hang(
         gap = room.pick([0.0, room.uniform(-0.4, 0.0), room.uniform(0.0, 0.6)], [0.42, 0.38, 0.2]) + low
     bottom = min(max(height - size[1] - gap, 1.2 if category == "pendant_lamp" else 1.7), height - 0.05)
     item = Item(category, size, x, bottom, z, yaw)
+    if not room.floor.holds(x - item.hull_x, z - item.hull_z, x + item.hull_x, z + item.hull_z):
+        return
     if any(overlap(item, other) for other in room.items if other.category.endswith("_lamp")):
         return
     room.add(item, room.style() if style is None else style)

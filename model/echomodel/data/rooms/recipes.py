@@ -43,6 +43,7 @@ STORAGE = (
     "children_cabinet",
 )  # fmt: skip
 SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
+DINING_CHAIRS = ("dining_chair", "chinese_chair")
 DESK_SEATS = ("office_chair", "dining_chair", "chair", "dressing_chair", "stool", "lounge_chair")
 
 
@@ -141,20 +142,34 @@ def _living_room(room: Builder) -> None:
 
 
 def _dining_room(room: Builder) -> None:
-    tables = [dining_group(room, central=True) for _ in range(room.take("dining_table"))]
+    tables = [dining_group(room, central=True) for _ in range(_tables(room))]
+    _no_chairs_without(room, tables)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, [table for table in tables if table])
 
 
 def _living_dining_room(room: Builder) -> None:
-    tables = room.take("dining_table")
+    count = _tables(room)
     sofa = _sofas(room)
-    for _ in range(tables):
-        dining_group(room)
+    _no_chairs_without(room, [dining_group(room) for _ in range(count)])
     _desks(room)
     _rest(room)
     ceiling_lamps(room, _anchors(room, sofa))
+
+
+def _tables(room: Builder) -> int:
+    """How many dining tables are wanted; several chairs ask for one."""
+    if sum(room.wanted.get(chair, 0) for chair in DINING_CHAIRS) > 1:
+        room.wanted.setdefault("dining_table", 1)
+    return room.take("dining_table")
+
+
+def _no_chairs_without(room: Builder, tables: list[Item | None]) -> None:
+    """Dining chairs stay out of a room whose table found no place."""
+    if not any(tables):
+        for chair in DINING_CHAIRS:
+            room.take(chair)
 
 
 def _study(room: Builder) -> None:
@@ -197,9 +212,8 @@ def _rest(room: Builder) -> None:
     """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
     sofa = next((item for item in room.items if item.category in (*SOFAS, *BEDS)), None)
     for _ in range(room.take("tv_stand")):
-        if sofa is None or room.chance(0.4):
-            yaw = None if sofa is None else sofa.yaw + room.pick([HALF_PI, -HALF_PI], [1, 1])
-            room.against_wall("tv_stand", corner=0.05, margin=0.2, yaw=yaw, near=sofa)
+        if sofa is None or not television(room, sofa):
+            room.against_wall("tv_stand", corner=0.05, margin=0.2, yaw=None if sofa is None else sofa.yaw + math.pi)
     table = next((item for item in room.items if item.category == "dining_table"), None)
     for category in STORAGE:
         count = room.take(category)
@@ -215,8 +229,8 @@ def _rest(room: Builder) -> None:
             _by_the_wall(room, category)
     for category in [c for c in room.wanted if c in SMALL_TABLES]:
         for _ in range(room.take(category)):
-            if category == "nightstand" or room.chance(0.5):
-                room.against_wall(category, corner=0.3, gap=abs(room.rng.normal(0.05, 0.2)), near=sofa)
+            if category != "nightstand" and room.chance(0.5):
+                room.against_wall(category, corner=0.3, near=sofa)
     on_top(room)
     for category in [c for c in room.wanted if c not in ("pendant_lamp", "ceiling_lamp")]:
         count = room.take(category)
@@ -230,8 +244,6 @@ def _by_the_wall(room: Builder, category: str) -> None:
     size, style = room.size(category), room.style()
     stands = [item for item in room.items if item.category == "tv_stand"]
     turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2])
-    if category == "floor_lamp" and room.chance(0.5):
-        turn += room.uniform(0.12, 0.75)
     sofas = [item for item in room.items if item.category in SOFAS]
     if (stands or sofas) and category == "plant" and room.chance(0.8):
         stand = (stands or sofas)[0] if room.chance(0.75) else (sofas or stands)[0]
@@ -250,15 +262,15 @@ def _by_the_wall(room: Builder, category: str) -> None:
 
 
 def _loose(room: Builder, category: str, size: tuple[float, float, float], style: int) -> None:
-    """A loose seat: near a wall with its back to it and often askew, or on open floor."""
+    """A loose seat: near a wall with its back to it, lounge chairs turned into the room now and then, or on open floor."""
     if room.chance(0.6):
         for _ in range(8):
             spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
             if spot is None:
                 break
-            x, z = spot[0].point(spot[1], size[2] / 2 + room.uniform(0.1, 0.8))
-            askew = category in ("lounge_chair", "armchair", "chair") and room.chance(0.55)
-            turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.15, 0.8) if askew else 0.0
+            askew = category in ("lounge_chair", "armchair") and room.chance(0.3)
+            turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.3, 0.8) if askew else 0.0
+            x, z = spot[0].point(spot[1], size[2] / 2 + (room.uniform(0.15, 0.3) if askew else room.uniform(0.02, 0.1)))
             if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
                 return
     room.somewhere(category, size=size, style=style)

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.roomboxes import RoomBoxes
 
-SHIFT = 0.3  # metres, largest standard deviation of a shift on the floor
+SHIFT = 0.25  # metres, largest standard deviation of a shift on the floor
 STRETCH = 0.2  # largest standard deviation of the logarithm of a size
 SWAPS = 0.3  # share of the untidy rooms in which two pieces of furniture change places
 ON_THE_FLOOR = 0.02  # metres
