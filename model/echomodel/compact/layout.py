@@ -110,17 +110,20 @@ class LayoutDenoiser(nn.Module):
     def drafts(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> list[Tensor]:
         """The drafts of the prediction, (N, 8) each, and the prediction, the last of them."""
         known = (level == 0).to(boxes.dtype)[:, None]
-        x = context.nodes + self.box(box_features(boxes, self.frequencies)) + known * self.known
+        with exactly(boxes):
+            x = context.nodes + self.box(box_features(boxes, self.frequencies)) + known * self.known
         modulations = iter(self.modulation(self.level(level_features(level))).chunk(self.layers, dim=1))
         pairs, out = context.pairs, [torch.zeros_like(boxes)]
         for number, layers in enumerate(self.rounds):
             if number:
                 draft = clean_from(out[-1].detach(), boxes, level, self.objective).clamp(-WILDEST, WILDEST)
-                features, pairs = self._measure(draft, context)
-                x = x + self.measured[number - 1](features)
+                with exactly(boxes):
+                    features, pairs = self._measure(draft, context)
+                    x = x + self.measured[number - 1](features)
             for layer in layers:  # type: ignore[attr-defined]
                 x = layer(x, pairs, next(modulations))
-            out.append(out[-1] + self.heads[number](self.norms[number](x)))
+            with exactly(boxes):
+                out.append(out[-1] + self.heads[number](self.norms[number](x)))
         return out[1:]
 
     def _measure(self, clean: Tensor, context: LayoutContext) -> tuple[Tensor, Pairs]:
@@ -130,6 +133,11 @@ class LayoutDenoiser(nn.Module):
         features = torch.cat([box_features(clean, self.frequencies), walls, openings], dim=1)
         told = torch.cat([context.pairs.told, pair_features(boxes, context.pairs)], dim=1)
         return features, replace(context.pairs, told=told)
+
+
+def exactly(x: Tensor) -> torch.autocast:
+    """Numbers that stand for centimetres are not rounded where the rest is computed in bfloat16."""
+    return torch.autocast(x.device.type, enabled=False)
 
 
 def box_features(boxes: Tensor, frequencies: int) -> Tensor:
