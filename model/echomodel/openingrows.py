@@ -51,7 +51,7 @@ def room_features(rows: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
-    """How far each box keeps from the door or passage, and from the window, that it comes nearest to, at several scales.
+    """How far each box keeps from the door or passage, and the window, that it comes nearest to, at several scales.
 
     Arguments:
         boxes: N boxes. rows: (N, O, ROW), openings of the room of each, NaN = none.

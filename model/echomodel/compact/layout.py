@@ -86,8 +86,9 @@ class LayoutDenoiser(nn.Module):
             nn.init.zeros_(layer.bias)
 
     def context(
-        self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale, tidy: Tensor
-    ) -> LayoutContext:
+        self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale,
+        tidy: Tensor | None = None,
+    ) -> LayoutContext:  # fmt: skip
         """Everything that does not depend on the step.
 
         Arguments:
@@ -96,11 +97,12 @@ class LayoutDenoiser(nn.Module):
             latent: (N, latent width), output of the graph manipulator.
             rules: (S,) int64, which of the config's rule sets the relations are meant in.
             scale: what the boxes' numbers stand for, node by node.
-            tidy: (S,) int64, 1 for rooms as one would show them, 0 for rooms in disorder.
+            tidy: (S,) int64, 1 for rooms as one would show them, 0 for rooms in disorder; None = all tidy.
         """
         room = self.room_type(graph.room_type) + self.rules(rules) + self.floor(plan_features(graph.floor))
         openings, there = room_features(graph.openings)
-        room = room + self.tidy(tidy) + (self.opening(openings) * there[..., None]).sum(1)
+        room = room + self.tidy(torch.ones_like(rules) if tidy is None else tidy)
+        room = room + (self.opening(openings) * there[..., None]).sum(1)
         nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
         return LayoutContext(nodes, pairs, graph.floor[graph.scene], graph.openings[graph.scene], scale)
 

@@ -15,8 +15,7 @@ from echomodel.samplers import Predict
 
 def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> Predict:
     """Clean boxes (N, 8) of tidy rooms in noisy ones; arguments as for `LayoutDenoiser.context`."""
-    scale, tidy = model.statistics.scale(graph.category), torch.ones_like(rules)
-    context = model.layout.context(graph, pairs, latent, rules, scale, tidy)
+    context = model.layout.context(graph, pairs, latent, rules, model.statistics.scale(graph.category))
 
     def predict(x: Tensor, level: Tensor) -> Tensor:
         return clean_from(model.layout(x, level, context), x, level, model.config.layout.objective)

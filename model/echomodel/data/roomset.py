@@ -152,7 +152,7 @@ class RoomSet:
     Arguments:
         directory: folder with `rooms.json` and its shards.
 
-    Attributes: `held_out`, `untidy` (n,) bool, `counts` (n,) objects per room, `info`, the content of `rooms.json`. Raises
+    Attributes: `held_out`, `untidy` (n,) bool, `counts` (n,) objects per room, `info`, what `rooms.json` says. Raises
     ValueError for a folder without a finished set or with a damaged shard.
     """
 

@@ -58,8 +58,8 @@ class Recipe:
         seed: seed of the initial weights and of every batch.
         data: folder that `echousd data build` made; its held-out part is for validation.
         start: weights files to start from.
-        warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: grown ones keep
-            what they had in their first rows and columns and begin with zeros in the others.
+        warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: what has
+            grown keeps what it had in its first rows and columns and begins with zeros in the others.
         frozen: parts that the stage would train but that stay as they are.
         nodes: node budget of a batch of rooms, per process. shapes_per_batch: objects per shape batch, per process.
         scenes, text: `paper` alone: scenes per batch, and where text features come from: `clip` (downloaded once), a

@@ -33,8 +33,8 @@ class PackedRooms:
         category (N,) int64, size, position (N, 3), yaw (N,) float32: as in `Boxes`, room frame.
         style: (N,) int64, style group, -1 = unknown.
         count: (R,) int64 nodes per room.
-        room_type: (R,) int64. floor: (R, K, 2), openings: (R, O, ROW) float32, as in `GraphBatch`. rules: (R,) int64, rule
-            set of the labels. tidy: (R,) int64, 0 for rooms that were shaken.
+        room_type: (R,) int64. floor: (R, K, 2), openings: (R, O, ROW) float32, as in `GraphBatch`.
+        rules: (R,) int64, rule set of the labels. tidy: (R,) int64, 0 for rooms that were shaken.
         bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
     """
 

@@ -6,19 +6,12 @@ import math
 
 import numpy as np
 
+from echomodel.data.rooms.beds import BEDS, bed_group
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item
-from echomodel.data.rooms.groups import (
-    BEDS,
-    SOFAS,
-    VANITY_SEATS,
-    bed_group,
-    desk_group,
-    dining_group,
-    sofa_group,
-    television,
-)
 from echomodel.data.rooms.lamps import ceiling_lamps, on_top
+from echomodel.data.rooms.sofas import SOFAS, sofa_group, television
 from echomodel.data.rooms.statistics import RoomTypeStatistics
+from echomodel.data.rooms.tables import VANITY_SEATS, desk_group, dining_group
 
 # Classes that the statistics do not show appear in place of a similar one with this probability.
 SUBSTITUTES = {
@@ -262,7 +255,7 @@ def _by_the_wall(room: Builder, category: str) -> None:
 
 
 def _loose(room: Builder, category: str, size: tuple[float, float, float], style: int) -> None:
-    """A loose seat: near a wall with its back to it, lounge chairs turned into the room now and then, or on open floor."""
+    """A loose seat: with its back to a wall, now and then turned into the room, or on open floor."""
     if room.chance(0.6):
         for _ in range(8):
             spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
