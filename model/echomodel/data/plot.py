@@ -47,10 +47,10 @@ def plot_rooms(
         if len(room.floor_polygon):
             axes.fill(*room.floor_polygon.T, facecolor="whitesmoke", edgecolor="black", linewidth=1.2)
         for opening in room.openings:
-            colour = {"door": "saddlebrown", "window": "deepskyblue", "passage": "white"}[opening.kind]
-            axes.plot(*segment(room.floor_polygon, opening).T, color=colour, linewidth=3)
+            shade = {"door": "saddlebrown", "window": "deepskyblue", "passage": "white"}[opening.kind]
+            axes.plot(*segment(room.floor_polygon, opening).T, color=shade, linewidth=3)
             if len(swing := swing_area(room.floor_polygon, opening)):
-                axes.plot(*np.vstack([swing, swing[:1]]).T, color=colour, linewidth=0.6)
+                axes.plot(*np.vstack([swing, swing[:1]]).T, color=shade, linewidth=0.6)
         corners = footprints(room)
         for i in np.argsort(room.position[:, 1] if len(room) else []):
             coarse = _coarse(room.categories[i])

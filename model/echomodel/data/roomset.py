@@ -276,9 +276,9 @@ def _openings(entries: np.ndarray) -> tuple[Opening, ...]:
     found: list[Opening] = []
     for entry in entries:
         kind = KINDS[entry["kind"]]
-        numbers = (round(float(entry[name]), DIGITS) for name in ("offset", "width", "height", "sill"))
-        words = HINGES[entry["hinge"]], SWINGS[entry["swing"]]
-        found.append(Opening(numbered(kind, [o.name for o in found]), kind, int(entry["edge"]), *numbers, *words))
+        offset, width, height, sill = (round(float(entry[f]), DIGITS) for f in ("offset", "width", "height", "sill"))
+        name, words = numbered(kind, [o.name for o in found]), (HINGES[entry["hinge"]], SWINGS[entry["swing"]])
+        found.append(Opening(name, kind, int(entry["edge"]), offset, width, height, sill, *words))
     return tuple(found)
 
 
