@@ -22,46 +22,49 @@ def register(app: typer.Typer) -> None:
         relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
         unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
         output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
-        seed: Annotated[int, typer.Option(help="Seed of the new randomness.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of the new randomness.", min=0, max=2**63 - 1)] = 0,
         shapes: Annotated[str, typer.Option(help="Of new objects. sdf: from the model; boxes: plain boxes.")] = "sdf",
         weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
         repair: Annotated[
             bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
         ] = True,
         force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
+        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
         """Change what a room holds; objects that the change does not touch stay byte for byte."""
-        from echousd.cli.generate import check_output, progress_bar, report
+        from echousd.cli.generate import check_output, progress_bar, report, writing
         from echousd.graph.text import relation_from_text
         from echousd.room.edit import edit as change
         from echousd.room.reading import read_room
         from echousd.room.save import save_layers, write_preview
 
-        check_output(output or room.parent, flat=False, force=force)
-        old = graph = read_room(room).graph
-        for name in remove or ():
-            graph = graph.remove_node(name)
-        for text in unrelate or ():
-            gone = relation_from_text(text)
-            graph = graph.unrelate(gone.subject, gone.predicate, gone.object)
-        for text in relabel or ():
-            graph = graph.relabel_node(*_named(text))
-        for text in add or ():
-            graph = graph.add_node(*_named(text))
-        for text in relate or ():
-            new = relation_from_text(text)
-            graph = graph.relate(new.subject, new.predicate, new.object)
-        steps = old.diff(graph).lines()
-        if not steps:
-            raise ValueError("nothing to change; use --add, --remove, --relabel, --relate or --unrelate")
-        with progress_bar() as listen:
-            made = change(
-                room, graph, seed=seed, shapes=shapes, model=weights, repair=repair, progress=listen,
-            )  # fmt: skip
-            listen("write", 0, 1)
-            root = save_layers(made, output or room.parent, force=force)
-            listen("write", 1, 1)
-            preview = write_preview(root)
+        folder = output or room.parent
+        check_output(folder, flat=False, force=force)
+        with writing(folder, flat=False, force=force, wait=wait):
+            old = graph = read_room(room).graph
+            for name in remove or ():
+                graph = graph.remove_node(name)
+            for text in unrelate or ():
+                gone = relation_from_text(text)
+                graph = graph.unrelate(gone.subject, gone.predicate, gone.object)
+            for text in relabel or ():
+                graph = graph.relabel_node(*_named(text))
+            for text in add or ():
+                graph = graph.add_node(*_named(text))
+            for text in relate or ():
+                new = relation_from_text(text)
+                graph = graph.relate(new.subject, new.predicate, new.object)
+            steps = old.diff(graph).lines()
+            if not steps:
+                raise ValueError("nothing to change; use --add, --remove, --relabel, --relate or --unrelate")
+            with progress_bar() as listen:
+                made = change(
+                    room, graph, seed=seed, shapes=shapes, model=weights, repair=repair, progress=listen,
+                )  # fmt: skip
+                listen("write", 0, 1)
+                root = save_layers(made, folder, force=force)
+                listen("write", 1, 1)
+                preview = write_preview(root)
         for step in steps:
             typer.echo(step)
         report(made, root, preview)

@@ -40,7 +40,7 @@ def register(app: typer.Typer) -> None:
                 "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
             ),
         ],
-        seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0, max=2**63 - 1)] = 0,
         preset: Annotated[
             str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
         ] = None,
@@ -67,12 +67,13 @@ def register(app: typer.Typer) -> None:
         force: Annotated[
             bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
         ] = False,
+        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
         """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD."""
         started = time.perf_counter()
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
-        with progress_bar() as listen:
+        with writing(output, flat=flat, force=force, wait=wait), progress_bar() as listen:
             gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
             try:
                 from echousd.room.pipeline import generate as make
@@ -116,10 +117,25 @@ def check_output(output: Path, *, flat: bool, force: bool) -> None:
         return
     if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
         raise ValueError(f"{output}: the output is a folder; --flat writes one file")
-    from echousd.room.folder import check_writable, claim
+    from echousd.room.folder import check_writable
 
-    claim(output, force=force)
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"{output}: is a file, the output must be a folder")
     check_writable(output)
+
+
+@contextmanager
+def writing(output: Path, *, flat: bool, force: bool, wait: bool) -> Iterator[None]:
+    """Have the folder for this process alone, from what is read of it to what is written."""
+    if flat:
+        yield
+        return
+    from echousd.room.folder import claim
+    from echousd.room.lock import locked
+
+    with locked(output, wait=wait):
+        claim(output, force=force)
+        yield
 
 
 def set_crate_version(version: str | None) -> None:

@@ -15,7 +15,7 @@ from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_
 from echousd.room.models import load_model
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.reading import SavedRoom, read_room
-from echousd.room.room import Provenance, Room, RoomOptions
+from echousd.room.room import Provenance, Room, RoomOptions, check_seed
 from echousd.room.sources import DEFAULT, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, free_name, style_groups
@@ -52,6 +52,7 @@ def edit(
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room.
     """
+    check_seed(seed)
     source, timer = shape_source(shapes), StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(root)

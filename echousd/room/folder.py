@@ -6,37 +6,33 @@ says which files move where; from then on the run can be finished by whoever com
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import shutil
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
-STAGING = ".echousd"
-JOURNAL = "journal.json"
-MANIFEST_KEY = "echousd_room"
-
-
-def digest(content: bytes) -> str:
-    """Short content hash, as the manifest records it."""
-    return hashlib.blake2b(content, digest_size=16).hexdigest()
-
-
-def find_manifest(folder: Path) -> dict | None:
-    """The manifest of the room in `folder`, or None if there is none of ours."""
-    for path in sorted(folder.glob("*.json")):
-        try:
-            raw = json.loads(path.read_text("utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError):
-            continue
-        if isinstance(raw, dict) and MANIFEST_KEY in raw and isinstance(raw.get("files"), dict):
-            return raw
-    return None
+from echousd.room.journal import (
+    STAGING,
+    Journal,
+    Move,
+    Removal,
+    digest,
+    digest_of,
+    flush,
+    read_journal,
+    write_journal,
+)
+from echousd.room.lock import LOCK, locked
+from echousd.room.manifest import find_manifest
+from echousd.room.within import inside
 
 
-def claim(folder: Path, *, force: bool) -> dict:
+def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
     """Make sure that `folder` is ours to write into, finish or discard an interrupted run, and return the old manifest.
+
+    Where several rooms lie in the folder, it is that of the room called `root` if there is one.
 
     Raises ValueError for a file in the way, or a folder that holds other things than a room of ours.
     """
@@ -45,10 +41,10 @@ def claim(folder: Path, *, force: bool) -> dict:
     if not folder.exists():
         return {}
     recover(folder)
-    manifest = find_manifest(folder)
+    manifest = find_manifest(folder, root)
     if manifest is not None:
         return manifest
-    others = sorted(entry.name for entry in folder.iterdir() if entry.name != STAGING)
+    others = sorted(entry.name for entry in folder.iterdir() if entry.name not in (STAGING, LOCK))
     if others and not force:
         shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
         raise ValueError(f"{folder}: holds {shown} and no room of EchoUSD; choose another folder or use --force")
@@ -80,23 +76,28 @@ def write_together(
         remove: relative paths that no longer belong to the room, deleted at the very end.
 
     Raises:
-        ValueError: something cannot be written; then nothing was changed.
+        ValueError: something cannot be written, or would be outside of the folder; then nothing was changed.
     """
     created = not folder.exists()
     staging = folder / STAGING
-    last = list(last)
+    last, remove = list(last), list(remove)
     order = [path for path in files if path not in last] + [path for path in last if path in files]
+    for path in (*order, *remove):
+        if inside(folder, path, "a file of the room").is_dir():
+            raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(staging, ignore_errors=True)
+        _discard(staging)
         staging.mkdir()
         changed = [path for path in order if not _holds(folder / path, files[path])]
         for number, path in enumerate(changed):
             (staging / str(number)).write_bytes(files[path])
-        gone = [path for path in remove if (folder / path).is_file()]
-        journal = {"move": [[str(number), path] for number, path in enumerate(changed)], "remove": gone}
-        (staging / "journal.new").write_text(json.dumps(journal), "utf-8")
-        (staging / "journal.new").replace(staging / JOURNAL)
+        move = [
+            Move(staged=str(number), to=path, digest=digest(files[path]), over=digest_of(folder / path))
+            for number, path in enumerate(changed)
+        ]
+        gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
+        write_journal(staging, Journal(move=move, remove=gone))
     except OSError as error:
         shutil.rmtree(folder if created else staging, ignore_errors=True)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
@@ -105,23 +106,78 @@ def write_together(
 
 
 def recover(folder: Path) -> None:
-    """Finish an interrupted run that had written its journal; discard one that had not."""
+    """Finish an interrupted run that had written its journal; discard one that had not.
+
+    Raises ValueError where that is impossible, where another process is writing, and for a journal that names anything
+    outside of the folder.
+    """
     staging = folder / STAGING
-    if not staging.is_dir():
+    if not staging.is_symlink() and not staging.is_dir():
         return
-    try:
-        if (staging / JOURNAL).is_file():
-            journal = json.loads((staging / JOURNAL).read_text("utf-8"))
-            for source, path in journal["move"]:
-                if (staging / source).exists():  # else an earlier run has moved it
-                    (folder / path).parent.mkdir(parents=True, exist_ok=True)
-                    (staging / source).replace(folder / path)
-            for path in journal["remove"]:
-                (folder / path).unlink(missing_ok=True)
-                _remove_empty((folder / path).parent, folder)
+    with locked(folder):
+        try:
+            journal = read_journal(folder)
+            if journal is not None and _whole(folder, journal):
+                _finish(folder, journal)
+            _discard(staging)
+        except OSError as error:
+            raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
+
+
+def backup_name(folder: Path, path: str) -> str:
+    """`layers/layout.edited.usda` for `layers/layout.usda`, or the first free one of `.edited_2`, `.edited_3` ..."""
+    place, number = Path(path), 1
+    while True:
+        word = "edited" if number == 1 else f"edited_{number}"
+        name = place.with_name(f"{place.stem}.{word}{place.suffix}")
+        if not os.path.lexists(folder / name):
+            return name.as_posix()
+        number += 1
+
+
+def tell_kept(folder: Path, path: str, kept: str) -> None:
+    """Warn that a file that is not ours, or was edited, is now called `kept`."""
+    warnings.warn(f"{folder / path}: not as echousd wrote it; kept as {kept}", stacklevel=3)
+
+
+def _whole(folder: Path, journal: Journal) -> bool:
+    """Whether all that is still staged is what the journal says."""
+    for entry in journal.move:
+        staged = folder / STAGING / entry.staged
+        if staged.exists() and digest_of(staged) != entry.digest:
+            warnings.warn(f"{staged}: damaged; the interrupted run is given up, generate the room again", stacklevel=3)
+            return False
+    return True
+
+
+def _finish(folder: Path, journal: Journal) -> None:
+    touched = {folder}
+    for entry in journal.move:
+        staged, place = folder / STAGING / entry.staged, folder / entry.to
+        if not staged.exists():  # an earlier run has moved it
+            continue
+        place.parent.mkdir(parents=True, exist_ok=True)
+        touched |= {place.parent, place.parent.parent}
+        if digest_of(place) not in ("", entry.over, entry.digest):  # somebody's, since the run was interrupted
+            kept = backup_name(folder, entry.to)
+            place.replace(folder / kept)
+            tell_kept(folder, entry.to, kept)
+        staged.replace(place)
+    for removal in journal.remove:
+        place = folder / removal.path
+        if digest_of(place) == removal.digest:
+            place.unlink(missing_ok=True)
+        _remove_empty(place.parent, folder)
+    for place in touched:
+        if place.is_dir():
+            flush(place)
+
+
+def _discard(staging: Path) -> None:
+    if staging.is_symlink():
+        raise ValueError(f"{staging}: is a link, where runs keep their own files; remove it")
+    if staging.exists():
         shutil.rmtree(staging)
-    except OSError as error:
-        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
 
 
 def _remove_empty(folder: Path, top: Path) -> None:

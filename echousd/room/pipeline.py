@@ -10,7 +10,7 @@ from echousd.graph import SceneGraph
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.models import check_preset, load_model
 from echousd.room.progress import Listener, StageTimer
-from echousd.room.room import Provenance, Room, RoomOptions
+from echousd.room.room import Provenance, Room, RoomOptions, check_seed
 from echousd.room.sources import DEFAULT, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
@@ -38,7 +38,7 @@ def generate(
 
     Arguments:
         graph: the graph, or a file that holds one (stage, YAML, JSON).
-        seed: of all randomness, 0 or more; equal arguments give equal rooms.
+        seed: of all randomness, 0 to 2^63 - 1; equal arguments give equal rooms.
         shapes: where geometry comes from, a name of `echousd.room.sources`: `sdf`, the model's shape branch, or plain
             `boxes`.
         model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
@@ -58,8 +58,7 @@ def generate(
     source = shape_source(shapes)
     if samples < 1 or samples > 1000:
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
-    if seed < 0:
-        raise ValueError(f"seed is {seed}, allowed: 0 or more")
+    check_seed(seed)
     check_preset(model, preset)
     timer = StageTimer(progress)
     file = ""

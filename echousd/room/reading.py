@@ -15,9 +15,11 @@ from pxr import Usd, UsdGeom
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
 from echousd.room.colliders import approximation
-from echousd.room.folder import find_manifest, recover
+from echousd.room.folder import recover
 from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
+from echousd.room.manifest import find_manifest
 from echousd.room.paths import OBJECTS, component_file, payload_file, piece_of
+from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
 
 
@@ -52,7 +54,7 @@ def read_room(root: str | Path) -> SavedRoom:
     root = Path(root)
     recover(root.parent)
     stage = open_stage(root)
-    manifest = find_manifest(root.parent)
+    manifest = find_manifest(root.parent, root.stem)
     if manifest is None:
         raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
     graph = read_graph(stage)
@@ -70,7 +72,8 @@ def read_room(root: str | Path) -> SavedRoom:
         if asset not in made:
             made[asset] = found
             carried[asset] = {
-                path: (root.parent / path).read_bytes() for path in (payload_file(asset), component_file(asset))
+                path: inside(root.parent, path, f"asset {asset!r}").read_bytes()
+                for path in (payload_file(asset), component_file(asset))
             }
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])

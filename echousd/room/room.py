@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from echousd.room.manifest import MAX_SEED
 from echousd.room.styles import style_groups
 
 if TYPE_CHECKING:
@@ -68,6 +69,15 @@ class Provenance:
     model: str = "none"
     shapes: str = "boxes"
     source: str = ""
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+
+
+def check_seed(seed: int) -> None:
+    """Raises ValueError for what a layer cannot store as a whole number."""
+    if not 0 <= seed <= MAX_SEED:
+        raise ValueError(f"seed is {seed}, allowed: 0 to {MAX_SEED}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,21 +161,24 @@ class Room:
             scene.graph.update(frame_to=name, matrix=pose, geometry=asset)
         return scene
 
-    def save(self, folder: str | Path, *, force: bool = False, preview: bool = True) -> Path:
+    def save(self, folder: str | Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
         """Write the layered room and return the path of its root layer.
 
         Arguments:
-            folder: created if need be, its name names the room; a room of ours in it is regenerated, all other files
-                stay untouched.
+            folder: created if need be, its name names the room; a room of ours in it is regenerated under the name
+                that it has. Files that somebody else wrote or edited stay, if need be under another name that a warning
+                tells.
             force: also write into a folder that holds other things than a room of ours.
             preview: draw `<name>.png` (needs the extra `render`; left out without it).
+            wait: for another process that writes this folder, instead of raising.
 
         Raises:
-            ValueError: the folder is not ours, cannot be written, or the disk is full; nothing is half-written.
+            ValueError: the folder is not ours, is being written by another process, cannot be written, or the disk is
+                full; nothing is half-written.
         """
         from echousd.room.save import save_room
 
-        return save_room(self, Path(folder), force=force, preview=preview)
+        return save_room(self, Path(folder), force=force, preview=preview, wait=wait)
 
     @property
     def stage(self) -> Usd.Stage:

@@ -6,52 +6,79 @@ import io
 import json
 import os
 import tempfile
+import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pxr import Sdf, Usd
+from pxr import Sdf
 
 import echousd
 from echousd.room import folder as folders
+from echousd.room import ownership
 from echousd.room.assets import layer_bytes
 from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
+from echousd.room.journal import flush
+from echousd.room.lock import locked
+from echousd.room.manifest import MANIFEST_KEY
 from echousd.room.room import Room
 
 
-def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True) -> Path:
+def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
     """Write the layered room and its preview; see `Room.save`."""
-    root = save_layers(room, folder, force=force)
-    if preview:
-        write_preview(root)
-    return root
+    with locked(folder, wait=wait):
+        root = save_layers(room, folder, force=force)
+        if preview:
+            write_preview(root)
+        return root
 
 
 def save_layers(room: Room, folder: Path, *, force: bool = False) -> Path:
-    """Write the layers, assets and the manifest of a room; see `Room.save`."""
-    room = replace(room, name=identifier(folder.resolve().name))
-    old = folders.claim(folder, force=force)
-    recorded: dict[str, str] = old.get("files", {})
+    """Write the layers, assets and the manifest of a room; see `Room.save`.
+
+    Warns of every file that is kept because somebody else wrote or edited it, and names it.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: is a file, the output must be a folder")
+    with locked(folder):
+        old = folders.claim(folder, force=force, root=room.name)
+        return _save_layers(room, folder, old)
+
+
+def _save_layers(room: Room, folder: Path, old: Mapping[str, Any]) -> Path:
+    recorded: dict[str, str] = dict(old.get("files", {}))
+    # A folder that was renamed or copied keeps its root's name: other layers refer to it.
+    room = replace(room, name=old.get("name") or identifier(folder.resolve().name))
+    room = replace(room, assets=ownership.free_assets(folder, room, recorded))
     files = room_files(room)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
-    for path in list(files):
-        current = _read(folder / path)
-        if current is None or path not in recorded:
-            continue
-        if folders.digest(current) in (recorded[path], folders.digest(files[path])):
-            continue
-        if path == root:
-            files[path] = _keep_root(folder / path, current, files[path])
-        else:  # a layer of ours that somebody edited: the edit is lost to the room, but not to its author
-            files[str(Path(path).with_suffix(".edited" + Path(path).suffix))] = current
-    owned = {path: folders.digest(content) for path, content in files.items() if ".edited." not in path}
+    owned = {path: folders.digest(content) for path, content in files.items()}
+    current = ownership.read(folder, root)
+    if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
+        files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
+    for path in (path for files_of in room.carried.values() for path in files_of):
+        if path in recorded and path in owned and ownership.read(folder, path) == files[path]:
+            owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
+    replaced = [path for path in files if path != root or root not in recorded] + ([] if old else [manifest])
+    kept = ownership.backups(folder, replaced, recorded, files)
+    files |= {name: ownership.read(folder, path) or b"" for path, name in kept.items() if name}
+    gone = [path for path in recorded if path not in owned]
+    needed = ownership.referenced(folder, recorded, gone, replaced)
+    owned |= {path: recorded[path] for path in needed}
     files[manifest] = (json.dumps(manifest_of(room, owned), indent=1) + "\n").encode()
-    stale = [path for path in recorded if path not in owned and _unchanged(folder / path, recorded[path])]
-    stale += [f"{old['name']}.{end}" for end in ("json", "png") if old.get("name", room.name) != room.name]
+    stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [root, manifest]
     changed = folders.write_together(folder, files, last=last, remove=stale)
+    for path, name in kept.items():
+        if name:
+            folders.tell_kept(folder, path, name)
+    for path in gone:
+        if path not in stale and (folder / path).is_file():
+            why = f"{needed[path]} refers to it" if path in needed else "it was edited"
+            warnings.warn(f"{folder / path}: no longer part of the room; kept, as {why}", stacklevel=3)
     for layer in filter(None, (Sdf.Layer.Find(str(folder / path)) for path in changed)):
         layer.Reload()  # this process holds it open, as it was before
     return folder / root
@@ -82,10 +109,13 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
 
 
 PREVIEW = 400  # pixels
+MARK = ("Software", "echousd")  # text in our previews, which other programs do not keep
 
 
 def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
+    from PIL.PngImagePlugin import PngInfo
+
     from echousd.render import QUICK, RenderUnavailable, render_file
 
     out = root.with_suffix(".png")
@@ -93,10 +123,25 @@ def write_preview(root: Path) -> Path | None:
         picture = render_file(root, view="perspective", size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
-    buffer = io.BytesIO()
-    picture.save(buffer, "PNG")
+    buffer, mark = io.BytesIO(), PngInfo()
+    mark.add_text(*MARK)
+    picture.save(buffer, "PNG", pnginfo=mark)
+    if out.is_file() and not _drawn_by_us(out):
+        kept = folders.backup_name(out.parent, out.name)
+        out.replace(out.with_name(kept))
+        folders.tell_kept(out.parent, out.name, kept)
     write_whole(out, buffer.getvalue(), left="the room itself is complete")
     return out
+
+
+def _drawn_by_us(path: Path) -> bool:
+    from PIL import Image
+
+    try:
+        with Image.open(path) as picture:
+            return picture.info.get(MARK[0]) == MARK[1]
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return False
 
 
 def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed") -> None:
@@ -109,6 +154,7 @@ def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(content)
+        flush(temporary)
         temporary.replace(path)
     except OSError as error:
         temporary.unlink(missing_ok=True)
@@ -120,7 +166,7 @@ def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
     kept = sum(v.state == "kept" for v in room.verdicts)
     broken = sum(v.state == "broken" for v in room.verdicts)
     return {
-        folders.MANIFEST_KEY: 1,
+        MANIFEST_KEY: 1,
         "name": room.name,
         "generator": f"echousd {echousd.__version__}",
         "seed": room.provenance.seed,
@@ -149,27 +195,6 @@ def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
     return {**facts, "source": origin.source, "licence": origin.licence, **credit}
 
 
-def _keep_root(path: Path, current: bytes, fresh: bytes) -> bytes:
-    """The artist's root layer with our sublayers and data brought up to date."""
-    theirs, ours = Sdf.Layer.CreateAnonymous(".usda"), Sdf.Layer.CreateAnonymous(".usda")
-    if not theirs.ImportFromString(current.decode("utf-8")) or not ours.ImportFromString(fresh.decode("utf-8")):
-        raise ValueError(f"{path}: edited by hand and no longer readable as USD; repair it or delete it")
-    axes = [Usd.Stage.Open(layer, Usd.Stage.LoadNone).GetMetadata("upAxis") for layer in (theirs, ours)]
-    if axes[0] != axes[1]:
-        raise ValueError(f"{path}: edited by hand and {axes[0]}-up; a {axes[1]}-up room needs another folder")
-    present = list(theirs.subLayerPaths)
-    theirs.subLayerPaths = present + [layer for layer in ours.subLayerPaths if layer not in present]
-    theirs.customLayerData = {**theirs.customLayerData, **ours.customLayerData}
-    return theirs.ExportToString().encode("utf-8")
-
-
-def _read(path: Path) -> bytes | None:
-    try:
-        return path.read_bytes()
-    except OSError:
-        return None
-
-
-def _unchanged(path: Path, recorded: str) -> bool:
-    content = _read(path)
-    return content is not None and folders.digest(content) == recorded
+def _digest(folder: Path, path: str) -> str:
+    content = ownership.read(folder, path)
+    return "" if content is None else folders.digest(content)

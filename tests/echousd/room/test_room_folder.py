@@ -11,6 +11,7 @@ import pytest
 from stopped_disk import stopped_disk
 
 from echousd.room.folder import STAGING, check_writable, claim, recover, write_together
+from echousd.room.lock import LOCK
 
 OLD = {"assets/a.usda": b"a old", "layers/one.usda": b"one old", "room.usda": b"root old"}
 NEW = {"assets/a.usda": b"a new", "assets/b.usda": b"b new", "layers/one.usda": b"one new", "room.usda": b"root new"}
@@ -24,7 +25,7 @@ def written(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in folder.rglob("*")
-        if path.is_file() and STAGING not in path.parts
+        if path.is_file() and STAGING not in path.parts and path.name != LOCK
     }
 
 

@@ -170,7 +170,7 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
 def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, moment):
     """Another graph is saved over a room and after some operation on the disk nothing happens, no tidying either."""
 
-    from echousd.room import folder as folders
+    from echousd.room.manifest import find_manifest
 
     folder = tmp_path / "bedroom"
     root = make(seed=1).save(folder, preview=False)
@@ -192,7 +192,7 @@ def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, mo
         )
     other.save(folder, preview=False)
     assert not (folder / STAGING).exists()
-    assert set(folders.find_manifest(folder)["assets"]) == set(other.names)
+    assert set(find_manifest(folder)["assets"]) == set(other.names)
     assert not (folder / "assets/pendant").exists()
 
 
