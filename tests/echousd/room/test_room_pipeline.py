@@ -131,7 +131,7 @@ class Empty(StandIn):
     [
         ({"shapes": "cubes"}, "shapes is 'cubes', allowed: sdf, boxes"),
         ({"samples": 0}, "samples is 0, allowed: 1 to 1000"),
-        ({"seed": -1}, "seed is -1, allowed: 0 or more"),
+        ({"seed": -1}, "seed is -1, allowed: 0 to 9223372036854775807"),
         ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),
         ({"model": Empty()}, "shape of 'bed': TSDF holds no surface"),
         ({"model": "/nowhere.safetensors"}, "/nowhere.safetensors"),
