@@ -13,6 +13,8 @@ from typing import Any
 
 SUPPORTS = ("floor", "table", "wall", "ceiling")
 ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
+# at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top
+STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near")
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Category:
         solid: its collider may be one hull; everything else has room below or inside that other things need.
         access: metres in front that must stay free, so that it can be opened or used.
         belongs_to: categories that it attends, the likeliest first.
+        stands: how it stands to them, one of `STANCES`.
         admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
             thing's smaller horizontal side.
         aliases: what people call it.
@@ -53,6 +56,7 @@ class Category:
     solid: bool = False
     access: float = 0.0
     belongs_to: tuple[str, ...] = ()
+    stands: str = ""
     admits: tuple[tuple[str, float], ...] = ()
     aliases: tuple[str, ...] = ()
 

@@ -1,0 +1,146 @@
+"""Rules of access: fronts that open, a bed that can be got into, doors that swing, windows that give light."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from echomodel.floors import known, signed_distance
+from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
+from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.plan import Plan
+
+NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
+SHARE = 0.3  # share of a front's width that may be covered
+BEDSIDE = 0.3  # metres beside a bed
+GRAZE = 0.05  # metres that furniture may reach into a door's way
+TALL = 0.3  # metres over a window's sill: what is higher takes its light
+CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
+
+
+def front_free(plan: Plan) -> Found:
+    """Doors, drawers, shelves and sofas can be reached from the front."""
+    depth = plan.numbers([kind.access for kind in plan.kinds]) * NEEDED
+    opens = (depth > 0) & plan.standing & ~plan.of("seat")  # an armchair is walked round
+    i, j = plan.pairs(opens, plan.standing & ~plan.movable)
+    other = (plan.anchor[j] != i) & (plan.anchor[i] != j)
+    low = plan.position[j, 1] + plan.size[j, 1] < 0.05  # rugs
+    i, j = i[other & ~low], j[other & ~low]
+    lateral, forward = plan.local(j, i)
+    half_width, half_depth = plan.reach(j, i)
+    clear = forward - half_depth - plan.size[i, 2] / 2
+    covered = torch.minimum(plan.size[i, 0], plan.size[i, 0] / 2 + half_width - lateral.abs())
+    behind = plan.size[i, 2] / 2 - forward  # what stands beside or behind is in no front's way
+    margin = torch.maximum(torch.maximum(clear - depth[i], SHARE * plan.size[i, 0] - covered), behind)
+    least, about = worst(i, margin, j, len(plan), 9.0)
+    who = opens.nonzero()[:, 0]
+    walls = _clear_of_walls(plan, who, depth[who])
+    margin = torch.minimum(least[who], walls)
+    return found(who, margin, other=torch.where(walls < least[who], -1, about[who]), measure=margin + depth[who])
+
+
+def _clear_of_walls(plan: Plan, who: Tensor, depth: Tensor) -> Tensor:
+    """(P,): how far the far side of the space before each front is inside the room; 9 where there are no walls."""
+    side = torch.stack([plan.yaw[who].cos(), -plan.yaw[who].sin()], -1)
+    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
+    ahead = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + depth)[:, None]
+    across = plan.size[who, 0, None] * plan.numbers([-0.25, 0.0, 0.25])
+    points = ahead[:, None] + side[:, None] * across[..., None]
+    floor = plan.floor[plan.scene[who]]
+    inside = signed_distance(points, floor).median(1).values
+    return torch.where(known(floor), inside, torch.full_like(inside, 9.0))
+
+
+def bed_side_free(plan: Plan) -> Found:
+    """At least one long side of a bed can be reached, below the nightstands."""
+    beds = plan.of("bed") & plan.standing
+    who = beds.nonzero()[:, 0]
+    i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable)
+    lateral, forward = plan.local(j, i)
+    half_width, half_depth = plan.reach(j, i)
+    # only what stands between the shoulders and the foot is in the way
+    length = plan.size[i, 2]
+    along = torch.minimum(forward + half_depth, length / 2) - torch.maximum(forward - half_depth, -length / 5)
+    out = []
+    for sign in (1.0, -1.0):
+        clear = torch.where(sign * lateral > 0, lateral.abs() - half_width - plan.size[i, 0] / 2, 9.0 + 0 * lateral)
+        margin = torch.maximum(clear - BEDSIDE, 0.4 * length - along)
+        least, _ = worst(i, margin, j, len(plan), 9.0)
+        yaw = plan.yaw[who]
+        side = torch.stack([yaw.cos(), -yaw.sin()], -1) * sign
+        points = plan.position[who][:, [0, 2]] + side * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
+        floor = plan.floor[plan.scene[who]]
+        wall = signed_distance(points[:, None], floor)[:, 0]
+        out.append(torch.minimum(least[who], torch.where(known(floor), wall, 9.0 + 0 * wall)))
+    margin = torch.maximum(*out)
+    return found(who, margin, measure=margin + BEDSIDE)
+
+
+def door_free(plan: Plan) -> Found:
+    """Doors swing, and passages are passed, without meeting furniture."""
+    return _before_openings(plan, window=False)
+
+
+def window_free(plan: Plan) -> Found:
+    """Windows are not covered by tall furniture."""
+    return _before_openings(plan, window=True)
+
+
+def _before_openings(plan: Plan, *, window: bool) -> Found:
+    rows: list[tuple[Tensor, Tensor, int]] = []
+    for scene, openings in enumerate(plan.openings):
+        corners = plan.floor[scene]
+        polygon = corners[torch.isfinite(corners).all(1)].detach().cpu().numpy()
+        for number, opening in enumerate(openings):
+            if (opening.kind == "window") != window or opening.edge >= len(polygon):
+                continue
+            who = ((plan.scene == scene) & (plan.standing | (~window & _hangs_low(plan)))).nonzero()[:, 0]
+            rows.append((who, _clearance(plan, who, polygon, opening), number))
+    if not rows:
+        none = torch.zeros(0, dtype=torch.int64)
+        return found(none, plan.size.new_zeros(0))
+    who = torch.cat([row[0] for row in rows])
+    margin = torch.cat([row[1] for row in rows])
+    about = torch.cat([torch.full_like(row[0], row[2]) for row in rows])
+    least, which = worst(who, margin, about, len(plan), 9.0)
+    met = who.unique()
+    return found(met, least[met], measure=GRAZE - least[met], words=which[met])
+
+
+def _hangs_low(plan: Plan) -> Tensor:
+    return (
+        ~plan.standing
+        & (plan.position[:, 1].detach() < CLEARANCE)
+        & (plan.size.detach().amax(1) > 0.3)
+        & (plan.of("storage", "seat", "sofa", "board", "bed"))
+    )
+
+
+def _clearance(plan: Plan, who: Tensor, polygon, opening: Opening) -> Tensor:  # type: ignore[no-untyped-def]
+    """(P,): how far boxes stay out of an opening's way, beyond what is tolerated, metres."""
+    near, far = (plan.numbers(point.tolist()) for point in segment(polygon, opening))
+    inward = plan.numbers(inward_normal(polygon, opening.edge).tolist())
+    along = (far - near) / opening.width
+    swings = opening.kind == "door" and opening.swing == "in"
+    depth = WINDOW_DEPTH if opening.kind == "window" else opening.width if swings else STEP
+    offset = plan.position[who][:, [0, 2]] - near
+    side = torch.stack([plan.yaw[who].cos(), -plan.yaw[who].sin()], -1)
+    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
+    width, length = plan.size[who, 0] / 2, plan.size[who, 2] / 2
+
+    def reach(axis: Tensor) -> Tensor:
+        return (side @ axis).abs() * width + (front @ axis).abs() * length
+
+    at, deep = offset @ along, offset @ inward
+    beside = (at - opening.width / 2).abs() - opening.width / 2 - reach(along)
+    out = torch.maximum(beside, deep - reach(inward) - depth)
+    if opening.kind == "window":
+        low = opening.sill + TALL - (plan.position[who, 1] + plan.size[who, 1])
+        return torch.maximum(out + 0.15, low)
+    if swings:  # the corner of the square that the leaf does not sweep
+        hinge, closed = (plan.numbers(point.tolist()) for point in hinge_point(polygon, opening))
+        off = plan.position[who][:, [0, 2]] - hinge
+        x = ((off @ closed).abs() - reach(closed)).clamp_min(0)
+        z = ((off @ inward).abs() - reach(inward)).clamp_min(0)
+        out = torch.maximum(out, (x.square() + z.square()).clamp_min(1e-12).sqrt() - opening.width)
+    return out + GRAZE

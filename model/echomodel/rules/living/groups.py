@@ -1,0 +1,121 @@
+"""Rules of groups: seats at their tables, the table before its sofa, nightstands at the head, the screen in view."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from echomodel.rules.living.found import Found, found
+from echomodel.rules.living.plan import FAR, Plan
+
+LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
+LOUNGE = math.radians(100.0)  # an armchair takes part in its group, it does not stare at the table
+NEAR = 1.5  # metres: a seat further from its table is judged for its distance alone
+COMPANY = 2.5  # metres: an armchair further away stands for itself
+REACH = 0.6  # metres between a seat's front and its table: 99 % of real dining chairs are nearer
+BEFORE = (0.0, 1.0)  # metres between a sofa and its coffee table, 90 % of real ones
+BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
+IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
+HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
+VIEW = math.radians(50.0)  # from a screen's own front to who watches it
+FACING = math.radians(100.0)  # from a viewer's front to the screen: beside a chaise people turn their heads
+NEAREST, FARTHEST = 0.9, 7.0  # metres between a screen and its viewer's middle
+
+
+def seat_faces(plan: Plan) -> Found:
+    """A seat that stands at a table or desk looks at it."""
+    i, j = plan.attended("at")
+    looks = (plan.gap(i, j).detach() < NEAR) & ~plan.which(lambda kind: kind.solid)[i]  # stools have no front
+    i, j = i[looks], j[looks]
+    lateral, forward = plan.nearest_point(i, j)
+    inside = (lateral.square() + forward.square()).detach() < 1e-6
+    centre = plan.local(j, i)
+    lateral, forward = _turned(lateral, forward, plan.yaw[j] - plan.yaw[i])
+    off = _angle(torch.where(inside, centre[0], lateral), torch.where(inside, centre[1], forward))
+    return found(i, LOOK - off, other=j, measure=torch.rad2deg(off))
+
+
+def seat_in_reach(plan: Plan) -> Found:
+    """A seat whose work is at a table or desk stands at it."""
+    i, j = plan.attended("at")
+    bound = ~plan.which(lambda kind: kind.solid)[i]  # stools go anywhere
+    i, j = i[bound], j[bound]
+    off = plan.gap(i, j) - plan.size[i, 2] / 2
+    return found(i, REACH - off, other=j, measure=off)
+
+
+def lounger_faces(plan: Plan) -> Found:
+    """An armchair of a group is turned towards it."""
+    i, j = plan.attended("company")
+    near = plan.gap(i, j).detach() < COMPANY
+    i, j = i[near], j[near]
+    off = _angle(*plan.local(j, i))
+    return found(i, LOUNGE - off, other=j, measure=torch.rad2deg(off))
+
+
+def table_before_sofa(plan: Plan) -> Found:
+    """A coffee table lies before its sofa, within its width and a hand's reach."""
+    i, j = plan.attended("before")
+    lateral, forward = plan.local(i, j)
+    _, half_depth = plan.reach(i, j)
+    gap = forward - half_depth - plan.size[j, 2] / 2
+    ell = plan.which(lambda kind: any(word == "coffee_table" for word, _ in kind.admits))[j]
+    least = torch.where(ell, BEFORE[0] - plan.size[j, 2] * 0.6, plan.numbers([BEFORE[0]]).expand_as(gap))
+    within = plan.size[j, 0] / 2 - lateral.abs()
+    margin = torch.stack([gap - least, BEFORE[1] - gap, within], -1)
+    return _first_of(i, j, margin, torch.stack([gap, gap, lateral.abs()], -1))
+
+
+def nightstand_at_head(plan: Plan) -> Found:
+    """Nightstands stand beside the bed at its head; of more than two the nearest two."""
+    i, j = plan.attended("head")
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    beside = lateral.abs() - half_width - plan.size[j, 0] / 2
+    back = (forward - half_depth) + plan.size[j, 2] / 2
+    rank = _rank_at(j, plan.gap(i, j).detach())
+    margin = torch.stack([BESIDE - beside, beside + IN_BED, HEAD - back.abs()], -1)
+    keep = rank < 2
+    return _first_of(i[keep], j[keep], margin[keep], torch.stack([beside, beside, back.abs()], -1)[keep])
+
+
+def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:
+    """(P,) int64: how many of the same anchor are nearer."""
+    same = anchor[:, None] == anchor[None]
+    order = torch.arange(len(anchor))
+    nearer = (distance[None] < distance[:, None]) | ((distance[None] == distance[:, None]) & (order < order[:, None]))
+    return (same & nearer).sum(1)
+
+
+def screen_in_view(plan: Plan) -> Found:
+    """A television is opposite a sofa, seat or bed, at a distance from which people watch."""
+    screens = plan.stands("opposite") | plan.of("screen")
+    i, j = plan.pairs(screens, plan.of("sofa", "bed") | plan.stands("company"))
+    if not len(i):
+        return found(i, plan.size.new_zeros(0))
+    before, back = _angle(*plan.local(j, i)), _angle(*plan.local(i, j))
+    far = (plan.position[i] - plan.position[j])[:, [0, 2]].square().sum(1).clamp_min(1e-12).sqrt()
+    angles = torch.minimum(VIEW - before, FACING - back)
+    margin = torch.minimum(torch.minimum(angles, (far - NEAREST)), FARTHEST - far)
+    best = margin.new_full((len(plan),), -FAR).scatter_reduce(0, i, margin, "amax")
+    who = i.unique()
+    return found(who, best[who])
+
+
+def _first_of(i: Tensor, j: Tensor, margin: Tensor, measure: Tensor) -> Found:
+    """Of several demands (P, Q) the one that is missed by most."""
+    least, which = margin.min(1)
+    return found(i, least, other=j, measure=measure.gather(1, which[:, None])[:, 0], words=which)
+
+
+def _turned(lateral: Tensor, forward: Tensor, turn: Tensor) -> tuple[Tensor, Tensor]:
+    """A direction in a frame that is turned by `turn` to another one, in that other one."""
+    cos, sin = turn.cos(), turn.sin()
+    return cos * lateral + sin * forward, cos * forward - sin * lateral
+
+
+def _angle(lateral: Tensor, forward: Tensor) -> Tensor:
+    """Angle between the front and a direction, 0 to pi; smooth but at the front itself."""
+    return torch.atan2((lateral.square() + 1e-12).sqrt(), forward)

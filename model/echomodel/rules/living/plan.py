@@ -1,0 +1,220 @@
+"""What living rules look at: boxes with what their words say, walls, openings and who attends whom (torch)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from echomodel.floors import edges, known
+from echomodel.openings import Opening
+from echomodel.rules.geometry import BoxesLike
+from echomodel.vocabulary import Category, vocabulary
+
+NEARNESS = ("close_by", "standing_on", "above")  # predicates that say which anchor an object attends
+FACING = np.cos(np.radians(30.0))  # a back turned further from a wall's normal does not lean on it
+FAR = 9.0  # metres, in place of the distance to something that is not there
+CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
+UNKNOWN = Category("", "", "", support="floor", role="", look="", density=0.0, ade20k="")
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """N boxes of S rooms.
+
+    Arguments:
+        kinds: N rows of the vocabulary; `UNKNOWN` for other words.
+        size, position: (N, 3) float, metres; yaw: (N,) float, radians.
+        scene: (N,) int64, room of each box.
+        floor: (S, K, 2) float, corners of the floors, padded with NaN, all NaN = unknown; in the frame of the boxes.
+        openings: doors and windows of each room.
+        triplets: (E, 3) int64, what the graphs state.
+        given: (N,) bool, boxes whose place and heading somebody stated: no rule blames them.
+    """
+
+    kinds: tuple[Category, ...]
+    size: Tensor
+    position: Tensor
+    yaw: Tensor
+    scene: Tensor
+    floor: Tensor
+    openings: tuple[tuple[Opening, ...], ...]
+    triplets: Tensor
+    given: Tensor
+
+    # -- words -------------------------------------------------------------------------------------------------------
+
+    def of(self, *roles: str) -> Tensor:
+        """(N,) bool, boxes with one of these roles."""
+        return self._mask([kind.role in roles for kind in self.kinds])
+
+    def stands(self, *stances: str) -> Tensor:
+        """(N,) bool, boxes that stand so to what they attend (`Category.stands`)."""
+        return self._mask([kind.stands in stances for kind in self.kinds])
+
+    def which(self, asked: Callable[[Category], object]) -> Tensor:
+        """(N,) bool, boxes whose row answers a question with yes."""
+        return self._mask([bool(asked(kind)) for kind in self.kinds])
+
+    def numbers(self, values: Sequence[Any]) -> Tensor:
+        """N numbers as a tensor like the boxes."""
+        return torch.tensor(values, dtype=self.size.dtype, device=self.size.device)
+
+    @cached_property
+    def movable(self) -> Tensor:
+        """(N,) bool, seats that are moved aside to open or to reach something."""
+        return self.which(lambda kind: kind.role == "seat" and not kind.access)
+
+    def _mask(self, values: Sequence[bool]) -> Tensor:
+        return torch.tensor(values, dtype=torch.bool, device=self.size.device)
+
+    @cached_property
+    def standing(self) -> Tensor:
+        """(N,) bool, boxes that stand on the floor and are in the way of legs and doors."""
+        return self.which(lambda kind: kind.support == "floor") & (self.position[:, 1].detach() < 0.3)
+
+    # -- pairs -------------------------------------------------------------------------------------------------------
+
+    def pairs(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
+        """Numbers (P,), (P,) of all ordered pairs of different boxes of one room, the first of `first` (N,) bool."""
+        together = (self.scene[:, None] == self.scene[None]) & first[:, None] & second[None]
+        together.fill_diagonal_(False)
+        i, j = together.nonzero(as_tuple=True)
+        return i, j
+
+    def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+        """(P,) and (P,): how far i's centre lies to j's +x side and before j's centre, metres."""
+        dx, dz = self.position[i, 0] - self.position[j, 0], self.position[i, 2] - self.position[j, 2]
+        cos, sin = self.yaw[j].cos(), self.yaw[j].sin()
+        return cos * dx - sin * dz, sin * dx + cos * dz
+
+    def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+        """(P,) and (P,): half extents of i along j's width and along j's front, metres."""
+        turn = self.yaw[i] - self.yaw[j]
+        cos, sin = turn.cos().abs(), turn.sin().abs()
+        width, depth = self.size[i, 0] / 2, self.size[i, 2] / 2
+        return cos * width + sin * depth, sin * width + cos * depth
+
+    def nearest_point(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+        """(P,) and (P,): lateral and forward, in j's frame, from i's centre to the nearest point of j's footprint."""
+        lateral, forward = self.local(i, j)
+        half = self.size[j][:, [0, 2]] / 2
+        return (
+            torch.minimum(torch.maximum(lateral, -half[:, 0]), half[:, 0]) - lateral,
+            torch.minimum(torch.maximum(forward, -half[:, 1]), half[:, 1]) - forward,
+        )
+
+    def gap(self, i: Tensor, j: Tensor) -> Tensor:
+        """(P,): distance from i's centre to j's footprint, 0 inside it, metres."""
+        lateral, forward = self.nearest_point(i, j)
+        return (lateral.square() + forward.square()).clamp_min(1e-12).sqrt()
+
+    @cached_property
+    def anchor(self) -> Tensor:
+        """(N,) int64, the object that each one attends, -1 = none: as the graph states, else the nearest."""
+        names = [kind.name for kind in self.kinds]
+        table = [b in kind.belongs_to for kind in self.kinds for b in names]
+        belongs = self._mask(table).reshape(len(self), len(self))
+        together = (self.scene[:, None] == self.scene[None]) & belongs
+        together.fill_diagonal_(False)
+        cost = torch.full(together.shape, torch.inf, dtype=self.size.dtype)
+        i, j = together.nonzero(as_tuple=True)
+        with torch.no_grad():
+            centre = (self.position[i] - self.position[j])[:, [0, 2]].norm(dim=1)
+            cost[i, j] = (self.gap(i, j) + 0.05 * centre).to(cost)
+        for predicate in NEARNESS:
+            chosen = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
+            for a, b in ((0, 2), (2, 0)):
+                cost[chosen[:, a], chosen[:, b]] -= 100.0
+        if not len(self):
+            return torch.zeros(0, dtype=torch.int64)
+        best, found = cost.min(1)
+        return torch.where(torch.isfinite(best), found, -1)
+
+    def attended(self, *stances: str) -> tuple[Tensor, Tensor]:
+        """Numbers (P,), (P,) of the boxes that stand so to what they attend, and of what that is."""
+        i = ((self.anchor >= 0) & self.stands(*stances)).nonzero()[:, 0]
+        return i, self.anchor[i]
+
+    # -- walls -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def walls(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Start (S, K, 2), direction (S, K, 2), inward normal (S, K, 2) and length (S, K) of the walls; 0 = none."""
+        start, end = edges(self.floor)
+        along = end - start
+        length = along.norm(dim=-1)
+        length = torch.where(length > 1e-3, length, torch.zeros_like(length))
+        along = along / length.clamp_min(1e-3)[..., None]
+        area = (start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]).sum(1)
+        normal = torch.stack([-along[..., 1], along[..., 0]], -1) * torch.sign(area)[:, None, None]
+        length = length * known(self.floor)[:, None]
+        return start, along, normal, length
+
+    @cached_property
+    def back_gap(self) -> Tensor:
+        """(N,): distance between each back and the wall behind it, metres; `FAR` where there is none."""
+        start, along, normal, length = (of[self.scene] for of in self.walls)
+        front = torch.stack([self.yaw.sin(), self.yaw.cos()], -1)[:, None]
+        side = torch.stack([self.yaw.cos(), -self.yaw.sin()], -1)[:, None]
+        offset = self.position[:, None, [0, 2]] - start
+        reach = (normal * side).sum(-1).abs() * self.size[:, None, 0] / 2
+        reach = reach + (normal * front).sum(-1).abs() * self.size[:, None, 2] / 2
+        gap = (offset * normal).sum(-1) - reach
+        at = (offset * along).sum(-1)
+        behind = (length > 0) & ((normal * front).sum(-1) > FACING) & (at > -0.1) & (at < length + 0.1) & (gap > -1.0)
+        return torch.where(behind, gap.abs(), torch.full_like(gap, FAR)).amin(1)
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+
+def plan_of(
+    boxes: BoxesLike,
+    categories: Sequence[str],
+    floor: np.ndarray | Tensor | None = None,
+    openings: Sequence[Opening] = (),
+    relations: np.ndarray | Tensor | None = None,
+    *,
+    given: np.ndarray | None = None,
+    dtype: torch.dtype = torch.float64,
+) -> Plan:
+    """The plan of one room.
+
+    Arguments:
+        boxes: N boxes, metres and radians, arrays or tensors. categories: N words; those outside the vocabulary are in
+            the way of others and obey no rule.
+        floor: (k, 2) float, corners (x, z) in the frame of the boxes, None = unknown.
+        openings: doors and windows in its edges. relations: (E, 3) int, [subject, predicate id, object].
+        given: (N,) bool, boxes that no rule blames.
+    """
+    corners = torch.full((1, 4, 2), torch.nan, dtype=dtype)
+    if floor is not None and len(floor):
+        corners = torch.as_tensor(np.asarray(floor), dtype=dtype)[None]
+    size = torch.as_tensor(boxes.size).to(dtype)
+    none = np.zeros(len(size), bool)
+    triplets = np.zeros((0, 3), int) if relations is None else np.asarray(relations)
+    return Plan(
+        tuple(kind_of(word) for word in categories),
+        size,
+        torch.as_tensor(boxes.position).to(dtype),
+        torch.as_tensor(boxes.yaw).to(dtype),
+        torch.zeros(len(size), dtype=torch.int64),
+        corners,
+        (tuple(openings),),
+        torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
+        torch.as_tensor(none if given is None else np.asarray(given, bool)),
+    )
+
+
+def kind_of(word: str) -> Category:
+    """The row of a word, `UNKNOWN` where the vocabulary has none."""
+    try:
+        return vocabulary().category(word)
+    except ValueError:
+        return UNKNOWN

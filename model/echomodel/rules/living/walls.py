@@ -1,0 +1,42 @@
+"""Rules of walls: furniture stands parallel to them, and what belongs at a wall touches it."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from echomodel.rules.living.found import Found, found
+from echomodel.rules.living.plan import FAR, Plan
+
+CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
+TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
+PASSAGE = 0.75  # metres: a sofa so far from the wall stands in the room on purpose, one walks behind it
+
+
+def parallel(plan: Plan) -> Found:
+    """Storage, beds, sofas, tables and desks stand parallel to a wall."""
+    who = (plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company")).nonzero()[:, 0]
+    _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
+    wall = torch.atan2(-along[..., 1], along[..., 0])
+    off = _from_quarter(plan.yaw[who, None] - wall)
+    off = torch.where(length > 0.3, off, torch.full_like(off, math.pi / 4)).amin(1)
+    off = torch.where((length > 0).any(1), off, _from_quarter(plan.yaw[who]))
+    return found(who, CROOKED - off, measure=torch.rad2deg(off))
+
+
+def _from_quarter(angle: Tensor) -> Tensor:
+    """How far an angle is from the nearest quarter turn, radians."""
+    return torch.atan2((4 * angle).sin(), (4 * angle).cos()).abs() / 4
+
+
+def at_wall(plan: Plan) -> Found:
+    """What belongs at a wall has its back to one; a nightstand's place is the head of its bed."""
+    wall = plan.which(lambda kind: kind.wall)
+    beside = plan.stands("head") & (plan.anchor >= 0)
+    there = (plan.walls[3] > 0).any(1)[plan.scene]
+    who = (wall & plan.standing & ~beside & there).nonzero()[:, 0]
+    gap = plan.back_gap[who]
+    free = plan.of("sofa")[who] & (gap >= PASSAGE)
+    return found(who, torch.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=(gap < FAR).long())

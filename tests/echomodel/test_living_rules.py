@@ -1,0 +1,185 @@
+"""Living rules: one room that a person would live in, and each thing that a person would point at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.data.rooms.generator import generate_rooms
+from echomodel.openings import Opening
+from echomodel.rules.living import RULES, faults, faults_of, missed, plan_of
+from echomodel.rules.living.ways import ways
+
+FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
+HALF = np.pi / 2
+
+
+@dataclass
+class Room:
+    """Boxes by name: category, size, (x, z), yaw; all on the floor but for lamps."""
+
+    things: dict
+
+    def moved(self, name, **fields):
+        """The same room with one thing changed."""
+        return Room({**self.things, name: {**self.things[name], **fields}})
+
+    def found(self, **kwargs):
+        """(name, rule) of every fault."""
+        names = list(self.things)
+        rows = list(self.things.values())
+
+        class Boxes:
+            size = np.array([row["size"] for row in rows], float)
+            position = np.array([(row["at"][0], row.get("up", 0.0), row["at"][1]) for row in rows], float)
+            yaw = np.array([row.get("yaw", 0.0) for row in rows], float)
+
+        options = {"floor": FLOOR, **kwargs}
+        out = faults(Boxes, [row["kind"] for row in rows], **options)
+        return {(names[f.object], f.rule): f.sentence(names) for f in out}
+
+
+BEDROOM = Room({
+    "bed": {"kind": "double_bed", "size": (1.8, 1.0, 2.1), "at": (0.0, -0.93)},
+    "left": {"kind": "nightstand", "size": (0.5, 0.5, 0.4), "at": (-1.2, -1.78)},
+    "right": {"kind": "nightstand", "size": (0.5, 0.5, 0.4), "at": (1.2, -1.78)},
+    "wardrobe": {"kind": "wardrobe", "size": (1.8, 2.2, 0.6), "at": (-2.18, 1.0), "yaw": HALF},
+    "pendant": {"kind": "pendant_lamp", "size": (0.5, 0.6, 0.5), "at": (0.0, 0.0), "up": 2.0},
+    "lamp": {"kind": "table_lamp", "size": (0.3, 0.5, 0.3), "at": (1.2, -1.78), "up": 0.5},
+})  # fmt: skip
+LIVING = Room({
+    "sofa": {"kind": "multi_seat_sofa", "size": (2.2, 0.85, 0.9), "at": (0.0, -1.53)},
+    "coffee": {"kind": "coffee_table", "size": (1.1, 0.4, 0.6), "at": (0.0, -0.4)},
+    "stand": {"kind": "tv_stand", "size": (1.8, 0.5, 0.4), "at": (0.0, 1.78), "yaw": np.pi},
+    "armchair": {"kind": "armchair", "size": (0.8, 0.8, 0.8), "at": (1.5, -0.3), "yaw": -HALF},
+})  # fmt: skip
+DINING = Room({
+    "table": {"kind": "dining_table", "size": (1.4, 0.75, 0.9), "at": (0.0, 0.0)},
+    "chair": {"kind": "dining_chair", "size": (0.5, 0.9, 0.5), "at": (0.3, 0.6), "yaw": np.pi},
+    "sideboard": {"kind": "sideboard", "size": (1.4, 0.9, 0.4), "at": (0.0, -1.78)},
+    "pendant": {"kind": "pendant_lamp", "size": (0.5, 0.6, 0.5), "at": (0.0, 0.0), "up": 2.0},
+})  # fmt: skip
+
+
+@pytest.mark.parametrize("room", [BEDROOM, LIVING, DINING], ids=["bedroom", "living", "dining"])
+def test_a_tidy_room_has_no_fault(room):
+    assert room.found() == {}
+
+
+FAULTS = [
+    (BEDROOM.moved("wardrobe", yaw=HALF + 0.4), ("wardrobe", "parallel"), "wardrobe is turned by 23 degrees"),
+    (BEDROOM.moved("wardrobe", at=(-1.6, 1.0)), ("wardrobe", "at_wall"), "wardrobe stands 0.60 m off the wall"),
+    (BEDROOM.moved("left", at=(-1.2, 1.0)), ("left", "nightstand_at_head"), "m from the head of bed"),
+    (BEDROOM.moved("left", at=(-2.2, -1.78)), ("left", "nightstand_at_head"), "left stands 1.05 m beside bed"),
+    (BEDROOM.moved("wardrobe", at=(-1.32, -0.3), yaw=HALF), ("wardrobe", "front_free"), "the front of wardrobe"),
+    (BEDROOM.moved("bed", size=(1.8, 1.0, 3.2)), ("bed", "scale"), "bed is 3.20 m deep"),
+    (BEDROOM.moved("lamp", up=0.0), ("lamp", "lamp_on_surface"), "lamp stands on nothing"),
+    (LIVING.moved("coffee", at=(1.5, -0.4)), ("coffee", "table_before_sofa"), "beside the middle of sofa"),
+    (LIVING.moved("coffee", at=(0.0, 0.8)), ("coffee", "table_before_sofa"), "coffee lies 1.58 m before sofa"),
+    (LIVING.moved("stand", yaw=0.0), ("stand", "screen_in_view"), "stand faces no seat"),
+    (LIVING.moved("armchair", yaw=HALF), ("armchair", "lounger_faces"), "armchair turns its back on sofa"),
+    (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
+    (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
+    (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
+]
+
+
+@pytest.mark.parametrize(
+    ("room", "fault", "said"), FAULTS, ids=[f"{f[1][0]}-{f[1][1]}-{i}" for i, f in enumerate(FAULTS)]
+)
+def test_what_a_person_points_at_is_a_fault_with_a_sentence(room, fault, said):
+    found = room.found()
+    assert fault in found
+    assert said in found[fault]
+
+
+def test_a_bed_between_two_walls_cannot_be_got_into():
+    narrow = np.array([(-1.0, -2.0), (1.0, -2.0), (1.0, 2.0), (-1.0, 2.0)])
+    assert ("bed", "bed_side_free") in Room({"bed": BEDROOM.things["bed"]}).found(floor=narrow)
+
+
+def test_doors_swing_free_and_windows_are_not_covered():
+    door = Opening("door", "door", 3, 0.3, 0.9, 2.0)  # the left wall, from the corner behind the wardrobe
+    window = Opening("window", "window", 3, 0.3, 1.4, 1.3, sill=0.9)
+    found = BEDROOM.found(openings=(door,))
+    assert "wardrobe reaches 0.88 m into the way of a door" in found["wardrobe", "door_free"]
+    assert found.keys() - {("wardrobe", "door_free")} == set()
+    assert set(BEDROOM.found(openings=(window,))) == {("wardrobe", "window_free")}
+    low = BEDROOM.moved("wardrobe", size=(1.8, 0.9, 0.6))
+    assert ("wardrobe", "window_free") not in low.found(openings=(window,))
+
+
+def test_what_the_graph_states_decides_whom_a_seat_attends():
+    two = Room({**DINING.things, "desk": {"kind": "desk", "size": (1.2, 0.75, 0.6), "at": (1.8, 1.7), "yaw": np.pi}})
+    names = list(two.things)
+    close = np.array([(names.index("chair"), 5, names.index("desk"))])
+    assert ("chair", "seat_in_reach") not in two.found()
+    assert ("chair", "seat_in_reach") in two.found(relations=close)
+
+
+def test_what_was_given_is_not_blamed():
+    room = BEDROOM.moved("wardrobe", yaw=HALF + 0.4)
+    given = np.array([name == "wardrobe" for name in room.things])
+    assert not [key for key in room.found(given=given) if key[0] == "wardrobe"]
+
+
+def test_a_piece_behind_others_cannot_be_walked_to():
+    wall = {"kind": "sideboard", "size": (5.0, 0.9, 0.4), "at": (0.0, 0.0)}
+    room = Room(
+        {"shelf": {"kind": "bookshelf", "size": (1.0, 1.8, 0.35), "at": (0.0, 1.8), "yaw": np.pi}, "wall": wall}
+    )
+    door = Opening("door", "door", 0, 2.0, 0.9, 2.0)
+    assert ("shelf", "reached") in room.found(openings=(door,))
+    assert ("shelf", "reached") not in room.moved("wall", size=(3.0, 0.9, 0.4)).found(openings=(door,))
+
+
+def test_the_walkable_share_counts_what_the_robot_gets_to():
+    block = np.array([[5.0, 1.0, 0.4]]), np.array([[0.0, 0.0, 0.5]]), np.zeros(1)
+    door = Opening("door", "door", 0, 2.0, 0.9, 2.0)
+    found = ways(*block, np.ones(1, bool), FLOOR, (door,))
+    front, behind = 2.3 - 0.4, 1.3 - 0.4  # depths of the two halves less the robot's radius at both sides
+    assert found.share == pytest.approx(front / (front + behind), abs=0.03)
+    assert found.reached.all()
+
+
+@pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
+def test_margins_have_finite_slopes(rule):
+    room = generate_rooms(1, 5, room_type="living_dining_room")[0]
+    door = Opening("door", "door", 0, 0.2, 0.9, 2.0)
+    plan = plan_of(room, room.categories, room.floor_polygon, (door,))
+    free = [value.clone().requires_grad_() for value in (plan.size, plan.position, plan.yaw)]
+    for field, value in zip(("size", "position", "yaw"), free, strict=True):
+        object.__setattr__(plan, field, value)
+    margin = rule.find(plan).margin
+    if margin.requires_grad:
+        slopes = torch.autograd.grad(margin.sum(), free, allow_unused=True)
+        assert all(bool(torch.isfinite(slope).all()) for slope in slopes if slope is not None)
+
+
+def test_several_rooms_at_once_are_judged_as_one_by_one():
+    rooms = generate_rooms(6, 11)
+    plans = [plan_of(room, room.categories, room.floor_polygon) for room in rooms]
+    start, packed, alone = 0, [], []
+    for number, plan in enumerate(plans):
+        alone += [(f.object + start, f.rule) for f in faults_of(plan)]
+        packed.append(torch.full((len(plan),), number))
+        start += len(plan)
+    from echomodel.floors import padded
+
+    together = type(plans[0])(
+        tuple(kind for plan in plans for kind in plan.kinds),
+        *(torch.cat([getattr(plan, name) for plan in plans]) for name in ("size", "position", "yaw")),
+        torch.cat(packed), padded([plan.floor for plan in plans]), ((),) * len(plans),
+        torch.zeros((0, 3), dtype=torch.int64), torch.zeros(start, dtype=torch.bool),
+    )  # fmt: skip
+    assert sorted((f.object, f.rule) for f in faults_of(together)) == sorted(alone)
+    assert float(missed(together)) == pytest.approx(sum(float(missed(plan)) for plan in plans))
+
+
+def test_the_room_generator_rarely_breaks_them():
+    rooms = generate_rooms(60, 3)
+    found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
+    assert len(found) < 0.12 * sum(len(room) for room in rooms)
