@@ -14,7 +14,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables, rgb
 from echousd.packing import Package, Reach, take_assets
 from echousd.stage import open_stage
-from echousd.stage.values import given
+from echousd.stage.read import source
+from echousd.stage.values import check_types, given, reading, targets
 
 if TYPE_CHECKING:
     import trimesh
@@ -52,12 +53,13 @@ def export(
     stage = open_stage(room)
     reach = Reach.of(stage, search)
     reach.check_layers(stage)
-    if out.suffix == ".glb":
-        content = glb(stage, reach)
-    elif out.suffix == ".usdz":
-        content = usdz(stage, Package(reach), arkit=arkit)
-    else:
-        content = layer_bytes(flat_layer(stage), out.suffix)
+    with reading(stage):
+        if out.suffix == ".glb":
+            content = glb(stage, reach)
+        elif out.suffix == ".usdz":
+            content = usdz(stage, Package(reach), arkit=arkit)
+        else:
+            content = layer_bytes(flat_layer(stage), out.suffix)
     write_whole(out, content)
     return out
 
@@ -75,6 +77,7 @@ def flat_layer(
     from echousd.room.compose import place_layouts
 
     layer = stage.Flatten(False)
+    check_types(layer, source(stage))
     stage = Usd.Stage.Open(layer)
     for prim in list(stage.TraverseAll()):
         if prim.IsValid() and not guides and _is_guide(prim):
@@ -166,13 +169,7 @@ def _paint_plain(image: Usd.Prim) -> None:
 
 def _drop_unused_materials(stage: Usd.Stage) -> None:
     """Looks of assets that the room's own looks replace."""
-    bound = {
-        target
-        for prim in stage.TraverseAll()
-        for target in (
-            prim.GetRelationship("material:binding").GetTargets() if prim.HasRelationship("material:binding") else ()
-        )
-    }
+    bound = {target for prim in stage.TraverseAll() for target in targets(prim, "material:binding")}
     unused = [p for p in stage.TraverseAll() if p.IsA(UsdShade.Material) and p.GetPath() not in bound]
     scopes = {prim.GetParent().GetPath() for prim in unused}
     for path in [prim.GetPath() for prim in unused]:

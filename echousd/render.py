@@ -60,13 +60,16 @@ def render_stage(
     """
     from PIL import Image
 
+    from echousd.stage.values import reading
+
     if view not in VIEWS:
         raise ValueError(f"view is {view!r}, allowed: {', '.join(VIEWS)}")
     if colors not in COLORS:
         raise ValueError(f"colors is {colors!r}, allowed: {', '.join(COLORS)}")
     if not 16 <= size <= LARGEST:
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
-    scenery = read_scenery(stage, by_class=colors == "class")
+    with reading(stage):
+        scenery = read_scenery(stage, by_class=colors == "class")
     camera = top_view(scenery) if view == "top" else corner_view(scenery)
     if view == "perspective":
         scenery = scenery.without_near_walls(camera.matrix[:3, 3])

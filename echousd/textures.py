@@ -14,6 +14,7 @@ MAX_BYTES = 256 * 2**20
 MAX_PIXELS = 8192 * 8192
 # Pillow would also run Ghostscript for EPS; these it decodes itself.
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF", "AVIF")
+READABLE = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".webp", ".gif", ".avif")
 GREY = 188  # sRGB of what is not there
 
 

@@ -1,14 +1,18 @@
-"""Rules on the files of a stage: asset paths that work on another machine."""
+"""Rules on the files of a stage: paths that work on another machine, images that can be read."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import PurePosixPath
 
-from pxr import Sdf, Usd, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
 
-from echousd.check.findings import Finding, Rule
+from echousd.check.findings import Finding, Rule, prims
 from echousd.packing import Reach
+from echousd.stage.encoding import StageError
+from echousd.stage.values import asset
+from echousd.textures import READABLE, TextureError, read_image
 
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
@@ -51,6 +55,33 @@ def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
                 )
 
 
+def images(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every image that a shader reads can be read."""
+    known: dict[str, str] = {}
+    for prim in prims(stage):
+        if not prim.IsA(UsdShade.Shader):
+            continue
+        try:
+            file = asset(prim.GetAttribute("inputs:file")) if prim.HasAttribute("inputs:file") else None
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
+        path = str(file.resolvedPath) if file else ""
+        if not path or PurePosixPath(path.rstrip("]")).suffix.lower() not in READABLE:
+            continue
+        if path not in known:
+            known[path] = _image_fault(path)
+        if known[path]:
+            yield Finding(prim.GetPath(), known[path])
+
+
+def _image_fault(path: str) -> str:
+    try:
+        read_image(path)
+    except TextureError as error:
+        return str(error)
+    return ""
+
+
 def _asset_paths(layer: Sdf.Layer) -> list[str]:
     """All asset paths that a layer authors: sublayers, references, payloads, clips, attributes, metadata."""
     copy = Sdf.Layer.CreateAnonymous(".usda")
@@ -90,5 +121,6 @@ def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
 
 RULES = (
     Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),
+    Rule("echo:Images", "Images can be read.", images),
     Rule("echo:PathsInside", "Files that a room names lie below its folder.", paths_inside),
 )

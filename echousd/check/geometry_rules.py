@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Sdf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from echousd.check.findings import Finding, Rule, applied, is_guide, prims
-from echousd.stage.encoding import NODE_API
+from echousd.stage.encoding import NODE_API, StageError
+from echousd.stage.values import array, matrix, targets
 
 EVEN = 1e-3  # relative difference of scale factors that counts as none
 PHYSICAL = ("PhysicsRigidBodyAPI", "PhysicsCollisionAPI")
@@ -19,7 +20,10 @@ def texture_coordinates(stage: Usd.Stage) -> Iterator[Finding]:
     for prim in prims(stage):
         if not prim.IsA(UsdGeom.Mesh) or is_guide(prim):
             continue
-        fault = _uv_fault(UsdGeom.Mesh(prim))
+        try:
+            fault = _uv_fault(UsdGeom.Mesh(prim))
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
         if fault:
             yield Finding(prim.GetPath(), fault)
 
@@ -28,17 +32,17 @@ def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
     primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("st")
     if not primvar or not primvar.HasValue():
         return "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
-    values = primvar.Get()
+    values = array(primvar.GetAttr(), 2)
     interpolation = primvar.GetInterpolation()
-    counts = mesh.GetFaceVertexCountsAttr().Get() or []
+    points = len(array(mesh.GetPointsAttr(), 3))
     wanted = {
         UsdGeom.Tokens.constant: 1,
-        UsdGeom.Tokens.uniform: len(counts),
-        UsdGeom.Tokens.varying: len(mesh.GetPointsAttr().Get() or []),
-        UsdGeom.Tokens.vertex: len(mesh.GetPointsAttr().Get() or []),
-        UsdGeom.Tokens.faceVarying: len(mesh.GetFaceVertexIndicesAttr().Get() or []),
+        UsdGeom.Tokens.uniform: len(array(mesh.GetFaceVertexCountsAttr(), whole=True)),
+        UsdGeom.Tokens.varying: points,
+        UsdGeom.Tokens.vertex: points,
+        UsdGeom.Tokens.faceVarying: len(array(mesh.GetFaceVertexIndicesAttr(), whole=True)),
     }.get(interpolation, 0)
-    indices = primvar.GetIndices() if primvar.IsIndexed() else None
+    indices = array(primvar.GetIndicesAttr(), whole=True) if primvar.IsIndexed() else None
     found = len(values) if indices is None else len(indices)
     if found != wanted:
         return f"primvars:st has {found} texture coordinates, {interpolation} interpolation needs {wanted}"
@@ -56,7 +60,11 @@ def scale(stage: Usd.Stage) -> Iterator[Finding]:
     for prim in prims(stage):
         if not prim.IsA(UsdGeom.Xformable):
             continue
-        local = _factors(cache.GetLocalTransformation(prim)[0])
+        try:
+            local = _factors(matrix(cache.GetLocalTransformation(prim)[0], prim))
+            whole = matrix(cache.GetLocalToWorldTransform(prim), prim)
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
         if local.min() < 1e-6:
             told.add(prim.GetPath())
             yield Finding(prim.GetPath(), f"scale is {_shown(local)}, allowed: above 0")
@@ -64,7 +72,7 @@ def scale(stage: Usd.Stage) -> Iterator[Finding]:
         schemas = applied(prim)
         if NODE_API not in schemas and not any(schema in schemas for schema in PHYSICAL):
             continue
-        world = _factors(cache.GetLocalToWorldTransform(prim))
+        world = _factors(whole)
         if world.min() < 1e-6 or world.max() / world.min() < 1 + EVEN:
             continue
         culprit = _unevenly_scaled(prim, cache)
@@ -72,6 +80,20 @@ def scale(stage: Usd.Stage) -> Iterator[Finding]:
             told.add(culprit.GetPath())
             what = "a body, collider or object of a scene graph"
             yield Finding(culprit.GetPath(), f"scale is {_shown(world)}, allowed on {what}: the same along all axes")
+
+
+def mirrored(stage: Usd.Stage) -> Iterator[Finding]:
+    """No transform mirrors: physics engines and many clients turn such meshes inside out."""
+    cache = UsdGeom.XformCache()
+    for prim in prims(stage):
+        if not prim.IsA(UsdGeom.Xformable):
+            continue
+        try:
+            turn = matrix(cache.GetLocalTransformation(prim)[0], prim)[:3, :3]
+        except (StageError, Tf.ErrorException):
+            continue
+        if np.linalg.det(turn) < -1e-12:
+            yield Finding(prim.GetPath(), "its transform mirrors (a negative scale), allowed: positive scales")
 
 
 def _unevenly_scaled(prim: Usd.Prim, cache: UsdGeom.XformCache) -> Usd.Prim:
@@ -103,7 +125,7 @@ def materials_inside(stage: Usd.Stage) -> Iterator[Finding]:
         for relationship in prim.GetRelationships():
             if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
                 continue
-            for target in relationship.GetTargets():
+            for target in targets(prim, relationship.GetName()):
                 found = stage.GetPrimAtPath(target.GetPrimPath())
                 if found and found.IsA(UsdShade.Material) and not target.HasPrefix(default.GetPath()):
                     yield Finding(
@@ -115,5 +137,6 @@ def materials_inside(stage: Usd.Stage) -> Iterator[Finding]:
 RULES = (
     Rule("echo:TextureCoordinates", "Visible meshes have texture coordinates, as many as needed.", texture_coordinates),
     Rule("echo:Scale", "No zero scale; bodies, colliders and objects are scaled evenly.", scale),
+    Rule("echo:Mirrored", "No transform mirrors.", mirrored),
     Rule("echo:MaterialsInside", "Bound materials lie below the default prim.", materials_inside),
 )

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import StageError
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
+from echousd.stage.values import matrix, mesh_arrays, numbers
 
 Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
 HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
@@ -56,7 +57,8 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     """The contents of one room; what is not valid is left out here, the validators report it."""
     stage = prims.room.GetStage()
     cache = UsdGeom.XformCache()
-    to_room = room_frame(prims.room, cache)
+    found_frame = _readable(lambda: room_frame(prims.room, cache))
+    to_room = np.eye(4) if found_frame is None else found_frame
     names = _readable(lambda: node_names(prims)) or {}
     owners = [prim.GetPath() for prim in prims.nodes]
     objects, missing = [], []
@@ -64,7 +66,9 @@ def read_contents(prims: RoomPrims) -> RoomContents:
         node = _readable(lambda prim=prim: read_node(prim, names.get(prim.GetPath(), prim.GetName())))  # type: ignore[misc]
         if node is None:
             continue
-        found = _object(prim, node, cache, to_room, set(owners) - {prim.GetPath()})
+        found = _readable(
+            lambda prim=prim, node=node: _object(prim, node, cache, to_room, set(owners) - {prim.GetPath()})  # type: ignore[misc]
+        )
         if found is None:
             missing.append(node.name)
         else:
@@ -84,7 +88,7 @@ def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
     axes are the room's; a Z-up prim is turned.
     """
     stage = room.GetStage()
-    world = np.array(cache.GetLocalToWorldTransform(room)).T
+    world = matrix(cache.GetLocalToWorldTransform(room), room)
     up = np.array([0.0, 0, 1] if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
     scale = np.linalg.norm(world[:3, :3], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
@@ -101,22 +105,23 @@ def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
 def _readable(read):  # type: ignore[no-untyped-def]
     try:
         return read()
-    except StageError:
+    except (StageError, Tf.ErrorException):
         return None
 
 
 def _object(
     prim: Usd.Prim, node: Node, cache: UsdGeom.XformCache, to_room: np.ndarray, others: set
 ) -> RoomObject | None:
-    own = to_room @ np.array(cache.GetLocalToWorldTransform(prim)).T
+    own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
     points, faces = [], []
     count = 0
     for mesh in meshes_below(prim, others):
-        vertices, triangles = triangulated(mesh)
-        if not len(triangles):
+        found = _readable(lambda mesh=mesh: triangulated(mesh))  # type: ignore[misc]
+        if found is None or not len(found[1]):
             continue
-        matrix = to_room @ np.array(cache.GetLocalToWorldTransform(mesh)).T
-        points.append(vertices @ matrix[:3, :3].T + matrix[:3, 3])
+        vertices, triangles = found
+        world = to_room @ matrix(cache.GetLocalToWorldTransform(mesh), mesh)
+        points.append(vertices @ world[:3, :3].T + world[:3, 3])
         faces.append(triangles + count)
         count += len(vertices)
     if not points:
@@ -156,12 +161,14 @@ def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
     """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int; other gprims become their box."""
     if not prim.IsA(UsdGeom.Mesh):
         extent = UsdGeom.Boundable(prim).ComputeExtent(Usd.TimeCode.Default())
-        return _box(np.array(extent)) if extent else (np.zeros((0, 3)), np.zeros((0, 3), int))
-    mesh = UsdGeom.Mesh(prim)
-    points = np.array(mesh.GetPointsAttr().Get() or [], float).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], int)
-    indices = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], int)
-    if not len(points) or counts.sum() != len(indices) or (len(indices) and indices.max() >= len(points)):
+        return (
+            _box(numbers(extent, 3, f"<{prim.GetPath()}>: its extent"))
+            if extent
+            else (np.zeros((0, 3)), np.zeros((0, 3), int))
+        )
+    arrays = mesh_arrays(UsdGeom.Mesh(prim))
+    points, counts, indices = arrays.points, arrays.counts, arrays.indices
+    if not len(points):
         return np.zeros((0, 3)), np.zeros((0, 3), int)
     starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
     triangles = []

@@ -1,12 +1,18 @@
-"""Rules on rigid bodies: none inside another, no triangle meshes as colliders of what moves."""
+"""Rules on physics: no body inside another, colliders that engines take and that fit, gravity that points down."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pxr import Usd, UsdGeom, UsdPhysics
+import numpy as np
+from pxr import Tf, Usd, UsdGeom, UsdPhysics
 
-from echousd.check.findings import Finding, Rule, prims
+from echousd.check.findings import Finding, Rule, is_guide, prims
+from echousd.check.objects import triangulated
+from echousd.stage.encoding import StageError
+from echousd.stage.values import array, matrix
+
+OFF = 0.25  # metres between the boxes of geometry and colliders, which are hulls or a few boxes
 
 CONCAVE = (UsdPhysics.Tokens.none, UsdPhysics.Tokens.meshSimplification)
 
@@ -43,6 +49,58 @@ def dynamic_colliders(stage: Usd.Stage) -> Iterator[Finding]:
             )
 
 
+def colliders(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every rigid body has colliders, and they fill the same box as its geometry."""
+    cache = UsdGeom.XformCache()
+    for prim in prims(stage):
+        if not prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            continue
+        below = [found for found in Usd.PrimRange(prim, Usd.TraverseInstanceProxies()) if found.IsA(UsdGeom.Gprim)]
+        solid = [found for found in below if found.HasAPI(UsdPhysics.CollisionAPI)]
+        if below and not solid and not prim.HasAPI(UsdPhysics.CollisionAPI):
+            yield Finding(prim.GetPath(), "a rigid body without colliders: it falls through the floor")
+            continue
+        seen = [found for found in below if not is_guide(found)]
+        try:
+            boxes = [_bounds(gprims, cache) for gprims in (seen, solid)]
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
+        if boxes[0] is None or boxes[1] is None:
+            continue
+        metres = UsdGeom.GetStageMetersPerUnit(stage)
+        apart = float(np.abs(boxes[0] - boxes[1]).max()) * metres
+        if apart > OFF:
+            yield Finding(prim.GetPath(), f"its colliders end {apart:.2g} m from its geometry, allowed: {OFF:g} m")
+
+
+def _bounds(gprims: list[Usd.Prim], cache: UsdGeom.XformCache) -> np.ndarray | None:
+    """(2, 3) float: box around some prims in the world, None for none."""
+    corners = []
+    for prim in gprims:
+        points, _ = triangulated(prim)
+        if len(points):
+            world = matrix(cache.GetLocalToWorldTransform(prim), prim)
+            turned = points @ world[:3, :3].T + world[:3, 3]
+            corners += [turned.min(0), turned.max(0)]
+    return np.stack([np.min(corners, 0), np.max(corners, 0)]) if corners else None
+
+
+def gravity(stage: Usd.Stage) -> Iterator[Finding]:
+    """Gravity points down."""
+    up = np.array([0.0, 0, 1] if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
+    for prim in prims(stage):
+        if prim.GetTypeName() != "PhysicsScene":
+            continue
+        try:
+            direction = array(prim.GetAttribute("physics:gravityDirection"))
+        except (StageError, Tf.ErrorException):
+            continue
+        if direction.shape == (3,) and direction @ up > 0:
+            shown = ", ".join(f"{value:g}" for value in direction)
+            axis = UsdGeom.GetStageUpAxis(stage)
+            yield Finding(prim.GetPath(), f"gravity points along ({shown}), allowed: downwards on a {axis}-up stage")
+
+
 def _body_above(prim: Usd.Prim) -> Usd.Prim | None:
     while prim and not prim.IsPseudoRoot():
         if prim.HasAPI(UsdPhysics.RigidBodyAPI):
@@ -59,4 +117,6 @@ def _dynamic(body: UsdPhysics.RigidBodyAPI) -> bool:
 RULES = (
     Rule("echo:NestedBodies", "No rigid body lies inside another one.", nested_bodies),
     Rule("echo:DynamicColliders", "Dynamic bodies have no triangle-mesh colliders.", dynamic_colliders),
+    Rule("echo:Colliders", "Rigid bodies have colliders, where their geometry is.", colliders),
+    Rule("echo:Gravity", "Gravity points down.", gravity),
 )

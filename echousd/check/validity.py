@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pxr import Sdf, Usd
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 import echousd
-from echousd.check import file_rules, geometry_rules, graph_rules, physics_rules
+from echousd.check import file_rules, geometry_rules, graph_rules, mesh_rules, object_rules, physics_rules, value_rules
 from echousd.check.findings import Finding, Rule
+from echousd.stage.encoding import StageError
+from echousd.stage.files import said
 
-RULES: tuple[Rule, ...] = (*graph_rules.RULES, *geometry_rules.RULES, *physics_rules.RULES, *file_rules.RULES)
+FAMILIES = (graph_rules, object_rules, geometry_rules, mesh_rules, physics_rules, file_rules, value_rules)
+RULES: tuple[Rule, ...] = tuple(rule for family in FAMILIES for rule in family.RULES)
 KEYWORD = "EchoUSD"
 
 
@@ -54,10 +57,22 @@ def _validator(rule: Rule) -> Callable[[Usd.Stage, Any], list]:
                 [UsdValidation.ValidationErrorSite(stage, found.path)],
                 found.message,
             )
-            for found in rule.find(stage)
+            for found in safely(rule, stage)
         ]
 
     return validate
+
+
+def safely(rule: Rule, stage: Usd.Stage) -> list[Finding]:
+    """What a rule finds; a stage that it cannot read through is a finding as well."""
+    found: list[Finding] = []
+    try:
+        found.extend(rule.find(stage))
+    except Tf.ErrorException as error:
+        found.append(Finding(Sdf.Path.absoluteRootPath, f"cannot be read through: {said(error)}"))
+    except StageError as error:
+        found.append(Finding(Sdf.Path.absoluteRootPath, str(error)))
+    return found
 
 
 def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
@@ -71,22 +86,36 @@ def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
 
         register()
     except (ImportError, AttributeError, TypeError):
-        own = [(rule, found) for rule in RULES for found in rule.find(stage)]
-        errors = [_fault(rule, found) for rule, found in own if not found.warning]
-        warnings = [_fault(rule, found) for rule, found in own if found.warning]
+        errors, warnings = _own_faults(stage)
         alone = (
             f"OpenUSD {'.'.join(map(str, Usd.GetVersion()))} has no UsdValidation for Python: only our own rules ran"
         )
         return tuple(errors), (*warnings, Fault("echo:Validators", "/", alone))
     context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+    silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the report says as well
+    try:
+        told = context.Validate(stage)
+    except Tf.ErrorException as stopped:  # a validator of OpenUSD's own that cannot read the stage ends the whole run
+        errors, warnings = _own_faults(stage)
+        fault = Fault("echo:Validators", "/", f"OpenUSD's validators stopped: {said(stopped)}")
+        return (*errors, fault), tuple(warnings)
+    finally:
+        silence.TakeUncoalescedDiagnostics()
+        del silence
     errors, warnings = [], []
-    for error in context.Validate(stage):
+    for error in told:
         fault = Fault(_rule_name(error), _site(error), " ".join(error.GetMessage().split()))
         if error.GetType() == UsdValidation.ValidationErrorType.Error:
             errors.append(fault)
         elif error.GetType() == UsdValidation.ValidationErrorType.Warn:
             warnings.append(fault)
     return tuple(sorted(set(errors), key=_key)), tuple(sorted(set(warnings), key=_key))
+
+
+def _own_faults(stage: Usd.Stage) -> tuple[list[Fault], list[Fault]]:
+    own = [(rule, found) for rule in RULES for found in safely(rule, stage)]
+    errors = [_fault(rule, found) for rule, found in own if not found.warning]
+    return errors, [_fault(rule, found) for rule, found in own if found.warning]
 
 
 def _fault(rule: Rule, found: Finding) -> Fault:

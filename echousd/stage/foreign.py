@@ -17,6 +17,7 @@ from echomodel.vocabulary import UnknownWord, normalised, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.stage.encoding import StageError
 from echousd.stage.read import opened, source
+from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
 OLD_SCHEMA = "SemanticsAPI:"  # Omniverse before UsdSemantics
@@ -129,13 +130,12 @@ def labels(prim: Usd.Prim) -> Iterator[str]:
     new = [name.removeprefix(LABELS_SCHEMA) for name in applied if name.startswith(LABELS_SCHEMA)]
     for taxonomy in sorted(new, key=lambda name: name != "category"):
         attribute = prim.GetAttribute(f"semantics:labels:{taxonomy}")
-        yield from attribute.Get() or () if attribute else ()
+        yield from texts(attribute)
     for name in applied:
         if name.startswith(OLD_SCHEMA):
             attribute = prim.GetAttribute(f"semantic:{name.removeprefix(OLD_SCHEMA)}:params:semanticData")
-            found = attribute.Get() if attribute else None
-            if found:
-                yield from (word.strip() for word in str(found).split(","))
+            for found in texts(attribute):
+                yield from (word.strip() for word in found.split(","))
 
 
 def known_category(word: str) -> str | None:

@@ -12,6 +12,7 @@ from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage import encoding as usd
+from echousd.stage import values
 from echousd.stage.encoding import StageError
 
 
@@ -33,18 +34,20 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
     (`foreign_graph`). Raises StageError, and GraphError's text with the file's name, for what is not valid.
     """
     stage = opened(stage)
-    rooms = find_rooms(stage)
-    if rooms or room is not None:
-        return room_graph(the_room(stage, room, rooms))
-    from echousd.stage.foreign import foreign_graph
+    with values.reading(stage):
+        rooms = find_rooms(stage)
+        if rooms or room is not None:
+            return room_graph(the_room(stage, room, rooms))
+        from echousd.stage.foreign import foreign_graph
 
-    return foreign_graph(stage)
+        return foreign_graph(stage)
 
 
 def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
     """Every room's graph by the prim path of the room, in the stage's order; empty where there is none."""
     stage = opened(stage)  # held here: prims do not outlive their stage
-    return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(stage)}
+    with values.reading(stage):
+        return {str(prims.room.GetPath()): room_graph(prims) for prims in find_rooms(stage)}
 
 
 def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None = None) -> RoomPrims:
@@ -109,8 +112,7 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
 
 
 def _room_of(graph: Usd.Prim) -> RoomPrims:
-    relationship = graph.GetRelationship(usd.ROOM)
-    targets = relationship.GetTargets() if relationship else []
+    targets = values.targets(graph, usd.ROOM)
     if len(targets) > 1:
         raise StageError(f"{place(graph)}: {usd.ROOM} has {len(targets)} targets, allowed: at most one")
     room = graph.GetStage().GetPrimAtPath(targets[0]) if targets else graph.GetParent()
@@ -195,7 +197,7 @@ def read_node(prim: Usd.Prim, name: str) -> Node:
     fields = {key: found for key, found in fields.items() if found is not None}
     free = {key: found for key, found in free.items() if found is not None}
     if "category" not in fields:
-        labels = value(prim, usd.LABELS)
+        labels = values.texts(prim.GetAttribute(usd.LABELS))
         if not labels:
             raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY} or {usd.LABELS} with one word")
         fields["category"] = labels[0]
@@ -218,8 +220,7 @@ _PREDICATES = frozenset(predicate.name for predicate in vocabulary().predicates)
 
 def value(prim: Usd.Prim, name: str) -> Any:
     """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
-    attribute = prim.GetAttribute(name)
-    found = attribute.Get() if attribute else None
+    found = values.given(prim.GetAttribute(name))
     if found is None or isinstance(found, float | bool):
         return found
     found = usd.plain(found)
@@ -235,10 +236,10 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
     object_ = _end(prim, usd.OBJECT, names)
     if subject is None or object_ is None:
         return None
-    predicate, confidence = prim.GetAttribute(usd.PREDICATE).Get(), value(prim, usd.CONFIDENCE)
-    if predicate in _PREDICATES and confidence in (None, 1.0):  # nothing left to check, as the nodes are valid
+    predicate, confidence = value(prim, usd.PREDICATE), value(prim, usd.CONFIDENCE)
+    # Words and numbers that leave nothing to check, as the nodes are valid.
+    if isinstance(predicate, str) and predicate in _PREDICATES and confidence in (None, 1.0):
         return Relation.model_construct(subject=subject, predicate=predicate, object=object_, confidence=1.0)
-    predicate = value(prim, usd.PREDICATE)
     if predicate is None:
         raise StageError(f"{place(prim)}: {usd.PREDICATE} has no value, allowed: one predicate")
     try:
@@ -248,8 +249,7 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
 
 
 def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
-    relationship = prim.GetRelationship(name)
-    targets = relationship.GetTargets() if relationship else []
+    targets = values.targets(prim, name)
     if len(targets) != 1:
         found = f"{len(targets)} targets" + (f" ({', '.join(map(str, targets))})" if targets else "")
         raise StageError(f"{place(prim)}: {name} has {found}, allowed: exactly one")
@@ -257,8 +257,19 @@ def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
     if node is None and not _deactivated(prim.GetStage(), targets[0]):
         there = prim.GetStage().GetPrimAtPath(targets[0])
         why = f"which is no node of this room (no {usd.NODE_API})" if there else "where no prim is"
+        if _unloaded(there or prim.GetStage().GetPrimAtPath(targets[0].GetParentPath())):
+            why = "whose payload is not loaded"
         raise StageError(f"{place(prim)}: {name} points to <{targets[0]}>, {why}, allowed: a node of the room")
     return node
+
+
+def _unloaded(prim: Usd.Prim) -> bool:
+    """Whether the payload of a prim, or of one above it, is not loaded."""
+    while prim and not prim.IsPseudoRoot():
+        if not prim.IsLoaded():
+            return True
+        prim = prim.GetParent()
+    return False
 
 
 def _deactivated(stage: Usd.Stage, path: Sdf.Path) -> bool:

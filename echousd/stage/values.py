@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
+from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
 
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
@@ -31,9 +32,9 @@ class MeshArrays:
 
 
 def owner(attribute: Usd.Attribute) -> str:
-    """`file: <prim path>.attribute` for error messages."""
+    """`file: <prim path>: attribute` for error messages."""
     layer = attribute.GetStage().GetRootLayer()
-    return f"{layer.realPath or layer.identifier}: <{attribute.GetPath()}>"
+    return f"{layer.realPath or layer.identifier}: <{attribute.GetPrimPath()}>: {attribute.GetName()}"
 
 
 def given(attribute: Usd.Attribute | None) -> Any:
@@ -99,6 +100,9 @@ def texts(attribute: Usd.Attribute | None) -> tuple[str, ...]:
     words = (found,) if isinstance(found, str) else tuple(found) if hasattr(found, "__iter__") else (None,)
     if not all(isinstance(word, str) for word in words):
         raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: words")
+    longest = max(map(len, words), default=0)
+    if longest > MAX_TEXT:
+        raise StageError(f"{owner(attribute)} is a text of {longest} characters, allowed: {MAX_TEXT}")
     return words
 
 
@@ -108,6 +112,19 @@ def asset(attribute: Usd.Attribute | None) -> Sdf.AssetPath | None:
     if found is None or isinstance(found, Sdf.AssetPath) or attribute is None:
         return found
     raise StageError(f"{owner(attribute)} is {shown(found)}, allowed: an asset path")
+
+
+def targets(prim: Usd.Prim, name: str) -> list[Sdf.Path]:
+    """Targets of a relationship, none where there is none; raises StageError where they cannot be read."""
+    try:
+        relationship = prim.GetRelationship(name)
+        return list(relationship.GetTargets()) if relationship else []
+    except Tf.ErrorException as error:
+        from echousd.stage.files import said
+
+        layer = prim.GetStage().GetRootLayer()
+        where = f"{layer.realPath or layer.identifier}: <{prim.GetPath()}>: {name}"
+        raise StageError(f"{where} is no relationship that can be read ({said(error)})") from None
 
 
 def matrix(found: Gf.Matrix4d, prim: Usd.Prim) -> np.ndarray:
@@ -139,6 +156,36 @@ def mesh_arrays(mesh: UsdGeom.Mesh) -> MeshArrays:
             f"allowed: 0 to {len(points) - 1}"
         )
     return MeshArrays(points, counts, indices)
+
+
+def misfit(kind: Sdf.ValueTypeName, found: Any) -> bool:
+    """Whether a value is of another type than its attribute; OpenUSD reads such a value, but cannot write it."""
+    default = kind.defaultValue
+    if found is None or default is None or isinstance(found, Sdf.ValueBlock):
+        return False
+    if isinstance(default, float | Sdf.TimeCode):
+        return isinstance(found, bool) or not isinstance(found, int | float | Sdf.TimeCode)
+    if isinstance(default, int) and not isinstance(default, bool):
+        return isinstance(found, bool) or not isinstance(found, int)
+    return not isinstance(found, type(default))
+
+
+def check_types(layer: Sdf.Layer, where: str) -> None:
+    """Raises StageError for the first value of a layer that is of another type than its attribute.
+
+    Arguments:
+        where: the file that the error names.
+    """
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    for path in paths:
+        spec = layer.GetAttributeAtPath(path) if path.IsPropertyPath() else None
+        if not spec:
+            continue
+        samples = layer.ListTimeSamplesForPath(path) if spec.HasInfo("timeSamples") else ()
+        for found in (spec.default, *(layer.QueryTimeSample(path, time) for time in samples)):
+            if misfit(spec.typeName, found):
+                raise StageError(f"{where}: <{path}> is {shown(found)}, allowed: {spec.typeName}")
 
 
 def shown(found: Any, most: int = 40) -> str:

@@ -41,6 +41,29 @@ FOUND = {
     "material_outside": {"echo:MaterialsInside"},
     "absolute_path": {"echo:RelativePaths"},
     "path_outside": {"echo:PathsInside"},
+    "not_finite": {"echo:FiniteValues"},
+    "nan_points": {"echo:FiniteValues", "empty"},
+    "wrong_type": {"echo:ValueTypes", "usdValidation:AttributeTypeMismatch.AttributeTypeMismatch"},
+    "missing_op": {"echo:TransformOps"},
+    "moving": {"echo:AtRest"},
+    "missing_variant": {"echo:Variants"},
+    "bad_index": {"echo:MeshIndices"},
+    "long_normals": {"echo:Normals"},
+    "against_normals": {"echo:Winding"},
+    "inside_out": {"echo:Winding"},
+    "wrong_extent": {"echo:Extents"},
+    "mirrored": {"echo:Mirrored"},
+    "upside_down": {"echo:Upright"},
+    "two_labels": {"echo:OneLabel"},
+    "other_label": {"echo:OneLabel"},
+    "stated_size": {"echo:StatedBoxes"},
+    "stated_yaw": {"echo:StatedBoxes"},
+    "no_floor": {"echo:Floor"},
+    "no_collider": {"echo:Colliders"},
+    "far_collider": {"echo:Colliders"},
+    "gravity_up": {"echo:Gravity"},
+    "corrupt_image": {"echo:Images"},
+    "unloaded": set(),  # its payload is loaded here; the rule has a test of its own
 }
 
 
@@ -57,12 +80,19 @@ def found(report) -> set[str]:
 
 def test_there_is_a_file_for_every_rule() -> None:
     assert {path.stem for path in BAD.glob("*.usda")} == set(FOUND)
-    assert {rule.name for rule in RULES} <= set().union(*FOUND.values())
+    assert {rule.name for rule in RULES} <= set().union(*FOUND.values(), {"echo:PayloadsLoaded"})
 
 
 @pytest.mark.parametrize("name", FOUND)
 def test_each_broken_file_is_caught_by_its_rule_alone(name: str) -> None:
     assert found_in(BAD / f"{name}.usda") == FOUND[name]
+
+
+def test_what_is_not_loaded_is_called_so() -> None:
+    stage = Usd.Stage.Open(str(BAD / "unloaded.usda"), Usd.Stage.LoadNone)
+    report = check_room(stage)
+    assert [(fault.rule, fault.prim) for fault in report.errors] == [("echo:PayloadsLoaded", "/Room")]
+    assert "not loaded" in report.errors[0].message
 
 
 def test_our_rules_are_validators_of_usd() -> None:

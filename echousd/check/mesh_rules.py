@@ -1,0 +1,162 @@
+"""Rules on meshes: faces that their points can make, normals, extents, and surfaces that face outwards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from echousd.check.findings import Finding, Rule, prims
+from echousd.stage.encoding import StageError
+from echousd.stage.values import MeshArrays, array, mesh_arrays
+
+UNIT = 0.05  # how far the length of a normal may be from 1
+EXTENT = 1e-3  # how far an extent may be from the points, in shares of their diagonal
+AGAINST = 0.5  # share of the faces whose normals point the other way
+
+
+def mesh_indices(stage: Usd.Stage) -> Iterator[Finding]:
+    """Faces have three corners or more, as many in all as there are indices, and indices name points."""
+    for mesh in meshes(stage):
+        try:
+            points = array(mesh.GetPointsAttr(), 3)
+            counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
+            indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True)
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
+        if len(counts) and counts.min() < 3:
+            yield Finding(mesh.GetPath(), f"a face has {counts.min()} corners, allowed: 3 or more")
+        elif counts.sum() != len(indices):
+            yield Finding(mesh.GetPath(), f"faces ask for {counts.sum()} corners, faceVertexIndices has {len(indices)}")
+        elif len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
+            reach = f"from {indices.min()} to {indices.max()}"
+            yield Finding(mesh.GetPath(), f"faceVertexIndices reach {reach}, allowed: 0 to {len(points) - 1}")
+
+
+def normals(stage: Usd.Stage) -> Iterator[Finding]:
+    """Normals have length 1, and are as many as their interpolation asks for."""
+    for mesh, arrays in _readable(stage):
+        found = _normals(mesh)
+        if found is None:
+            continue
+        values, interpolation = found
+        wanted = {
+            UsdGeom.Tokens.constant: 1,
+            UsdGeom.Tokens.uniform: len(arrays.counts),
+            UsdGeom.Tokens.faceVarying: len(arrays.indices),
+        }.get(interpolation, len(arrays.points))
+        if len(values) != wanted:
+            yield Finding(mesh.GetPath(), f"{len(values)} normals, {interpolation} interpolation needs {wanted}")
+            continue
+        length = np.linalg.norm(values, axis=1)
+        wrong = np.abs(length - 1) > UNIT
+        if wrong.any():
+            told = f"{length[wrong][0]:.4g} ({int(wrong.sum())} of {len(length)})"
+            yield Finding(mesh.GetPath(), f"a normal has length {told}, allowed: 1")
+
+
+def extents(stage: Usd.Stage) -> Iterator[Finding]:
+    """An extent is the box around the points: clients cull and frame by it."""
+    for mesh, arrays in _readable(stage):
+        try:
+            extent = array(mesh.GetExtentAttr(), 3) if mesh.GetExtentAttr().HasAuthoredValue() else None
+        except (StageError, Tf.ErrorException):
+            continue
+        if extent is None or not len(arrays.points):
+            continue
+        box = np.stack([arrays.points.min(0), arrays.points.max(0)])
+        slack = EXTENT * np.linalg.norm(box[1] - box[0]) + 1e-6
+        if extent.shape != (2, 3) or np.abs(extent - box).max() > slack:
+            yield Finding(mesh.GetPath(), f"extent is {_shown(extent)}, its points reach {_shown(box)}")
+
+
+def winding(stage: Usd.Stage) -> Iterator[Finding]:
+    """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
+    for mesh, arrays in _readable(stage):
+        faces = corners_of(arrays)
+        if not len(faces):
+            continue
+        sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
+        triangles = arrays.points[arrays.indices[faces]]
+        if _closed(arrays.indices[faces]):
+            middle = triangles.mean((0, 1))
+            a, b, c = np.moveaxis(triangles - middle, 1, 0)
+            volume = sign * float((a * np.cross(b, c)).sum()) / 6
+            if volume < 0:
+                yield Finding(mesh.GetPath(), "closed and turned inside out: its faces wind the wrong way round")
+                continue
+        found = _normals(mesh)
+        if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
+            continue
+        cross = sign * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        agree = (cross * found[0][faces].sum(1)).sum(1)
+        area = np.linalg.norm(cross, axis=1)
+        if area.sum() > 0 and area[agree < 0].sum() > AGAINST * area.sum():
+            share = area[agree < 0].sum() / area.sum()
+            yield Finding(mesh.GetPath(), f"{share:.0%} of its surface winds against its normals, allowed: outwards")
+
+
+def meshes(stage: Usd.Stage) -> Iterator[UsdGeom.Mesh]:
+    """All meshes of a stage, those of an instance's prototype once."""
+    seen: set[Sdf.Path] = set()
+    for prim in prims(stage):
+        if prim.IsInstanceProxy():
+            prototype = prim.GetPrimInPrototype().GetPath()
+            if prototype in seen:
+                continue
+            seen.add(prototype)
+        if prim.IsA(UsdGeom.Mesh):
+            yield UsdGeom.Mesh(prim)
+
+
+def corners_of(arrays: MeshArrays) -> np.ndarray:
+    """(t, 3) int: fan triangles of the faces, as positions in the indices."""
+    first = np.cumsum(arrays.counts) - arrays.counts
+    fans = np.clip(arrays.counts - 2, 0, None)
+    start = np.repeat(first, fans)
+    step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
+    return np.stack([start, start + step + 1, start + step + 2], 1)
+
+
+def _readable(stage: Usd.Stage) -> Iterator[tuple[UsdGeom.Mesh, MeshArrays]]:
+    for mesh in meshes(stage):
+        try:
+            yield mesh, mesh_arrays(mesh)
+        except (StageError, Tf.ErrorException):  # other rules report it
+            continue
+
+
+def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+    try:
+        if primvar and primvar.HasAuthoredValue():
+            values = array(primvar.GetAttr(), 3)
+            if primvar.IsIndexed():
+                values = values[array(primvar.GetIndicesAttr(), whole=True)]
+            return values, primvar.GetInterpolation()
+        if mesh.GetNormalsAttr().HasAuthoredValue():
+            return array(mesh.GetNormalsAttr(), 3), mesh.GetNormalsInterpolation()
+    except (StageError, Tf.ErrorException, IndexError):
+        pass
+    return None
+
+
+def _closed(faces: np.ndarray) -> bool:
+    """Whether every edge of some triangles (t, 3) is walked once in each direction."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    size = int(faces.max()) + 1
+    there, back = np.sort(edges[:, 0] * size + edges[:, 1]), np.sort(edges[:, 1] * size + edges[:, 0])
+    return bool((there == back).all())
+
+
+def _shown(box: np.ndarray) -> str:
+    return " to ".join("(" + ", ".join(f"{value:.4g}" for value in row) + ")" for row in box)
+
+
+RULES = (
+    Rule("echo:MeshIndices", "The faces of meshes can be made of their points.", mesh_indices),
+    Rule("echo:Normals", "Normals have length 1 and are as many as needed.", normals),
+    Rule("echo:Extents", "Extents are the boxes around the points.", extents),
+    Rule("echo:Winding", "Faces turn outwards and agree with their normals.", winding),
+)

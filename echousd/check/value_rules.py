@@ -1,0 +1,112 @@
+"""Rules on values, whatever they describe: of their type, finite, at rest, of variants and payloads that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from pxr import Tf, Usd, UsdGeom
+
+from echousd.check.findings import Finding, Rule, prims
+from echousd.stage.files import said
+from echousd.stage.values import LARGEST, misfit, shown
+
+INVERTED = "!invert!"
+RESET = "!resetXformStack!"
+
+
+def value_types(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every value can be read and is of the type of its attribute: clients read nothing, or crash, on others."""
+    for attribute in _authored(stage):
+        try:
+            found = attribute.Get()
+        except Tf.ErrorException as error:
+            yield Finding(attribute.GetPath(), f"a value that cannot be read: {said(error)}")
+            continue
+        if misfit(attribute.GetTypeName(), found):
+            yield Finding(attribute.GetPath(), f"holds {shown(found)}, allowed: {attribute.GetTypeName()}")
+
+
+def finite_values(stage: Usd.Stage) -> Iterator[Finding]:
+    """No NaN, no infinity (but for physics' "unlimited"), nothing beyond a thousand million."""
+    for attribute in _authored(stage):
+        if attribute.GetNamespace().startswith("physics"):
+            continue
+        try:
+            found = np.asarray(attribute.Get())
+        except (Tf.ErrorException, TypeError, ValueError):
+            continue
+        if found.dtype.kind != "f":
+            continue
+        bad = ~(np.abs(found) <= LARGEST)
+        if bad.any():
+            told = f"{found[bad].flat[0]:g}" + (f" ({int(bad.sum())} of {bad.size} numbers)" if bad.size > 1 else "")
+            yield Finding(attribute.GetPath(), f"holds {told}, allowed: -{LARGEST:g} to {LARGEST:g}")
+
+
+def _authored(stage: Usd.Stage) -> Iterator[Usd.Attribute]:
+    seen = set()
+    for prim in prims(stage):
+        if prim.IsInstanceProxy():
+            prototype = prim.GetPrimInPrototype().GetPath()
+            if prototype in seen:
+                continue
+            seen.add(prototype)
+        yield from prim.GetAuthoredAttributes()
+
+
+def transform_ops(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every op that an xformOpOrder names is there; what is not there does not move its prim."""
+    for prim in prims(stage):
+        attribute = prim.GetAttribute(UsdGeom.Tokens.xformOpOrder)
+        try:
+            order = attribute.Get() if attribute else None
+        except Tf.ErrorException:
+            continue
+        if not isinstance(order, tuple | list) and not hasattr(order, "__iter__"):
+            continue
+        for name in order or ():
+            if name != RESET and not prim.HasAttribute(str(name).removeprefix(INVERTED)):
+                yield Finding(prim.GetPath(), f"xformOpOrder names {name!r}, allowed: ops that the prim has")
+
+
+def at_rest(stage: Usd.Stage) -> Iterator[Finding]:
+    """Nothing moves or changes shape over time: placement, collisions and relations are measured at rest."""
+    for attribute in _authored(stage):
+        name = attribute.GetName()
+        moves = name.startswith("xformOp") or name in ("points", "visibility")
+        if moves and attribute.GetNumTimeSamples():
+            count = attribute.GetNumTimeSamples()
+            yield Finding(attribute.GetPath(), f"has {count} time samples, allowed: one value, without time")
+
+
+def variants(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every chosen variant exists."""
+    for prim in prims(stage):
+        if prim.IsInstanceProxy():
+            continue
+        sets = prim.GetVariantSets()
+        names = sets.GetNames()
+        chosen = {key: word for spec in reversed(prim.GetPrimStack()) for key, word in spec.variantSelections.items()}
+        for name, word in chosen.items():
+            there = sets.GetVariantSet(name).GetVariantNames() if name in names else []
+            if word and word not in there:
+                allowed = ", ".join(there) or "none (there is no such variant set)"
+                yield Finding(prim.GetPath(), f"variant {name!r} is {word!r}, allowed: {allowed}")
+
+
+def payloads_loaded(stage: Usd.Stage) -> Iterator[Finding]:
+    """Every payload is loaded: what is not loaded cannot be checked."""
+    for prim in Usd.PrimRange.Stage(stage, Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract):
+        if prim.HasAuthoredPayloads() and not prim.IsLoaded():
+            yield Finding(prim.GetPath(), "its payload is not loaded, so nothing below it was checked; load it first")
+
+
+RULES = (
+    Rule("echo:ValueTypes", "Every value is of the type of its attribute.", value_types),
+    Rule("echo:FiniteValues", "No value is NaN, infinite or beyond 1e9.", finite_values),
+    Rule("echo:TransformOps", "The ops that an xformOpOrder names are there.", transform_ops),
+    Rule("echo:AtRest", "No time samples move or reshape anything.", at_rest),
+    Rule("echo:Variants", "Chosen variants exist.", variants),
+    Rule("echo:PayloadsLoaded", "Payloads are loaded.", payloads_loaded),
+)
