@@ -112,6 +112,33 @@ class ShapeConfig:
 
 
 @dataclass(frozen=True)
+class FurnitureConfig:
+    """Denoiser of descriptions of furniture (`echomodel.data.furniture.description`).
+
+    Arguments:
+        kinds: words of every kind that a description tells, in order.
+        numbers: its proportions and open choices.
+        width: channels of a node.
+        layers: echo layers.
+        voices: weighted means of the others' descriptions that a node hears at every step.
+        echo: exchange information between the objects at every step.
+        temperature: scale of the starting noise.
+        objective, steps, sampler: as in `LayoutConfig`; the network says the clean description.
+    """
+
+    kinds: tuple[int, ...] = (5, 9, 2, 7, 5, 7, 4, 4, 7)
+    numbers: int = 36
+    width: int = 192
+    layers: int = 4
+    voices: int = 4
+    echo: bool = True
+    temperature: float = 1.0
+    objective: Objective = "flow"
+    steps: int = 16
+    sampler: Sampler = "ancestral"
+
+
+@dataclass(frozen=True)
 class CompactConfig:
     """The compact echo model: sizes of its parts and of its vocabulary.
 
@@ -128,6 +155,7 @@ class CompactConfig:
     layout: LayoutConfig = field(default_factory=LayoutConfig)
     autoencoder: AutoencoderConfig = field(default_factory=AutoencoderConfig)
     shape: ShapeConfig = field(default_factory=ShapeConfig)
+    furniture: FurnitureConfig = field(default_factory=FurnitureConfig)
 
 
 PRESETS = {"compact": CompactConfig()}

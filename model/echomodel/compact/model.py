@@ -16,6 +16,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.autoencoder import Autoencoder
+from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.shape import ShapeDenoiser
@@ -24,7 +25,7 @@ from echomodel.vocabulary import vocabulary
 
 _SHARED = ("categories", "predicates", "room_types", "rules")
 FORMAT = "echousd-compact-1"
-_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser}
+_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser, "furniture": FurnitureDenoiser}
 PARTS = tuple(_MADE)
 MEASURES = 2  # set of measures of the drafts that this version computes
 
@@ -34,7 +35,7 @@ class WeightsError(ValueError):
 
 
 class CompactModel(nn.Module):
-    """Latent graph, layout denoiser, autoencoder and shape denoiser with the configuration and box statistics.
+    """Latent graph, the denoisers of layouts, shapes and furniture, autoencoder, configuration and box statistics.
 
     Arguments:
         config: sizes.
@@ -53,6 +54,7 @@ class CompactModel(nn.Module):
     layout: LayoutDenoiser
     autoencoder: Autoencoder
     shape: ShapeDenoiser
+    furniture: FurnitureDenoiser
 
     def part_tensors(self, part: str) -> dict[str, Tensor]:
         """State of one part, keys with the part's name in front."""
@@ -132,7 +134,7 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
                 "from it with the recipe's field 'warm'"
             )
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
-        for other in set(PARTS) - set(parts):
+        for other in (set(PARTS) - set(parts)) & set(raw):
             # settings of a part that lies in another file; an older version's may hold fields that are gone
             with suppress(ValueError):
                 own = replace(own, **{other: getattr(from_dict(CompactConfig, {other: raw[other]}), other)})

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from echomodel.data.furniture import Style, sample_size, solids, tsdf_of
+from echomodel.data.furniture import Choices, Style, sample_size, solids, tsdf_of
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.tsdf import RESOLUTION, TRUNCATION
 from echomodel.vocabulary import vocabulary
@@ -59,7 +59,7 @@ def piece(seed: int, style: int, category: str) -> tuple[Style, np.ndarray, list
     look = Style.draw(np.random.default_rng([seed, style]))
     rng = np.random.default_rng([seed, style, position])
     size = sample_size(category, rng, look)
-    return look, size, solids(category, look, rng, size)
+    return look, size, solids(category, look, Choices.draw(rng), size)
 
 
 def quantised(tsdf: np.ndarray) -> np.ndarray:

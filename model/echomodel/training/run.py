@@ -8,7 +8,7 @@ from pathlib import Path
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import PARTS, CompactModel, load_weights
+from echomodel.compact.model import CompactModel, load_weights
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
@@ -16,6 +16,7 @@ from echomodel.training.autoencoder_stage import AutoencoderStage
 from echomodel.training.joint_stage import JointStage
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.paper_stage import PaperStage, box_bounds, paper_model, text_encoder
+from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.rooms import PackedRooms
 from echomodel.training.shape_stage import ShapeStage
@@ -83,6 +84,10 @@ def _stage(
 ) -> TrainingStage:
     if recipe.stage == "layout":
         return _layout_stage(recipe, model, started)
+    if recipe.stage == "parts":
+        if "latent" not in started:
+            raise ValueError("recipe field 'start': stage 'parts' needs weights with latent")
+        return PartsStage(_rooms(recipe, model, held=False), recipe.nodes)
     shapes = ShapeSet(_folder(recipe, "shapes"))
     if recipe.stage == "vqvae":
         stage = AutoencoderStage(shapes, recipe.shapes_per_batch, components)
@@ -116,7 +121,8 @@ _PARTS = {
     "layout": ("latent", "layout"),
     "vqvae": ("autoencoder",),
     "shape": ("latent", "autoencoder", "shape"),
-    "joint": PARTS,
+    "joint": ("latent", "layout", "autoencoder", "shape"),
+    "parts": ("latent", "furniture"),
 }
 
 

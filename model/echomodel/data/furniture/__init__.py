@@ -9,47 +9,46 @@ import trimesh
 
 from echomodel.data.furniture import armchairs, beds, chairs, decor, lamps, shelving, sofas, stools, storage, tables
 from echomodel.data.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.furniture.style import Style
 from echomodel.vocabulary import vocabulary
 
-__all__ = ["MATERIALS", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
+__all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 
-Builder = Callable[[np.ndarray, Style, np.random.Generator], list[Solid]]
+Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, lamps, decor)
 SAME_AS = {"table": "dining_table"}
 
 
-def solids(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> list[Solid]:
+def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> list[Solid]:
     """The parts of one piece of furniture, about as large as `size`.
 
     Arguments:
         category: a word of the vocabulary; raises `UnknownWord` for others.
         style: what the piece shares with its suite.
-        rng: decides what the style leaves open.
-        size: (3,) width x, height y, depth z in metres; None draws one with `sample_size`.
+        choices: what the style leaves open.
+        size: (3,) width x, height y, depth z in metres.
 
     Raises ValueError for a size that is not three positive numbers.
     """
     name = vocabulary().category(category).name
-    if size is None:
-        size = sample_size(name, rng, style)
     size = np.asarray(size, float)
     if size.shape != (3,) or not (np.isfinite(size).all() and (size > 0).all()):
         raise ValueError(f"size of {name} is {size.tolist()}, need three positive numbers in metres")
-    return _builder(name)(size, style, rng)
+    return _builder(name)(size, style, choices)
 
 
 def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
     """One piece of furniture as a watertight mesh in the object frame (+Y up, +Z front, standing on y = 0), metres.
 
-    Arguments as for `solids`; the mesh fills `size` exactly. Part numbers, materials and texture coordinates are face
-    attributes, see `mesh_of`.
+    Arguments as for `solids`; `rng` draws the choices and, where it is None, the size. The mesh fills `size` exactly.
+    Part numbers, materials and texture coordinates are face attributes, see `mesh_of`.
     """
     if size is None:
         size = sample_size(category, rng, style)
-    return mesh_of(solids(category, style, rng, size), size)
+    return mesh_of(solids(category, style, Choices.draw(rng), size), size)
 
 
 def _builder(name: str) -> Builder:

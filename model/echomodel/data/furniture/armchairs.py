@@ -9,10 +9,11 @@ import numpy as np
 from echomodel.data.furniture.backs import chair_legs, leaning, slim_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
 from echomodel.data.furniture.solids import Shell, Solid, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def armchair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Upholstered: a tub with a curved wall, or a body with arms, a seat cushion and a back cushion."""
     w, h, d = size
     foot = min(style.leg_height * 0.9, 0.16) if style.legs not in ("plinth", "bun") else 0.05
@@ -119,11 +120,11 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
     return parts
 
 
-def lounge_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Low and leaning: a raked seat and back on a frame, a shell on four legs or a swivel foot, or an egg."""
     w, h, d = size
     seat = min(0.4, h * 0.5)
-    kind = rng.choice(["frame", "shell", "swivel"], p=[0.45, 0.35, 0.2])
+    kind = choices.pick("kind", ["frame", "shell", "swivel"], [0.45, 0.35, 0.2])
     if kind == "frame":
         tilt, rake = 0.12, 0.2 + style.rake
         parts: list[Solid] = chair_legs(style, w * 0.96, d * 0.86, seat * 0.8, 0.04 * style.bulk, tie=False)

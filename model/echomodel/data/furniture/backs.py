@@ -8,6 +8,7 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import base, box, cushion, leg, top
 from echomodel.data.furniture.solids import Ball, Block, Solid, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
@@ -40,7 +41,7 @@ def back_rest(
     z: float,
     thick: float,
     rake: float,
-    rng: np.random.Generator,
+    choices: Choices,
 ) -> list[Solid]:
     """The back of a chair from the seat's height y0 up to y1, its foot on the plane z, leaning back by `rake`."""
     length = (y1 - y0) / np.cos(rake)

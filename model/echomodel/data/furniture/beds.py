@@ -9,10 +9,11 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, base, box, cushion, front
 from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def _headboard(style: Style, w: float, h: float, z: float, rng: np.random.Generator) -> list[Solid]:
+def _headboard(style: Style, w: float, h: float, z: float, choices: Choices) -> list[Solid]:
     """The board at the head of a bed, its rear on the plane z, `w` wide and `h` high."""
     t = 0.05 + 0.04 * style.bulk
     kind = style.headboard
@@ -79,7 +80,7 @@ def _headboard(style: Style, w: float, h: float, z: float, rng: np.random.Genera
 
 
 def _bedding(
-    w: float, z0: float, z1: float, low: float, rng: np.random.Generator, style: Style, pillows: int
+    w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int
 ) -> list[Solid]:
     """Mattress, pillows and a cover from z0 (head) to z1."""
     thick = 0.2
@@ -96,8 +97,8 @@ def _bedding(
                 material="shade",
             )
         )
-    if rng.random() < 0.75:
-        start = z0 + (z1 - z0) * rng.uniform(0.28, 0.55)
+    if choices.chance("cover", 0.75):
+        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.55)
         over = 0.02 + 0.05 * style.softness
         parts.append(
             box(
@@ -110,14 +111,14 @@ def _bedding(
     return parts
 
 
-def _bed(size: Size, style: Style, rng: np.random.Generator, pillows: int) -> list[Solid]:
+def _bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]:
     """A frame on legs or a plinth, a headboard, bedding, perhaps a footboard."""
     w, h, d = size
     z0, z1 = -d / 2, d / 2
-    wide = w - (0.0 if rng.random() < 0.75 else min(0.5, w * 0.2))
+    wide = w - (0.0 if choices.chance("form", 0.75) else min(0.5, w * 0.2))
     frame = wide * 0.99
     foot = 0.06 if style.legs in ("plinth", "bun") else float(np.clip(style.leg_height + 0.06, 0.1, 0.25))
-    rail = float(rng.uniform(0.12, 0.24))
+    rail = choices.between("share", 0.12, 0.24)
     deck = min(foot + rail, 0.42)
     head = 0.13
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "splayed") else "straight"
@@ -131,38 +132,38 @@ def _bed(size: Size, style: Style, rng: np.random.Generator, pillows: int) -> li
             0.03 if upholstered else 0.0,
         )
     )
-    parts += _headboard(style, w, h, z0, rng)
-    parts += _bedding(frame * 0.95, z0 + head, z1 - 0.04, deck - 0.06, rng, style, pillows)
-    if style.headboard in ("slats", "posts", "arched") and rng.random() < 0.6:
+    parts += _headboard(style, w, h, z0, choices)
+    parts += _bedding(frame * 0.95, z0 + head, z1 - 0.04, deck - 0.06, choices, style, pillows)
+    if style.headboard in ("slats", "posts", "arched") and choices.chance("second", 0.6):
         parts.append(box((-frame / 2, 0, z1 - 0.05), (frame / 2, deck + min(0.3, 0.35 * (h - deck)), z1), "wood", 0.01))
     return parts
 
 
-def double_bed(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def double_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two pillows, or four in a broad bed."""
-    return _bed(size, style, rng, 2 if size[0] < 2.4 else 3)
+    return _bed(size, style, choices, 2 if size[0] < 2.4 else 3)
 
 
-def single_bed(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def single_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """One pillow."""
-    return _bed(size, style, rng, 1)
+    return _bed(size, style, choices, 1)
 
 
-def kids_bed(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A cot when small, a bunk when tall, otherwise a small bed with rails, drawers or a gabled headboard."""
     w, h, d = size
     if w < 0.85 or d < 1.4:
         return _cot(size, style)
     if h > 1.55:
-        return _bunk(size, style, rng)
-    if h > 1.2 and rng.random() < 0.45:
+        return _bunk(size, style, choices)
+    if h > 1.2 and choices.chance("kind", 0.45):
         return _loft(size)
-    house = h > 1.1 and rng.random() < 0.7
-    parts = _bed(np.array([w, min(h, 1.0) if house else h, d]), style, rng, 1)
+    house = h > 1.1 and choices.chance("extra", 0.7)
+    parts = _bed(np.array([w, min(h, 1.0) if house else h, d]), style, choices, 1)
     if house:
         return parts + _house(w, h, d)
     y0, y1 = 0.3, min(h * 0.85, 0.72)
-    side = -1 if rng.random() < 0.5 else 1
+    side = -1 if choices.chance("side", 0.5) else 1
     for y in np.linspace(y0 + 0.12, y1, 2):
         parts.append(box((side * w / 2 - 0.02, y - 0.035, -d * 0.48), (side * w / 2 + 0.02, y + 0.035, d * 0.1)))
     parts += [
@@ -238,7 +239,7 @@ def _cot(size: Size, style: Style) -> list[Solid]:
     return parts
 
 
-def _bunk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two decks on four posts, a rail above and a ladder or stairs with drawers."""
     w, h, d = size
     stairs = w > 1.9

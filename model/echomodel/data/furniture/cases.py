@@ -6,6 +6,7 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, base, box, front
 from echomodel.data.furniture.solids import Solid
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 BOARD = 0.02
@@ -73,14 +74,14 @@ def fronted(size: Size, style: Style, foot: float, rows: int, columns: int, kind
     return parts + front((x0, y0), (x1, y1), z, rows, columns, kind, style)
 
 
-def mixed(size: Size, style: Style, rng: np.random.Generator, foot: float, column_width: float) -> list[Solid]:
+def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width: float) -> list[Solid]:
     """Columns side by side, each doors, drawers or open cells; symmetrical more often than not."""
     _w, _h, d = size
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
     count = int(np.clip(round((x1 - x0) / column_width), 1, 6))
     odds = [0.5, 0.3, 0.2] if style.fronts != "open" else [0.35, 0.25, 0.4]
-    kinds = [str(k) for k in rng.choice(["door", "drawer", "open"], size=count, p=odds)]
-    if rng.random() < 0.7:
+    kinds = [str(k) for k in choices.stream("pattern").choice(["door", "drawer", "open"], size=count, p=odds)]
+    if choices.chance("symmetry", 0.7):
         kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
     xs = np.linspace(x0, x1, count + 1)
     t = BOARD

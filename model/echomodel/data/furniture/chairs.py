@@ -11,10 +11,11 @@ from echomodel.data.furniture.backs import back_rest, chair_legs, leaning, seat_
 from echomodel.data.furniture.carpentry import Size, base, box, top
 from echomodel.data.furniture.solids import Ball, Shell, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.stools import stool
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def dining_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Four legs or a sled, a seat, and the style's back; sometimes slim arms."""
     w, h, d = size
     seat = float(np.clip(0.46, 0.4 * h, 0.62 * h))
@@ -37,19 +38,19 @@ def dining_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
             material="fabric",
         )
         return [*parts, shell]
-    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake, rng)
+    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake, choices)
 
 
-def chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A plain chair, with arms more often than a dining chair."""
-    parts = dining_chair(size, style, rng)
+    parts = dining_chair(size, style, choices)
     w, h, d = size
-    if h > 0.7 and style.back != "shell" and rng.random() < 0.45:
+    if h > 0.7 and style.back != "shell" and choices.chance("extra", 0.45):
         parts += slim_arms(w * 1.04, d, 0.46, h, style, 0.03)
     return parts
 
 
-def chinese_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Ming style: round posts, a board seat, a splat in the middle, a yoke or a horseshoe arm, stretchers all round."""
     w, h, d = size
     r = 0.016 * (0.9 + 0.3 * style.bulk)
@@ -60,10 +61,10 @@ def chinese_chair(size: Size, style: Style, rng: np.random.Generator) -> list[So
     parts += [Tube(points=np.array([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]]), radius=r) for cx, cz in corners]
     parts += [Tube(points=np.array([[-x, y, cz], [x, y, cz]]), radius=r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
     parts += [Tube(points=np.array([[cx, 0.13, -z], [cx, 0.13, z]]), radius=r * 0.7) for cx in (-x, x)]
-    splat = w * rng.uniform(0.14, 0.24)
+    splat = w * choices.between("share", 0.14, 0.24)
     parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
     arm = seat + (h - seat) * 0.48
-    if rng.random() < 0.5:
+    if choices.chance("kind", 0.5):
         t = np.linspace(-np.pi / 2, np.pi / 2, 13)
         fall = np.abs(t) / (np.pi / 2)
         bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
@@ -102,11 +103,11 @@ def chinese_chair(size: Size, style: Style, rng: np.random.Generator) -> list[So
     return parts
 
 
-def dressing_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A vanity stool or a small chair with a low back."""
     w, h, d = size
     if h < 0.55:
-        return stool(size, style, rng)
+        return stool(size, style, choices)
     seat = min(0.44, h * 0.7)
     thick = 0.06 + 0.04 * style.softness
     parts: list[Solid] = chair_legs(style, w * 0.9, d * 0.9, seat - thick, 0.034 * style.bulk)
@@ -124,17 +125,17 @@ def dressing_chair(size: Size, style: Style, rng: np.random.Generator) -> list[S
                 material="fabric",
             ),
         ]
-    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5, rng)
+    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5, choices)
 
 
-def bar_stool(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A high seat with a foot rest, with a low back or without, on four legs or a column."""
     w, h, d = size
-    backed = h > 0.88 or rng.random() < 0.3
+    backed = h > 0.88 or choices.chance("back", 0.3)
     seat = min(0.75, h * 0.78) if backed else h
     thick = 0.035 + 0.04 * style.softness
     parts: list[Solid] = []
-    if rng.random() < 0.25:
+    if choices.chance("form", 0.25):
         r = 0.026
         parts += [
             Turned(low=(r, r), high=(r, r), height=seat - thick, material="metal"),
@@ -172,10 +173,10 @@ def bar_stool(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]
                 material="fabric",
             ),
         ]
-    return parts + back_rest(style, style.back, w * 0.84, seat, h, -d * 0.38, 0.04, style.rake * 0.5, rng)
+    return parts + back_rest(style, style.back, w * 0.84, seat, h, -d * 0.38, 0.04, style.rake * 0.5, choices)
 
 
-def office_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Five feet with casters, a column, a seat, a raked back, and arms."""
     w, h, d = size
     seat, reach = min(0.48, h * 0.52), min(w, d) * 0.48
@@ -257,7 +258,7 @@ def office_chair(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
             material="metal",
         )
     )
-    if rng.random() < 0.75:
+    if choices.chance("extra", 0.75):
         y = seat + 0.2
         for s in (-1, 1):
             x = s * (w / 2 - 0.025)

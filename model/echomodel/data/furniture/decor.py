@@ -6,19 +6,20 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def plant(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A pot, perhaps on a stand, with a tree crown, arching blades, broad leaves on stems or a cactus."""
     w, h, d = size
     reach = min(w, d) / 2
-    pot_h = float(np.clip(h * rng.uniform(0.18, 0.32), 0.12, 0.5))
-    pot_r = float(np.clip(reach * rng.uniform(0.45, 0.7), 0.08, 0.28))
+    pot_h = float(np.clip(h * choices.between("share", 0.18, 0.32), 0.12, 0.5))
+    pot_r = float(np.clip(reach * choices.between("spread", 0.45, 0.7), 0.08, 0.28))
     power = 2.0 if style.profile == "round" or style.corner > 0.4 else 6.0
     foot = 0.0
     parts: list[Solid] = []
-    if style.legs in ("tapered", "splayed", "hairpin") and rng.random() < 0.45:
+    if style.legs in ("tapered", "splayed", "hairpin") and choices.chance("raised", 0.45):
         foot = min(0.2, h * 0.15)
         for a in np.arange(4) * np.pi / 2 + np.pi / 4:
             x, z = pot_r * 1.05 * np.cos(a), pot_r * 1.05 * np.sin(a)
@@ -45,17 +46,18 @@ def plant(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         )
     )
     y0 = foot + pot_h
-    kind = rng.choice(["tree", "blades", "leaves", "cactus"], p=[0.38, 0.22, 0.32, 0.08])
+    kind = choices.pick("kind", ["tree", "blades", "leaves", "cactus"], [0.38, 0.22, 0.32, 0.08])
     grow = {"tree": _tree, "blades": _blades, "leaves": _leaves, "cactus": _cactus}[kind]
-    return parts + grow(y0, h, w / 2, d / 2, rng)
+    return parts + grow(y0, h, w / 2, d / 2, choices)
 
 
-def _tree(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
+def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """A trunk and a crown of leaf clumps."""
-    crown = (h - y0) * rng.uniform(0.45, 0.65)
+    rng = choices.stream("detail")
+    crown = (h - y0) * choices.between("split", 0.45, 0.65)
     top = h - crown / 2
     parts: list[Solid] = [Tube(points=np.array([[0, y0, 0], [0.02, (y0 + top) / 2, 0.01], [0, top, 0]]), radius=0.02)]
-    for _ in range(int(rng.integers(6, 11))):
+    for _ in range(choices.whole("count", 6, 11)):
         direction = rng.normal(size=3)
         direction /= np.linalg.norm(direction)
         share = rng.uniform(0.45, 0.6)
@@ -76,10 +78,11 @@ def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float)
     )
 
 
-def _blades(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
+def _blades(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """Long blades that rise from the pot and arch outward."""
+    rng = choices.stream("detail")
     parts: list[Solid] = []
-    count = int(rng.integers(7, 10))
+    count = choices.whole("count", 7, 10)
     for i in range(count):
         yaw = 2 * np.pi * (i + rng.uniform(-0.1, 0.1)) / count
         spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.8, 1.0)
@@ -94,10 +97,11 @@ def _blades(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -
     return parts
 
 
-def _leaves(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
+def _leaves(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """Broad leaves at the ends of stems."""
+    rng = choices.stream("detail")
     parts: list[Solid] = []
-    count = int(rng.integers(6, 9))
+    count = choices.whole("count", 6, 9)
     for i in range(count):
         yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.03, 0.03))
         tall = (h - y0) * (0.35 + 0.6 * i / count)
@@ -115,8 +119,9 @@ def _leaves(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -
     return parts
 
 
-def _cactus(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -> list[Solid]:
+def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """A column with bent arms."""
+    rng = choices.stream("detail")
     r = min(a, b) * 0.26
     parts: list[Solid] = [
         Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf"),
@@ -132,10 +137,10 @@ def _cactus(y0: float, h: float, a: float, b: float, rng: np.random.Generator) -
     return parts
 
 
-def tv(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A flat screen with a bezel on two feet, a foot plate, or none."""
     w, h, d = size
-    kind = rng.choice(["feet", "plate", "wall"], p=[0.45, 0.35, 0.2]) if d < 0.1 else rng.choice(["feet", "plate"])
+    kind = choices.pick("kind", ["feet", "plate", "wall"], [0.45, 0.35, 0.2]) if d < 0.1 else choices.pick("kind", ["feet", "plate"])
     low = 0.0 if kind == "wall" else h * 0.08
     t = min(d, 0.05) if kind != "wall" else d
     parts: list[Solid] = [

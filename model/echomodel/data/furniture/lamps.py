@@ -6,6 +6,7 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 DOWN = rotation(x=np.pi)
@@ -43,16 +44,16 @@ def _kind(style: Style, *without: str) -> str:
     return style.shade if style.shade not in ("ring", "arms", *without) else "drum"
 
 
-def pendant_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A canopy, a cord and a shade; a row of shades; a ring; or a chandelier with arms. The top is the ceiling."""
     w, h, d = size
     canopy = min(0.06, w * 0.2, d * 0.3) if min(w, d) > 0.14 else min(w, d) * 0.35
     parts: list[Solid] = []
     if w / d > 1.6:
-        return _row(size, style, rng)
+        return _row(size, style, choices)
     parts.append(_disc(0, h - 0.025, 0, canopy, canopy, 0.025))
-    if w > 0.45 and (style.shade == "arms" or rng.random() < 0.25):
-        return parts + _chandelier(size, style, rng)
+    if w > 0.45 and (style.shade == "arms" or choices.chance("kind", 0.25)):
+        return parts + _chandelier(size, style, choices)
     if style.shade == "ring" and w > 0.4:
         return parts + _rings(size, style)
     tall = min(h * 0.55, max(w * (0.4 + 0.4 * style.taper), h * 0.22))
@@ -67,11 +68,11 @@ def pendant_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     return parts + shade(kind, 0, 0, 0, w / 2, d / 2, tall, style)
 
 
-def _row(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Several shades under one bar."""
     w, h, d = size
     bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal")
-    if d < 0.25 and (style.shade == "ring" or rng.random() < 0.3):
+    if d < 0.25 and (style.shade == "ring" or choices.chance("form", 0.3)):
         beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01)
         return [
             bar,
@@ -94,11 +95,11 @@ def _row(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
-def _chandelier(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Curved arms round a stem, a candle or a small shade on each."""
     w, h, d = size
     body = min(h * 0.55, w * 0.6)
-    arms = int(rng.choice([5, 6, 8]))
+    arms = choices.pick("count", [5, 6, 8])
     r = max(0.008, 0.012 * w)
     parts: list[Solid] = [Tube(points=np.array([[0, body * 0.1, 0], [0, h, 0]]), radius=r, material="metal")]
     parts.append(
@@ -146,15 +147,15 @@ def _rings(size: Size, style: Style) -> list[Solid]:
     return parts
 
 
-def ceiling_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Flush with the ceiling: a drum, a bowl, a square panel, rings, or arms with spheres when tall."""
     w, h, d = size
     plate = _disc(0, h * 0.8, 0, w * 0.3, d * 0.3, h * 0.2)
     alike = max(w, d) / min(w, d) < 1.2
     if h > 0.35:
         stem = Tube(points=np.array([[0, h * 0.45, 0], [0, h, 0]]), radius=0.014, material="metal")
-        if rng.random() < 0.5:
-            count = int(rng.choice([3, 4, 6]))
+        if choices.chance("form", 0.5):
+            count = choices.pick("count", [3, 4, 6])
             parts: list[Solid] = [stem, _disc(0, h - 0.03, 0, w * 0.14, d * 0.14, 0.03)]
             r = min(0.09, w * 0.14, h * 0.25)
             for a in np.arange(count) * 2 * np.pi / count:
@@ -167,7 +168,7 @@ def ceiling_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
             _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03),
             *shade(_kind(style), 0, 0, 0, w / 2, d / 2, h * 0.55, style),
         ]
-    kind = str(rng.choice(["panel", "bowl", "drum", "ring"], p=[0.3, 0.3, 0.25, 0.15]))
+    kind = choices.pick("kind", ["panel", "bowl", "drum", "ring"], [0.3, 0.3, 0.25, 0.15])
     if not alike or (style.profile == "square" and kind == "panel"):
         glow = box((-w / 2, 0, -d / 2), (w / 2, h * 0.85, d / 2), "shade", min(0.03, h * 0.3) * style.softness)
         return [glow, box((-w * 0.42, h * 0.6, -d * 0.42), (w * 0.42, h, d * 0.42), "metal")]
@@ -196,7 +197,7 @@ def ceiling_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     return [plate, drum]
 
 
-def floor_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A foot, a straight pole, an arc, an angled arm or a tripod, and a shade."""
     w, h, d = size
     r = 0.012 * (0.8 + 0.4 * style.bulk)
@@ -225,7 +226,7 @@ def floor_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     a, b = w / 2, d / 2
     kind = _kind(style)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
-    if style.legs in ("splayed", "trestle", "tapered") and rng.random() < 0.6:
+    if style.legs in ("splayed", "trestle", "tapered") and choices.chance("form", 0.6):
         hub = (h - tall) * 0.93
         for angle in np.arange(3) * 2 * np.pi / 3 + np.pi / 2:
             toe = [a * 0.95 * np.cos(angle), r, b * 0.95 * np.sin(angle)]
@@ -238,11 +239,11 @@ def floor_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     return [*parts, pole]
 
 
-def table_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A vase, a column, balls or a tripod under a shade; or a desk lamp with an elbow."""
     w, h, d = size
     a, b = w / 2, d / 2
-    if style.family == "industrial" and rng.random() < 0.6:
+    if style.family == "industrial" and choices.chance("form", 0.6):
         r = 0.008
         arm = np.array([[0, 0.02, -b * 0.6], [0, h * 0.6, -b * 0.8], [0, h * 0.95, b * 0.3]])
         return [
@@ -254,7 +255,7 @@ def table_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     kind = _kind(style)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
     stem = h - tall
-    body = rng.choice(["vase", "column", "balls", "cone"])
+    body = choices.pick("kind", ["vase", "column", "balls", "cone"])
     if body == "vase":
         parts += [
             Ball(
@@ -282,7 +283,7 @@ def table_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     return parts
 
 
-def wall_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A plate at the wall (-z), an arm and a shade; or a half cylinder; or two shades on a bar."""
     w, h, d = size
     plate = box((-min(w, h) * 0.18, h * 0.3, -d / 2), (min(w, h) * 0.18, h * 0.7, -d / 2 + 0.02), "metal")
@@ -306,7 +307,7 @@ def wall_lamp(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]
                 for p in shade(_kind(style), s * (w / 2 - r), h * 0.3, d / 2 - r, r, r, h * 0.7, style)
             ],
         ]
-    if rng.random() < 0.3:
+    if choices.chance("form", 0.3):
         body = Turned(
             centre=np.array([0, 0, d * 0.1]), low=(w / 2, d * 0.4), high=(w / 2, d * 0.4), height=h, material="shade"
         )

@@ -9,25 +9,27 @@ import numpy as np
 from echomodel.data.furniture.carpentry import Size, base, box, front
 from echomodel.data.furniture.cases import BOARD, carcass, foot_height, shelves
 from echomodel.data.furniture.solids import Solid, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def bookshelf(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Open rows and columns with a back or without, some cells closed, some books; or a ladder of boards."""
     w, h, d = size
-    rows, columns = max(1, round(h / rng.uniform(0.3, 0.42))), max(1, round(w / rng.uniform(0.4, 0.8)))
-    if style.family == "industrial" and rng.random() < 0.6:
+    rows, columns = max(1, round(h / choices.between("rows", 0.3, 0.42))), max(1, round(w / choices.between("columns", 0.4, 0.8)))
+    if style.family == "industrial" and choices.chance("form", 0.6):
         return _rack(size, rows, columns)
-    foot = min(0.08, style.leg_height) if rng.random() < 0.5 else 0.02
+    foot = min(0.08, style.leg_height) if choices.chance("raised", 0.5) else 0.02
     parts, rect = carcass(
-        size, style, foot, kind="plinth" if foot < 0.04 else None, solid=False, back=rng.random() < 0.8
+        size, style, foot, kind="plinth" if foot < 0.04 else None, solid=False, back=choices.chance("back", 0.8)
     )
     parts += shelves(rect, d, -d / 2, rows, columns, style)
     x0, y0, x1, y1, z = rect
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
-    if rows > 2 and rng.random() < 0.4:
+    if rows > 2 and choices.chance("front", 0.4):
         parts.append(box((x0, y0, -d / 2), (x1, float(ys[1]), z)))
         parts += front((x0, y0), (x1, float(ys[1])), z, 1, max(1, columns), "door", style)
+    rng = choices.stream("pattern")
     for i in range(columns):
         for j in range(1, rows):
             if rng.random() < 0.4:
@@ -64,11 +66,11 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
     return parts + [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
 
 
-def shelf(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Lighter than a bookshelf: boards on uprights, a ladder, or boards round one post."""
     w, h, d = size
-    rows = max(1, round(h / rng.uniform(0.3, 0.45)))
-    kind = rng.choice(["rack", "boards", "ladder", "steps"])
+    rows = max(1, round(h / choices.between("rows", 0.3, 0.45)))
+    kind = choices.pick("kind", ["rack", "boards", "ladder", "steps"])
     if kind == "rack" or style.family == "industrial":
         return _rack(size, rows, max(1, round(w / 0.9)))
     t = BOARD * (0.8 + 0.5 * style.bulk)
@@ -107,16 +109,16 @@ def shelf(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     return [*parts, *base(style, w * 0.9, d * 0.9, float(ys[0]), 0.035, "straight")]
 
 
-def wine_cabinet(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Closed below; above a lattice for bottles, glass doors or shelves."""
     _w, h, d = size
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot_height(style, h, 0.12), solid=False)
-    split = y0 + (y1 - y0) * rng.uniform(0.3, 0.45)
+    split = y0 + (y1 - y0) * choices.between("split", 0.3, 0.45)
     columns = max(1, round((x1 - x0) / 0.45))
     parts.append(box((x0, y0, -d / 2), (x1, split, z)))
     parts += front((x0, y0), (x1, split), z, 1, columns, "door", style)
     bays = np.linspace(x0, x1, columns + 1)
-    lattice = int(rng.integers(0, columns))
+    rng, lattice = choices.stream("pattern"), choices.whole("side", 0, columns)
     for i in range(columns):
         a, b = float(bays[i]), float(bays[i + 1])
         if i:

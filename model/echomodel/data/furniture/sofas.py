@@ -10,6 +10,7 @@ import numpy as np
 from echomodel.data.furniture.armchairs import upholstered_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
 from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
@@ -115,24 +116,24 @@ def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) 
     ]
 
 
-def multi_seat_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two to four seat cushions, or one long one."""
-    count = int(np.clip(round(size[0] / rng.uniform(0.6, 0.85)), 2, 4))
-    return _couch(size, style, 1 if rng.random() < 0.12 else count)
+    count = int(np.clip(round(size[0] / choices.between("count", 0.6, 0.85)), 2, 4))
+    return _couch(size, style, 1 if choices.chance("form", 0.12) else count)
 
 
-def loveseat_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def loveseat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two seats, or one cushion across."""
-    if style.back == "shell" and rng.random() < 0.5:
+    if style.back == "shell" and choices.chance("kind", 0.5):
         return _curved(size, style)
-    return _couch(size, style, 1 if rng.random() < 0.2 or size[0] < 1.0 else 2)
+    return _couch(size, style, 1 if choices.chance("form", 0.2) or size[0] < 1.0 else 2)
 
 
-def sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Any sofa: rows of cushions, or a curved one."""
-    if rng.random() < 0.15 or (style.back == "shell" and rng.random() < 0.5):
+    if choices.chance("extra", 0.15) or (style.back == "shell" and choices.chance("kind", 0.5)):
         return _curved(size, style)
-    return multi_seat_sofa(size, style, rng)
+    return multi_seat_sofa(size, style, choices)
 
 
 def _curved(size: Size, style: Style) -> list[Solid]:
@@ -170,14 +171,14 @@ def _curved(size: Size, style: Style) -> list[Solid]:
     return parts
 
 
-def l_shaped_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A sofa whose end seat reaches forward as a chaise, left or right; or two sofas that meet in a corner."""
     w, h, depth = size
     d = float(np.clip(0.95, 0.5 * depth, 0.7 * depth))
-    side = -1 if rng.random() < 0.5 else 1
+    side = -1 if choices.chance("side", 0.5) else 1
     count = int(np.clip(round(w / 0.85), 3, 5))
     parts = _couch(np.array([w, h, d]), style, count, chaise=side, chaise_depth=depth)
-    if rng.random() < 0.35:
+    if choices.chance("extra", 0.35):
         foot, seat, frame = _foot(style), 0.43, 0.14
         y1 = h - 0.06
         x0, x1 = sorted((side * w / 2, side * (w / 2 - frame)))
@@ -197,7 +198,7 @@ def l_shaped_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[So
     return parts
 
 
-def chaise_longue_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """One long seat with a back at its end, and an arm at one side or none."""
     w, h, d = size
     foot = max(0.05, _foot(style))
@@ -209,10 +210,10 @@ def chaise_longue_sofa(size: Size, style: Style, rng: np.random.Generator) -> li
     back = box((-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), "fabric", 0.05)
     turn, pivot = rotation(x=-rake), np.array([0, seat - pad, -d / 2 + 0.08])
     parts.append(replace(back, centre=turn @ (back.centre - pivot) + pivot, turn=turn))
-    if rng.random() < 0.6:
-        s = -1 if rng.random() < 0.5 else 1
+    if choices.chance("extra", 0.6):
+        s = -1 if choices.chance("side", 0.5) else 1
         x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))
-        reach = -d / 2 + d * rng.uniform(0.35, 0.6)
+        reach = -d / 2 + d * choices.between("share", 0.35, 0.6)
         parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style))
     if style.arms == "rolled":
         parts.append(
@@ -229,10 +230,10 @@ def chaise_longue_sofa(size: Size, style: Style, rng: np.random.Generator) -> li
     return parts
 
 
-def lazy_sofa(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A bean bag: pear-shaped, a ball with a hollow, or a low folded chair."""
     w, h, d = size
-    kind = rng.choice(["pear", "lounger", "folded"])
+    kind = choices.pick("kind", ["pear", "lounger", "folded"])
     if kind == "pear":
         return [
             Ball(

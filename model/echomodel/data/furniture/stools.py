@@ -9,15 +9,16 @@ import numpy as np
 from echomodel.data.furniture.backs import seat_of
 from echomodel.data.furniture.carpentry import Size, base, box, cushion, top
 from echomodel.data.furniture.solids import Ball, Solid, Turned
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def stool(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A round or square seat on legs, a drum, or an hourglass."""
     w, h, d = size
     alike = max(w, d) / min(w, d) < 1.15
     shape = "round" if alike and style.round_tops > 0.4 else "corners"
-    if alike and rng.random() < 0.15:
+    if alike and choices.chance("kind", 0.15):
         waist = 0.3 + 0.15 * style.taper
         return [
             Turned(low=(w * 0.48, d * 0.48), high=(w * waist, d * waist), height=h / 2),
@@ -35,11 +36,11 @@ def stool(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     ]
 
 
-def bench(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def bench(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Long, without a back: a board or an upholstered seat on legs, or a chest with a cushion."""
     w, h, d = size
     thick = 0.035 + 0.09 * style.softness
-    if rng.random() < 0.2:
+    if choices.chance("kind", 0.2):
         return [
             box((-w / 2 * 0.98, 0.03, -d / 2 * 0.96), (w / 2 * 0.98, h - 0.08, d / 2 * 0.96), "fabric", 0.01),
             cushion((-w / 2, h - 0.1, -d / 2), (w / 2, h, d / 2), style),
@@ -49,11 +50,11 @@ def bench(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     return [seat_of(style, w, d, h, thick), *base(style, w * 0.94, d * 0.92, h - thick * 0.8, 0.045 * style.bulk, legs)]
 
 
-def ottoman(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """An upholstered block, drum or pouf, on short legs or on the floor."""
     w, h, d = size
     alike = max(w, d) / min(w, d) < 1.15
-    foot = min(style.leg_height, h * 0.4) if rng.random() < 0.65 else 0.0
+    foot = min(style.leg_height, h * 0.4) if choices.chance("raised", 0.65) else 0.0
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "plinth") else "tapered"
     parts: list[Solid] = base(style, w * 0.8, d * 0.8, foot, 0.04 * style.bulk, kind) if foot else []
     if alike and style.round_tops > 0.45:

@@ -9,14 +9,15 @@ import numpy as np
 from echomodel.data.furniture.carpentry import Size, base, box, front
 from echomodel.data.furniture.cases import BOARD, carcass, foot_height, fronted, mixed, shelves
 from echomodel.data.furniture.solids import Solid, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
-def nightstand(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """One to three drawers, or a drawer over an open cell, on legs or a plinth; rarely a drum."""
     w, h, d = size
     foot = foot_height(style, h, 0.4)
-    kind = rng.choice(["drawers", "niche", "table", "drum"], p=[0.55, 0.27, 0.13, 0.05])
+    kind = choices.pick("kind", ["drawers", "niche", "table", "drum"], [0.55, 0.27, 0.13, 0.05])
     if kind == "drum" and style.profile == "round":
         body = Turned(centre=np.array([0, foot, 0]), low=(w / 2, d / 2), high=(w / 2, d / 2), height=h - foot)
         lip = Turned(
@@ -30,8 +31,8 @@ def nightstand(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     if kind == "niche":
         parts, rect = carcass(size, style, foot, solid=False)
         x0, y0, x1, y1, z = rect
-        mid = y0 + (y1 - y0) * rng.uniform(0.4, 0.6)
-        low, high = ((x0, mid), (x1, y1)) if rng.random() < 0.7 else ((x0, y0), (x1, mid))
+        mid = y0 + (y1 - y0) * choices.between("split", 0.4, 0.6)
+        low, high = ((x0, mid), (x1, y1)) if choices.chance("side", 0.7) else ((x0, y0), (x1, mid))
         drawer = box((*low, -d / 2), (*high, z))
         return [*parts, drawer, *front(low, high, z, 1, 1, "drawer", style)]
     if kind == "table":
@@ -44,64 +45,64 @@ def nightstand(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
         ]
         parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style)
         return parts + base(style, w * 0.95, d * 0.92, low, 0.035 * style.bulk, legs)
-    return fronted(size, style, foot, int(rng.choice([1, 2, 2, 3])), 1, "drawer")
+    return fronted(size, style, foot, choices.pick("rows", [1, 2, 2, 3]), 1, "drawer")
 
 
-def dresser(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def dresser(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Rows of drawers, one to three columns; the top row sometimes split."""
     w, h, _d = size
     foot = foot_height(style, h, 0.2)
-    rows = int(np.clip(round((h - foot) / rng.uniform(0.18, 0.26)), 2, 7))
-    columns = 1 if w < 0.75 else int(rng.integers(1, 3)) if w < 1.3 else int(rng.integers(2, 4))
+    rows = int(np.clip(round((h - foot) / choices.between("rows", 0.18, 0.26)), 2, 7))
+    columns = 1 if w < 0.75 else choices.whole("columns", 1, 3) if w < 1.3 else choices.whole("columns", 2, 4)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot)
-    if columns == 1 and w > 0.6 and rng.random() < 0.5:
+    if columns == 1 and w > 0.6 and choices.chance("form", 0.5):
         mid = y1 - (y1 - y0) / rows
         upper = front((x0, mid), (x1, y1), z, 1, 2, "drawer", style)
         return parts + upper + front((x0, y0), (x1, mid), z, rows - 1, 1, "drawer", style)
     return parts + front((x0, y0), (x1, y1), z, rows, columns, "drawer", style)
 
 
-def sideboard(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A low row of doors, drawers and cells; tall ones carry a shelf or a glazed upper part."""
     w, h, d = size
     if h > 1.3:
         lower = 0.85
         t = BOARD
-        parts = mixed(np.array([w, lower, d]), style, rng, foot_height(style, lower, 0.25), 0.5)
+        parts = mixed(np.array([w, lower, d]), style, choices, foot_height(style, lower, 0.25), 0.5)
         inner = w * 0.92
         z1 = -d / 2 + d * 0.7
         parts += [box((s * inner / 2 - t, lower, -d / 2), (s * inner / 2 + t, h, z1)) for s in (-1, 1)]
         parts += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1)) for y in (lower + (h - lower) * 0.5, h - t)]
         parts.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent"))
         return parts
-    return mixed(size, style, rng, foot_height(style, h, 0.3), float(rng.uniform(0.38, 0.55)))
+    return mixed(size, style, choices, foot_height(style, h, 0.3), choices.between("columns", 0.38, 0.55))
 
 
-def cabinet(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Doors above drawers, doors only, or mixed columns; tall ones may have open shelves on top."""
     w, h, d = size
     foot = foot_height(style, h, 0.22)
     if h > 1.5:
         parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
         columns = max(1, round((x1 - x0) / 0.48))
-        split = y0 + (y1 - y0) * rng.uniform(0.33, 0.5)
-        low_kind, rows = ("door", 1) if rng.random() < 0.6 else ("drawer", int(rng.integers(2, 4)))
+        split = y0 + (y1 - y0) * choices.between("split", 0.33, 0.5)
+        low_kind, rows = ("door", 1) if choices.chance("front", 0.6) else ("drawer", choices.whole("rows", 2, 4))
         parts.append(box((x0, y0, -d / 2), (x1, split, z)))
         parts += front((x0, y0), (x1, split), z, rows, columns, low_kind, style)
-        if style.fronts == "open" or rng.random() < 0.4:
-            parts += shelves((x0, split, x1, y1, z), d, -d / 2, int(rng.integers(2, 5)), columns, style)
+        if style.fronts == "open" or choices.chance("extra", 0.4):
+            parts += shelves((x0, split, x1, y1, z), d, -d / 2, choices.whole("count", 2, 5), columns, style)
             return parts
         parts.append(box((x0, split, -d / 2), (x1, y1, z)))
         return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style)
-    if rng.random() < 0.4:
+    if choices.chance("kind", 0.4):
         return fronted(size, style, foot, 1, max(2, round(w / 0.45)), "door")
-    return mixed(size, style, rng, foot, float(rng.uniform(0.4, 0.6)))
+    return mixed(size, style, choices, foot, choices.between("columns", 0.4, 0.6))
 
 
-def children_cabinet(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A grid of cells, some with bins or drawers, sometimes with a gabled top."""
     w, h, d = size
-    gable = rng.random() < 0.3
+    gable = choices.chance("form", 0.3)
     body = h * 0.8 if gable else h
     parts, (x0, y0, x1, y1, z) = carcass(
         np.array([w, body, d]), style, min(0.06, style.leg_height), kind="plinth", solid=False
@@ -109,6 +110,7 @@ def children_cabinet(size: Size, style: Style, rng: np.random.Generator) -> list
     columns, rows = max(1, round((x1 - x0) / 0.36)), max(2, round((y1 - y0) / 0.34))
     parts += shelves((x0, y0, x1, y1, z), d, -d / 2, rows, columns, style)
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+    rng = choices.stream("pattern")
     for i in range(columns):
         for j in range(rows):
             if rng.random() < 0.42:
@@ -126,49 +128,49 @@ def children_cabinet(size: Size, style: Style, rng: np.random.Generator) -> list
     return parts
 
 
-def wardrobe(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Full-height doors, one to five, hinged or sliding; drawers below or an open column in some."""
     w, _h, d = size
     foot = 0.05 if style.family in ("modern", "scandinavian", "industrial") else 0.09
     kind = "plinth" if style.legs not in ("bun", "turned") else "bun"
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, kind=kind)
-    doors = int(np.clip(round((x1 - x0) / rng.uniform(0.42, 0.58)), 1, 6))
-    choice = rng.choice(["doors", "drawers", "sliding", "open"], p=[0.45, 0.25, 0.15, 0.15])
+    doors = int(np.clip(round((x1 - x0) / choices.between("columns", 0.42, 0.58)), 1, 6))
+    choice = choices.pick("kind", ["doors", "drawers", "sliding", "open"], [0.45, 0.25, 0.15, 0.15])
     if choice == "sliding" and w > 1.2:
         count = 2 if w < 2.0 else 3
         xs = np.linspace(x0, x1, count + 1)
         for i in range(count):
             step = 0.025 * (i % 2)
             panel = (xs[i] - 0.015, y0, z - 0.005 + step), (xs[i + 1] + 0.015, y1, z + 0.02 + step)
-            parts.append(box(*panel, "glass" if rng.random() < 0.3 else "accent"))
+            parts.append(box(*panel, "glass" if choices.chance("second", 0.3) else "accent"))
         return parts
     if choice == "drawers":
-        split = y0 + (y1 - y0) * rng.uniform(0.2, 0.32)
-        rows = int(rng.integers(1, 3))
+        split = y0 + (y1 - y0) * choices.between("split", 0.2, 0.32)
+        rows = choices.whole("rows", 1, 3)
         parts += front((x0, y0), (x1, split), z, rows, max(1, doors // 2), "drawer", style)
         return parts + front((x0, split), (x1, y1), z, 1, doors, "door", style)
     if choice == "open" and doors >= 3:
         edge = x1 - (x1 - x0) / doors
         case, (_, cy0, _, cy1, cz) = carcass(size, style, foot, kind=kind, solid=False)
         case.append(box((x0, cy0, -d / 2), (edge, cy1, z)))
-        case += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, int(rng.integers(4, 7)), 1, style)
+        case += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, choices.whole("rows", 4, 7), 1, style)
         return case + front((x0, y0), (edge, y1), z, 1, doors - 1, "door", style)
     return parts + front((x0, y0), (x1, y1), z, 1, doors, "door", style)
 
 
-def tv_stand(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Long and low: drawers, flaps and open cells in a row, on legs, a plinth or floating low."""
     w, h, d = size
-    if h > 0.8 and rng.random() < 0.5:
+    if h > 0.8 and choices.chance("form", 0.5):
         low = np.array([w, 0.45, d])
-        parts = mixed(low, style, rng, foot_height(style, 0.45, 0.3), 0.5)
+        parts = mixed(low, style, choices, foot_height(style, 0.45, 0.3), 0.5)
         panel = box((-w / 2, 0.45, -d / 2), (w / 2, h, -d / 2 + 0.03), "accent")
         return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0))]
     foot = foot_height(style, h, 0.45)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
-    count = max(2, round(w / rng.uniform(0.42, 0.62)))
-    kinds = [str(k) for k in rng.choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])]
-    if rng.random() < 0.75:
+    count = max(2, round(w / choices.between("columns", 0.42, 0.62)))
+    kinds = [str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])]
+    if choices.chance("symmetry", 0.75):
         kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
     xs = np.linspace(x0, x1, count + 1)
     for i, kind in enumerate(kinds):

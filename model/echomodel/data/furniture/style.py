@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -60,6 +61,32 @@ FAMILIES: dict[str, dict[str, dict[str, float]]] = {
     },
 }
 
+KINDS: dict[str, tuple[str, ...]] = {
+    part: tuple(dict.fromkeys(kind for family in FAMILIES.values() for kind in family[part]))
+    for part in FAMILIES["modern"]
+}
+# Least and largest value of every proportion that `Style.draw` draws.
+PROPORTIONS: dict[str, tuple[float, float]] = {
+    "bulk": (0.85 * 0.85, 1.3 * 1.2),
+    "splay": (math.radians(5), math.radians(13)),
+    "rake": (math.radians(3), math.radians(16)),
+    "taper": (0.4, 0.8),
+    "leg_height": (0.04, 0.2),
+    "softness": (0.05, 1.0),
+    "corner": (0.0, 1.0),
+    "top": (0.018, 0.05),
+    "overhang": (0.0, 0.05),
+    "gap": (0.004, 0.01),
+    "round_tops": (0.0, 1.0),
+    "tufting": (0.0, 1.0),
+    "contrast": (0.0, 1.0),
+    "arm_height": (0.0, 1.0),
+    "seat_depth": (0.0, 1.0),
+    "edge": (0.0, 1.0),
+    "piping": (0.0, 1.0),
+    "finish": (0.0, 1.0),
+}
+
 
 @dataclass(frozen=True)
 class Style:
@@ -92,6 +119,9 @@ class Style:
     contrast: float
     arm_height: float
     seat_depth: float
+    edge: float
+    piping: float
+    finish: float
     size_shift: tuple[float, float, float]
 
     @classmethod
@@ -120,6 +150,9 @@ class Style:
             arm_height=float(rng.uniform(0, 1)),
             seat_depth=float(rng.uniform(0, 1)),
             size_shift=tuple(rng.normal(0, 1, 3).tolist()),
+            edge=float(rng.uniform(0, 1)),
+            piping=float(rng.uniform(0, 1)),
+            finish=float(rng.uniform(0, 1)),
         )
 
     def to_dict(self) -> dict[str, object]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, base, box, front, pedestal, top, within
 from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 
@@ -13,7 +14,7 @@ def _leg(style: Style, width: float, height: float) -> float:
     return float(np.clip(0.045 * style.bulk * (0.6 + 0.3 * width + 0.3 * height), 0.025, 0.14))
 
 
-def _outline(style: Style, size: Size, rng: np.random.Generator) -> str:
+def _outline(style: Style, size: Size, choices: Choices) -> str:
     """Round where width and depth are alike and the style likes it, else with square or rounded corners."""
     alike = max(size[0], size[2]) / min(size[0], size[2]) < 1.12
     if style.round_tops > (0.35 if alike else 0.8):
@@ -21,18 +22,18 @@ def _outline(style: Style, size: Size, rng: np.random.Generator) -> str:
     return "corners" if style.corner > 0.45 else "square"
 
 
-def dining_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Four legs, a trestle, a sled or a pedestal under a plain, rounded or round top, with an apron or without."""
     w, h, d = size
-    shape, thick = _outline(style, size, rng), max(style.top * 1.1, 0.022)
+    shape, thick = _outline(style, size, choices), max(style.top * 1.1, 0.022)
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if shape == "round":
         inner = 0.71 if style.legs not in ("splayed", "hairpin") else 0.86
-        if w / d < 1.3 and rng.random() < 0.65:
+        if w / d < 1.3 and choices.chance("form", 0.65):
             return parts + pedestal(w, d, h - thick, style)
         kind = None if style.legs not in ("plinth", "bun", "trestle", "sled") else "straight"
         return parts + base(style, w * inner, d * inner, h - thick, _leg(style, w, h), kind)
-    if style.legs == "plinth" and rng.random() < 0.5:
+    if style.legs == "plinth" and choices.chance("form", 0.5):
         panel = max(0.05, 0.06 * w)
         x, z = w / 2 * 0.72, d / 2 * 0.75
         return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z)) for s in (-1, 1)]
@@ -49,11 +50,11 @@ def dining_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     return parts
 
 
-def coffee_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Low: legs, a shelf below, a solid block with drawers, a drum, a bowl or two nested tops."""
     w, h, d = size
-    shape, thick = _outline(style, size, rng), max(style.top, 0.025)
-    kind = rng.choice(["legs", "shelf", "block", "drum", "nested"], p=[0.36, 0.24, 0.2, 0.12, 0.08])
+    shape, thick = _outline(style, size, choices), max(style.top, 0.025)
+    kind = choices.pick("kind", ["legs", "shelf", "block", "drum", "nested"], [0.36, 0.24, 0.2, 0.12, 0.08])
     if kind == "drum" and shape == "round":
         drum = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
         return [top(shape, w, d, h, thick, style), drum]
@@ -65,7 +66,7 @@ def coffee_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
             (w / 2 * 0.9, h - thick - 0.02),
             d / 2 * 0.95,
             1,
-            int(rng.integers(1, 3)),
+            choices.whole("columns", 1, 3),
             "drawer",
             style,
         )
@@ -102,11 +103,11 @@ def coffee_table(size: Size, style: Style, rng: np.random.Generator) -> list[Sol
     return parts
 
 
-def side_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Beside a sofa: legs, pedestal, drum, a cube with a niche or a C-shaped frame."""
     w, h, d = size
-    shape, thick = _outline(style, size, rng), max(style.top * 0.8, 0.018)
-    kind = rng.choice(["legs", "pedestal", "drum", "cube", "c"], p=[0.45, 0.2, 0.12, 0.13, 0.1])
+    shape, thick = _outline(style, size, choices), max(style.top * 0.8, 0.018)
+    kind = choices.pick("kind", ["legs", "pedestal", "drum", "cube", "c"], [0.45, 0.2, 0.12, 0.13, 0.1])
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if kind == "pedestal":
         return parts + pedestal(w, d, h - thick, style)
@@ -144,17 +145,17 @@ def side_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
     parts += base(style, w * inner, d * inner, h - thick, _leg(style, w * 0.6, h) * 0.8, legs)
-    if rng.random() < 0.4:
+    if choices.chance("extra", 0.4):
         parts.append(top(shape, w * inner * 0.9, d * inner * 0.9, h * 0.35, thick, style, "accent"))
     return parts
 
 
-def round_end_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Always round: three or four legs, a pedestal or a drum, sometimes a tray rim."""
     w, h, d = size
     thick = max(style.top * 0.8, 0.018)
     parts: list[Solid] = [top("round", w, d, h, thick, style)]
-    kind = rng.choice(["legs", "pedestal", "drum"], p=[0.5, 0.3, 0.2])
+    kind = choices.pick("kind", ["legs", "pedestal", "drum"], [0.5, 0.3, 0.2])
     if kind == "pedestal":
         return parts + pedestal(w, d, h - thick, style)
     if kind == "drum":
@@ -164,12 +165,12 @@ def round_end_table(size: Size, style: Style, rng: np.random.Generator) -> list[
         ]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
     parts += base(style, w * 0.74, d * 0.74, h - thick, 0.035 * style.bulk, legs)
-    if rng.random() < 0.5:
+    if choices.chance("extra", 0.5):
         parts.append(top("round", w * 0.66, d * 0.66, h * 0.4, thick, style, "accent"))
     return parts
 
 
-def corner_side_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Fits a corner: a cabinet-like cube with a drawer and a shelf, or square legs with two tops."""
     w, h, d = size
     t = max(style.top * 0.8, 0.018)
@@ -179,7 +180,7 @@ def corner_side_table(size: Size, style: Style, rng: np.random.Generator) -> lis
     share = within(shape, style)
     parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
     parts.append(top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent"))
-    if rng.random() < 0.6:
+    if choices.chance("extra", 0.6):
         edge, rear = w * share * 0.47, d * share * 0.47
         drawer = (-edge, h * 0.68), (edge, h - t)
         parts.append(box((*drawer[0], -rear), (*drawer[1], rear)))
@@ -187,7 +188,7 @@ def corner_side_table(size: Size, style: Style, rng: np.random.Generator) -> lis
     return parts
 
 
-def console_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Narrow against a wall: legs with or without drawers below the top, perhaps a shelf near the floor."""
     w, h, d = size
     t = max(style.top, 0.02)
@@ -196,16 +197,16 @@ def console_table(size: Size, style: Style, rng: np.random.Generator) -> list[So
     w, d = w * within(shape, style), d * within(shape, style)
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
-    if rng.random() < 0.55:
+    if choices.chance("front", 0.55):
         low, high = (-w * 0.46, h - t - 0.14), (w * 0.46, h - t)
         parts.append(box((*low, -d * 0.42), (*high, d * 0.42)))
-        parts += front(low, high, d * 0.42, 1, int(rng.integers(1, 4)), "drawer", style)
-    if rng.random() < 0.5:
+        parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style)
+    if choices.chance("extra", 0.5):
         parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent"))
     return parts
 
 
-def desk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A writing top at 0.75 m on legs or side panels, with drawers at one side or both; tall ones carry a hutch."""
     w, h, d = size
     hutch = h > 1.05
@@ -215,17 +216,17 @@ def desk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
     parts: list[Solid] = [top(shape, w, d, desk_height, t, style)]
     if shape == "corners":
         w, d = w * within(shape, style), d * within(shape, style)
-    kind = rng.choice(["legs", "left", "both", "shallow"], p=[0.25, 0.35, 0.2, 0.2])
+    kind = choices.pick("kind", ["legs", "left", "both", "shallow"], [0.25, 0.35, 0.2, 0.2])
     unit = min(0.42, w * 0.3)
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1 = desk_height - t
     if kind in ("left", "both"):
-        sides = (-1, 1) if kind == "both" else (-1 if rng.random() < 0.5 else 1,)
+        sides = (-1, 1) if kind == "both" else (-1 if choices.chance("side", 0.5) else 1,)
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             foot = 0.1 if style.contrast > 0.5 else 0.02
             parts.append(box((x0, foot, -d * 0.46), (x1, y1, d * 0.46)))
-            parts += front((x0, foot), (x1, y1), d * 0.46, int(rng.integers(2, 4)), 1, "drawer", style)
+            parts += front((x0, foot), (x1, y1), d * 0.46, choices.whole("rows", 2, 4), 1, "drawer", style)
             if foot > 0.05:
                 parts += [
                     box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
@@ -240,16 +241,16 @@ def desk(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
         if kind == "shallow":
             low, high = (-w * 0.42, y1 - 0.12), (w * 0.42, y1)
             parts.append(box((*low, -d * 0.42), (*high, d * 0.42)))
-            parts += front(low, high, d * 0.42, 1, int(rng.integers(2, 4)), "drawer", style)
+            parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style)
     if hutch:
-        parts += _hutch(w, desk_height, h, d, rng)
+        parts += _hutch(w, desk_height, h, d, choices)
     return parts
 
 
-def _hutch(w: float, low: float, high: float, d: float, rng: np.random.Generator) -> list[Solid]:
+def _hutch(w: float, low: float, high: float, d: float, choices: Choices) -> list[Solid]:
     """Shelves above the rear of a desk."""
     t, z0, z1 = 0.02, -d / 2, -d / 2 + min(0.28, d * 0.45)
-    columns, rows = int(rng.integers(1, 4)), max(1, round((high - low) / 0.38))
+    columns, rows = choices.whole("second", 1, 4), max(1, round((high - low) / 0.38))
     xs, ys = np.linspace(-w / 2 + t, w / 2 - t, columns + 1), np.linspace(low, high - t, rows + 1)
     parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1)) for x in xs]
     parts += [box((-w / 2, y, z0), (w / 2, y + t, z1)) for y in ys[1:]]
@@ -257,7 +258,7 @@ def _hutch(w: float, low: float, high: float, d: float, rng: np.random.Generator
     return parts
 
 
-def dressing_table(size: Size, style: Style, rng: np.random.Generator) -> list[Solid]:
+def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A small desk with drawers and, when tall enough, a round, oval or square mirror."""
     w, h, d = size
     mirror = h > 0.95
@@ -268,26 +269,26 @@ def dressing_table(size: Size, style: Style, rng: np.random.Generator) -> list[S
     w, d = w * within(shape, style), d * within(shape, style)
     legs = "tapered" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1, low = table - t, table - t - 0.14
-    if rng.random() < 0.5:
+    if choices.chance("kind", 0.5):
         parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
         parts.append(box((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45)))
-        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, int(rng.integers(1, 4)), "drawer", style)
+        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, choices.whole("columns", 1, 4), "drawer", style)
     else:
-        unit = w * rng.uniform(0.26, 0.36)
+        unit = w * choices.between("share", 0.26, 0.36)
         for s in (-1, 1):
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             parts.append(box((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45)))
-            parts += front((x0, 0.06), (x1, y1), d * 0.45, int(rng.integers(2, 4)), 1, "drawer", style)
+            parts += front((x0, 0.06), (x1, y1), d * 0.45, choices.whole("rows", 2, 4), 1, "drawer", style)
             parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent"))
     if mirror:
-        parts += _mirror(w, table, h, d, style, rng)
+        parts += _mirror(w, table, h, d, style, choices)
     return parts
 
 
-def _mirror(w: float, low: float, high: float, d: float, style: Style, rng: np.random.Generator) -> list[Solid]:
+def _mirror(w: float, low: float, high: float, d: float, style: Style, choices: Choices) -> list[Solid]:
     """A mirror at the rear of the table."""
     tall, z = high - low, -d / 2 + 0.03
-    kind = rng.choice(["round", "panel", "wings"])
+    kind = choices.pick("form", ["round", "panel", "wings"])
     foot = box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02))
     if kind == "round":
         half = min(w * 0.4, tall * 0.46)
@@ -300,7 +301,7 @@ def _mirror(w: float, low: float, high: float, d: float, style: Style, rng: np.r
             material="glass",
         )
         return [foot, face]
-    half = w * rng.uniform(0.28, 0.42)
+    half = w * choices.between("spread", 0.28, 0.42)
     radius = 0.012
     panel = Block(
         centre=np.array([0, (low + high) / 2, z]),
