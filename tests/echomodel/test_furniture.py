@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.data.furniture import MATERIALS, Style, furniture, mesh_of, sample_size, solids, tsdf_of
+from echomodel.data.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
 from echomodel.data.furniture.sizes import size_score, size_statistics
 from echomodel.data.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.data.tsdf import mesh_from_tsdf, tsdf_from_mesh
@@ -51,7 +51,7 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
         assert abs(mesh.bounds[0, 1]) < 1e-9
         assert mesh.face_attributes["uv"].shape == (len(mesh.faces), 3, 2)
         assert set(mesh.face_attributes["material"]) <= set(range(len(MATERIALS)))
-    back = mesh_from_tsdf(tsdf_of(solids(category, style, np.random.default_rng(0), size)))
+    back = mesh_from_tsdf(tsdf_of(solids(category, style, Choices.draw(np.random.default_rng(0)), size)))
     assert back.is_watertight
     # A voxel more for parts thickened at the edge of the box, two less for tips of thin parts.
     assert (back.extents < 1.045).all()

@@ -3,40 +3,74 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
 
-from echomodel.data.furniture.solids import Solid, Tube
+from echomodel.data.furniture.solids import FINEST, Joint, Solid, Tube
 from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
 
 THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
 THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
-MATERIALS = ("wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen")
+MATERIALS = (
+    "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
+    "cushion", "linen", "blanket", "mirror", "book", "stem",
+)  # fmt: skip
 
 
-def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None) -> trimesh.Trimesh:
-    """All solids as one mesh of closed parts that overlap as boards and cushions do, stretched to fill `size`.
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One solid as a closed mesh in its place: vertices (n, 3) in metres, faces (m, 3), and its joint there."""
+
+    solid: Solid
+    vertices: np.ndarray
+    faces: np.ndarray
+    joint: Joint | None
+
+
+def pieces_of(solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST) -> list[Piece]:
+    """Every solid meshed, all of them stretched together to fill `size`, standing on y = 0, centred in x and z.
 
     Arguments:
         solids: parts in the object's frame, metres.
         size: (3,) float, the box to fill, metres; None keeps the parts' own extents.
-
-    The mesh stands on y = 0, centred in x and z. `face_attributes["part"]` (m,) int numbers the solids,
-    `face_attributes["material"]` (m,) int indexes `MATERIALS`, `face_attributes["uv"]` (m, 3, 2) float holds texture
-    coordinates per corner, box-projected, in metres.
+        detail: 0 (boxes and hexagons) to 3.
     """
-    pieces = [solid.mesh() for solid in solids]
-    offsets = np.cumsum([0] + [len(vertices) for vertices, _ in pieces])
-    vertices = np.concatenate([vertices for vertices, _ in pieces])
-    faces = np.concatenate([faces + offset for (_, faces), offset in zip(pieces, offsets, strict=False)])
-    counts = [len(faces) for _, faces in pieces]
-    lower, upper = vertices.min(0), vertices.max(0)
-    stretch = np.ones(3) if size is None else np.asarray(size, float) / (upper - lower)
-    vertices = (vertices - [(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2]) * stretch
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    mesh.face_attributes["part"] = np.repeat(np.arange(len(solids)), counts)
-    mesh.face_attributes["material"] = np.repeat([MATERIALS.index(s.material) for s in solids], counts)
+    seen = [solid for solid in solids if not solid.core]
+    meshes = [solid.mesh(detail) for solid in seen]
+    lower = np.min([vertices.min(0) for vertices, _ in meshes], axis=0)
+    upper = np.max([vertices.max(0) for vertices, _ in meshes], axis=0)
+    stretch = np.ones(3) if size is None else np.asarray(size, float) / np.maximum(upper - lower, 1e-9)
+    origin = np.array([(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2])
+    return [
+        Piece(solid, (vertices - origin) * stretch, faces, _stretched(solid.joint, origin, stretch))
+        for solid, (vertices, faces) in zip(seen, meshes, strict=True)
+    ]
+
+
+def _stretched(joint: Joint | None, origin: np.ndarray, stretch: np.ndarray) -> Joint | None:
+    if joint is None:
+        return None
+    anchor = (np.asarray(joint.anchor) - origin) * stretch
+    longer = float(np.linalg.norm(np.asarray(joint.axis) * stretch)) if joint.kind == "prismatic" else 1.0
+    x, y, z = (float(v) for v in anchor)
+    return replace(joint, anchor=(x, y, z), reach=joint.reach * longer)
+
+
+def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None) -> trimesh.Trimesh:
+    """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`.
+
+    `face_attributes["part"]` (m,) int numbers the solids, `face_attributes["material"]` (m,) int indexes `MATERIALS`,
+    `face_attributes["uv"]` (m, 3, 2) float holds texture coordinates per corner, box-projected, in metres.
+    """
+    pieces = pieces_of(solids, size)
+    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
+    faces = [piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)]
+    counts = [len(piece.faces) for piece in pieces]
+    mesh = trimesh.Trimesh(np.concatenate([p.vertices for p in pieces]), np.concatenate(faces), process=False)
+    mesh.face_attributes["part"] = np.repeat(np.arange(len(pieces)), counts)
+    mesh.face_attributes["material"] = np.repeat([MATERIALS.index(p.solid.material) for p in pieces], counts)
     mesh.face_attributes["uv"] = box_uv(mesh.vertices, mesh.faces)
     return mesh
 

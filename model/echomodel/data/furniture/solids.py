@@ -8,11 +8,15 @@ planes and first-order exact elsewhere, which is what the few voxels inside the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
+from echomodel.data.furniture.surfaces import cube_surface, loft, superellipse
+
 Array = np.ndarray
 IDENTITY = np.eye(3)
+FINEST = 3  # levels of detail that a solid can be meshed in: 0 to 3
 
 
 def rotation(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
@@ -34,17 +38,44 @@ def upright(bottom: Array, top: Array) -> Array:
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
+@dataclass(frozen=True)
+class Joint:
+    """How a drawer or a door moves; solids with one joint move as one body.
+
+    Arguments:
+        body: name of the body, unique in the piece.
+        kind: `prismatic` slides along the axis, `revolute` turns about it.
+        axis: unit vector in the object's frame. anchor: a point of the axis of a hinge, metres.
+        reach: how far it moves from closed to open, metres or radians.
+    """
+
+    body: str
+    kind: Literal["prismatic", "revolute"]
+    axis: tuple[float, float, float]
+    anchor: tuple[float, float, float]
+    reach: float
+
+
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A closed solid placed by `centre` (3,) and `turn` (3, 3) in the object's frame; `material` names its look."""
+    """A closed solid placed by `centre` (3,) and `turn` (3, 3) in the object's frame.
+
+    Arguments:
+        material: names its look. role: what it is in the piece: leg, top, seat, drawer, handle ...
+        joint: how it moves, None = it is fixed.
+        core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
+    """
 
     centre: Array = field(default_factory=lambda: np.zeros(3))
     turn: Array = field(default_factory=lambda: IDENTITY)
     material: str = "wood"
+    role: str = ""
+    joint: Joint | None = None
+    core: bool = False
 
-    def mesh(self) -> tuple[Array, Array]:
+    def mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         """Vertices (n, 3) in the object's frame and outward faces (m, 3) of the closed surface."""
-        vertices, faces = self.local_mesh()
+        vertices, faces = self.local_mesh(detail)
         return vertices @ self.turn.T + self.centre, faces
 
     def distance(self, x: Array, y: Array, z: Array, scale: Array) -> Array:
@@ -57,7 +88,7 @@ class Solid:
         local = self.turn * np.asarray(scale)[:, None]
         return self.local_distance(x, y, z, local.T @ local)
 
-    def local_mesh(self) -> tuple[Array, Array]:
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         raise NotImplementedError
 
     def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
@@ -100,18 +131,22 @@ class Block(Solid):
         outside = (length - r) * length / gradient_length(metric, *k)
         return np.where(length > 1e-9, outside, inside)
 
-    def local_mesh(self) -> tuple[Array, Array]:
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         r = min(self.radius, *(self.half * 0.999))
-        if r <= 0:
-            vertices, faces = _cube_surface(1)
+        steps = min(detail, 1 if r < 0.008 else 3)
+        if r <= 0 or not steps:
+            vertices, faces = cube_surface(1)
             return vertices * self.half, faces
-        vertices, faces = _cube_surface(8)
-        # The outer three of eight cells on each axis carry the rounding, the middle two the flat.
-        core = np.clip(vertices / 0.25, -1, 1) * (self.half - r)
-        corner = np.sign(vertices) * np.maximum(np.abs(vertices) - 0.25, 0) / 0.75
+        # On every axis `steps` cells carry the rounding at either end, one cell the flat between them.
+        cells = 2 * steps + 1
+        vertices, faces = cube_surface(cells)
+        node = np.rint((vertices + 1) / 2 * cells)
+        core = np.where(node <= steps, -1.0, 1.0)
+        corner = np.where(node <= steps, node - steps, node - steps - 1) / steps
         corner = np.sign(corner) * np.tan(np.abs(corner) * np.pi / 4)
+        corner = np.where(np.abs(corner) < 1e-12, 0.0, corner)
         length = np.linalg.norm(corner, axis=1, keepdims=True)
-        return core + r * corner / np.maximum(length, 1e-12), faces
+        return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
 
     def inradius(self, scale: Array) -> float:
         local = self.turn * np.asarray(scale)[:, None]
@@ -159,12 +194,12 @@ class Turned(Solid):
         rim = (length - self.rounding) * length / np.sqrt((across * k[0]) ** 2 + (along * k[1]) ** 2 + 1e-16)
         return np.where((k[0] > 0) & (k[1] > 0), rim, np.maximum(side, cap))
 
-    def local_mesh(self) -> tuple[Array, Array]:
-        outline = superellipse(self.power)
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         low, high = np.asarray(self.low), np.asarray(self.high)
+        outline = superellipse(self.power, _corners(detail, float(max(low.max(), high.max()))))
         r = min(self.rounding, self.height * 0.49, *(0.95 * np.maximum(low, high)))
         if r > 0:
-            arc = np.linspace(0, np.pi / 2, 5)
+            arc = np.linspace(0, np.pi / 2, 2 + detail)
             rims = [(r - r * np.sin(t), low - (r - r * np.cos(t))) for t in arc[::-1]]
             rims += [(self.height - r + r * np.sin(t), high - (r - r * np.cos(t))) for t in arc]
         else:
@@ -192,8 +227,8 @@ class Ball(Solid):
         g = (np.sign(c) * (t / q) ** (p - 1) / h for c, t, h in zip((x, y, z), (u, v, w), self.half, strict=True))
         return (q - 1) / gradient_length(metric, *g)
 
-    def local_mesh(self) -> tuple[Array, Array]:
-        vertices, faces = _cube_surface(8)
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        vertices, faces = cube_surface((2, 4, 6, 8)[detail] if self.half.max() > 0.04 else 2 + detail)
         vertices = np.tan(vertices * np.pi / 4)
         length = (np.abs(vertices) ** self.power).sum(1, keepdims=True) ** (1 / self.power)
         return vertices / length * self.half, faces
@@ -228,9 +263,9 @@ class Tube(Solid):
             nearest = np.minimum(nearest, found)
         return nearest
 
-    def local_mesh(self) -> tuple[Array, Array]:
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
         tangents = np.gradient(self.points, axis=0)
-        circle = superellipse(2.0, 12) * self.radius
+        circle = superellipse(2.0, (4, 6, 8, 12)[detail]) * self.radius
         rings, x = [], None
         for point, tangent in zip(self.points, tangents, strict=True):
             y = tangent / np.linalg.norm(tangent)
@@ -277,8 +312,8 @@ class Shell(Solid):
         upright_part = np.maximum(y - top, -y) / scale[1]
         return intersection(intersection(np.maximum(*walls), z / scale[2]), upright_part)
 
-    def local_mesh(self) -> tuple[Array, Array]:
-        angle = np.linspace(-np.pi / 2, np.pi / 2, 33)
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        angle = np.linspace(-np.pi / 2, np.pi / 2, (9, 13, 21, 33)[detail])
         s, c = np.sin(angle), np.cos(angle)
         norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
         top, rings = self._top(angle), []
@@ -298,47 +333,6 @@ class Shell(Solid):
         return float(self.thickness / 2 / max(scale[0], scale[2]))
 
 
-def superellipse(power: float, corners: int = 32) -> Array:
-    """Outline (n, 2) of the unit superellipse, counted from +x towards -z so that lofts along +y face outward."""
-    if np.isinf(power):
-        return np.array([[1, -1], [-1, -1], [-1, 1], [1, 1]], float)
-    angle = np.arange(corners) * (2 * np.pi / corners)
-    points = np.stack([np.cos(angle), -np.sin(angle)], axis=1)
-    return points / (np.abs(points) ** power).sum(1, keepdims=True) ** (1 / power)
-
-
-def loft(rings: list[Array]) -> tuple[Array, Array]:
-    """Closed surface through rings of equal length (k, 3): quads between neighbours, a fan over each end."""
-    k, n = len(rings[0]), len(rings)
-    vertices = np.concatenate([*rings, rings[0].mean(0)[None], rings[-1].mean(0)[None]])
-    i = np.arange(k)
-    j = (i + 1) % k
-    faces = [np.stack([r * k + i, r * k + j, (r + 1) * k + j], 1) for r in range(n - 1)]
-    faces += [np.stack([r * k + i, (r + 1) * k + j, (r + 1) * k + i], 1) for r in range(n - 1)]
-    faces.append(np.stack([np.full(k, n * k), j, i], 1))
-    faces.append(np.stack([np.full(k, n * k + 1), (n - 1) * k + i, (n - 1) * k + j], 1))
-    return vertices, np.concatenate(faces)
-
-
-_CUBES: dict[int, tuple[Array, Array]] = {}
-
-
-def _cube_surface(cells: int) -> tuple[Array, Array]:
-    """Surface of the cube [-1, 1]^3 as a grid of `cells` quads an edge, vertices shared."""
-    if cells not in _CUBES:
-        steps = np.linspace(-1, 1, cells + 1)
-        u, v = (g.ravel() for g in np.meshgrid(steps, steps, indexing="ij"))
-        index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
-        a, b, c, d = index[:-1, :-1].ravel(), index[1:, :-1].ravel(), index[1:, 1:].ravel(), index[:-1, 1:].ravel()
-        quads = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-        points: list[Array] = []
-        faces: list[Array] = []
-        for axis in range(3):
-            for side in (-1.0, 1.0):
-                face = np.empty((len(u), 3))
-                face[:, axis], face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = side, u, v
-                faces.append((quads if side > 0 else quads[:, ::-1]) + len(u) * len(points))
-                points.append(face)
-        vertices, inverse = np.unique(np.round(np.concatenate(points), 9), axis=0, return_inverse=True)
-        _CUBES[cells] = vertices, inverse.reshape(-1)[np.concatenate(faces)]
-    return _CUBES[cells]
+def _corners(detail: int, radius: float) -> int:
+    """Corners of a round outline: fewer for what is small."""
+    return ((8, 12, 20, 32) if radius > 0.05 else (6, 8, 12, 16))[detail]
