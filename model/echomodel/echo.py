@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
+from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
@@ -69,6 +70,11 @@ class EchoModel:
     def has_shapes(self) -> bool:
         """Whether there are a shape branch and its autoencoder."""
         return {"autoencoder", "shape"} <= set(self.model.parts)
+
+    @property
+    def has_furniture(self) -> bool:
+        """Whether there is a furniture branch."""
+        return {"latent", "furniture"} <= set(self.model.parts)
 
     @property
     def config(self) -> CompactConfig:
@@ -227,6 +233,57 @@ class EchoModel:
             return grids
         return torch.where(known_mask[:, None, None, None], known, grids)
 
+    @torch.no_grad()
+    def sample_furniture(
+        self,
+        graph: GraphBatch,
+        boxes: Boxes,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        sampler: Sampler | None = None,
+        known: Tensor | None = None,
+        known_mask: Tensor | None = None,
+        styles: Tensor | None = None,
+        edit: GraphEdit | None = None,
+        guidance: float = 1.0,
+        noise: Tensor | None = None,
+        progress: Progress | None = None,
+    ) -> Tensor:
+        """Descriptions of all pieces of furniture of S scenes (`echomodel.data.furniture.description`).
+
+        Arguments:
+            graph, boxes: N nodes and their boxes; only the sizes matter.
+            known, known_mask: (N, D) descriptions and (N,) bool; where true a piece is given and comes back unchanged.
+            styles: (N,) int64, nodes with one number of 0 or more are of one style, beside those that relations of
+                style join; None = nothing is known of styles.
+            noise: (N, D) starting noise in place of the generator's.
+            generator, steps, sampler, edit, guidance, progress: as for `sample_layout`.
+
+        Returns:
+            (N, D) float32; pieces of one class that relations of style or material join are equal.
+
+        Raises:
+            ValueError: a graph, box or argument that the model cannot work with; the message names it.
+        """
+        settings = self.config.furniture
+        graph = self._checked(graph)
+        if len(boxes) != graph.num_nodes:
+            raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
+        boxes = boxes.to(self.device)
+        boxes.check()
+        known, known_mask = self._known(graph, known, known_mask)
+        equal, width = equal_furniture(graph), sum(settings.kinds) + settings.numbers
+        start = self._noise((graph.num_nodes, width), generator, noise)
+        graph = with_whole_styles(graph, joined(graph, styles))
+        bare = graph.with_triplets(graph.triplets[:0])
+        return sample_descriptions(
+            self.model, graph, boxes.size, self.graph_latent(graph, edit), equal,
+            settings.temperature * start[equal] if noise is None else start,
+            generator=generator, steps=steps, sampler=sampler, known=known, known_mask=known_mask,
+            guidance=guidance, bare_latent=None if guidance == 1.0 else self.graph_latent(bare), progress=progress,
+        )  # fmt: skip
+
     def _layout_predictor(self, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
         config = self.config
         if rules not in config.rules:
@@ -310,8 +367,23 @@ def equal_furniture(graph: GraphBatch) -> Tensor:
     triplets = graph.triplets
     joins = torch.isin(triplets[:, 1], triplets.new_tensor([SAME_STYLE, SAME_MATERIAL]))
     joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
-    ends = triplets[joins][:, [0, 2]]
-    first = torch.arange(graph.num_nodes, device=triplets.device)
+    return _first_joined(graph.num_nodes, triplets[joins][:, [0, 2]])
+
+
+def joined(graph: GraphBatch, styles: Tensor | None = None) -> Tensor:
+    """(N,) int64: for every node the first node of its style, by relations of style and by `styles` (N,), -1 = none."""
+    triplets = graph.triplets
+    ends = triplets[triplets[:, 1] == SAME_STYLE][:, [0, 2]]
+    if styles is not None:
+        styles = styles.to(triplets.device)
+        same = (styles[:, None] == styles) & (graph.scene[:, None] == graph.scene) & (styles >= 0)
+        ends = torch.cat([ends, same.nonzero()])
+    return _first_joined(graph.num_nodes, ends)
+
+
+def _first_joined(nodes: int, ends: Tensor) -> Tensor:
+    """(N,) int64: for every node the first that a chain of the pairs `ends` (E, 2) joins it to."""
+    first = torch.arange(nodes, device=ends.device)
     while len(ends):
         lowest = first[ends].amin(1)
         lower = first.scatter_reduce(0, ends.flatten(), lowest.repeat_interleave(2), "amin")

@@ -25,7 +25,13 @@ from echomodel.vocabulary import vocabulary
 
 _SHARED = ("categories", "predicates", "room_types", "rules")
 FORMAT = "echousd-compact-1"
-_MADE = {"latent": LatentGraph, "layout": LayoutDenoiser, "autoencoder": Autoencoder, "shape": ShapeDenoiser, "furniture": FurnitureDenoiser}
+_MADE = {
+    "latent": LatentGraph,
+    "layout": LayoutDenoiser,
+    "autoencoder": Autoencoder,
+    "shape": ShapeDenoiser,
+    "furniture": FurnitureDenoiser,
+}
 PARTS = tuple(_MADE)
 MEASURES = 2  # set of measures of the drafts that this version computes
 

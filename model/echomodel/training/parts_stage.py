@@ -131,4 +131,3 @@ def silenced(pairs: Pairs, silent: Tensor, graph: GraphBatch) -> Pairs:
     for column in columns:
         told[rows, column] = 0
     return Pairs(pairs.receiver, pairs.sender, told, pairs.scale)
-

@@ -53,7 +53,8 @@ class Recipe:
 
     Arguments:
         stage: `vqvae` (autoencoder), `layout`, `shape`, `parts` (descriptions of furniture) or `joint` (layouts and
-            shapes on one latent graph); `paper_vqvae` and `paper` are the autoencoder and the joint stage of the `paper` preset.
+            shapes on one latent graph); `paper_vqvae` and `paper` are the autoencoder and the joint stage of the
+            `paper` preset.
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.
         data: folder that `echousd data build` made; its held-out part is for validation.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import trimesh
@@ -11,7 +13,7 @@ from echomodel.data.furniture import armchairs, beds, chairs, decor, lamps, shel
 from echomodel.data.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.sizes import sample_size
-from echomodel.data.furniture.solids import Solid
+from echomodel.data.furniture.solids import Joint, Solid
 from echomodel.data.furniture.style import Style
 from echomodel.vocabulary import vocabulary
 
@@ -37,7 +39,7 @@ def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> l
     size = np.asarray(size, float)
     if size.shape != (3,) or not (np.isfinite(size).all() and (size > 0).all()):
         raise ValueError(f"size of {name} is {size.tolist()}, need three positive numbers in metres")
-    return _builder(name)(size, style, choices)
+    return _named(_builder(name)(size, style, choices))
 
 
 def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
@@ -49,6 +51,21 @@ def furniture(category: str, style: Style, rng: np.random.Generator, size: np.nd
     if size is None:
         size = sample_size(category, rng, style)
     return mesh_of(solids(category, style, Choices.draw(rng), size), size)
+
+
+def _named(parts: list[Solid]) -> list[Solid]:
+    """The parts with their moving bodies numbered: drawer_1, drawer_2, door_1 ... in the order of the program."""
+    names: dict[int, Joint] = {}
+    counts: Counter[str] = Counter()
+    out = []
+    for part in parts:
+        if part.joint is not None:
+            if id(part.joint) not in names:
+                counts[part.joint.body] += 1
+                names[id(part.joint)] = replace(part.joint, body=f"{part.joint.body}_{counts[part.joint.body]}")
+            part = replace(part, joint=names[id(part.joint)])
+        out.append(part)
+    return out
 
 
 def _builder(name: str) -> Builder:

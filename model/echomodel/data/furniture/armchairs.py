@@ -8,8 +8,8 @@ import numpy as np
 
 from echomodel.data.furniture.backs import chair_legs, leaning, slim_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
-from echomodel.data.furniture.solids import Shell, Solid, Turned, rotation
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Shell, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.data.furniture.carpentry import base, box, cushion, leg, top
-from echomodel.data.furniture.solids import Ball, Block, Solid, rotation
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Ball, Block, Solid, rotation
 from echomodel.data.furniture.style import Style
 
 

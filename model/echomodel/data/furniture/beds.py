@@ -7,9 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, cushion, front
-from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.data.furniture.carpentry import Size, base, box, cushion
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.fronts import front
+from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 
@@ -79,9 +80,7 @@ def _headboard(style: Style, w: float, h: float, z: float, choices: Choices) -> 
     return [arch, box((-w / 2, 0.02, z), (w / 2, h * 0.62, z + t), "fabric" if style.softness > 0.5 else "wood")]
 
 
-def _bedding(
-    w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int
-) -> list[Solid]:
+def _bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int) -> list[Solid]:
     """Mattress, pillows and a cover from z0 (head) to z1."""
     thick = 0.2
     parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "fabric", 0.05)]

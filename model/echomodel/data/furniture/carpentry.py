@@ -1,8 +1,9 @@
-"""What all furniture shares: boards, cushions, tops, legs and bases, fronts with drawers and doors."""
+"""What all furniture shares: boards, cushions, tops, legs and bases."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,20 @@ from echomodel.data.furniture.style import Style
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
 
 
-def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0) -> Block:
+def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0, role: str = "board") -> Block:
     """The block between two corners (3,)."""
     a, b = np.asarray(low, float), np.asarray(high, float)
-    return Block(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), radius=radius, material=material)
+    return Block(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), radius=radius, material=material, role=role)
+
+
+def core(low: tuple, high: tuple, material: str = "wood") -> Block:
+    """What boards enclose between two corners (3,): a body for distances, without a mesh (`Solid.core`)."""
+    return replace(box(low, high, material), core=True)
+
+
+def of_role(role: str, parts: list[Solid], **changes: Any) -> list[Solid]:
+    """The parts with this role and other fields changed."""
+    return [replace(part, role=role, **changes) for part in parts]
 
 
 def cushion(low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY) -> Solid:
@@ -100,7 +111,12 @@ def base(
         kind: a kind of `Style.legs` instead of the style's own.
         tie: stretchers between the legs where the kind allows them.
     """
-    kind = kind or style.legs
+    return of_role("leg", _stand(style, width, depth, height, thick, kind or style.legs, tie=tie))
+
+
+def _stand(
+    style: Style, width: float, depth: float, height: float, thick: float, kind: str, *, tie: bool
+) -> list[Solid]:
     x, z, h = width / 2 - thick / 2, depth / 2 - thick / 2, height
     corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
     if kind == "plinth":
@@ -205,55 +221,3 @@ def pedestal(width: float, depth: float, height: float, style: Style) -> list[So
         low=(spread, spread), high=(spread * 0.9, spread * 0.9), height=max(0.015, height * 0.04), material=material
     )
     return [disc, column]
-
-
-def front(
-    low: tuple[float, float], high: tuple[float, float], z: float, rows: int, columns: int, kind: str, style: Style
-) -> list[Solid]:
-    """Drawer fronts or doors that fill the rectangle `low` to `high` (x, y) on the plane z, gaps between, with handles.
-
-    `kind` is `drawer` or `door`; thickness and frames follow the style.
-    """
-    gap, thick = style.gap, 0.018
-    parts: list[Solid] = []
-    xs = np.linspace(low[0], high[0], columns + 1)
-    ys = np.linspace(low[1], high[1], rows + 1)
-    for i in range(columns):
-        for j in range(rows):
-            x0, x1, y0, y1 = xs[i] + gap, xs[i + 1] - gap, ys[j] + gap, ys[j + 1] - gap
-            parts.append(box((x0, y0, z - 0.005), (x1, y1, z + thick), "accent"))
-            if style.fronts == "framed":
-                parts += _frame(x0, x1, y0, y1, z + thick, 0.15 * min(x1 - x0, y1 - y0))
-            parts += _handle(x0, x1, y0, y1, z + thick, kind, hinge_left=i % 2 == 0, style=style)
-    return parts
-
-
-def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float) -> list[Solid]:
-    b, t = max(border, 0.02), 0.014
-    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
-    return [box((*lo, z - 0.004), (*hi, z + t), "accent") for lo, hi in bars]
-
-
-def _handle(
-    x0: float, x1: float, y0: float, y1: float, z: float, kind: str, *, hinge_left: bool, style: Style
-) -> list[Solid]:
-    if style.handles == "none":
-        return []
-    w, h = x1 - x0, y1 - y0
-    door = kind == "door"
-    x = (x1 - 0.12 * w if hinge_left else x0 + 0.12 * w) if door else (x0 + x1) / 2
-    y = (y0 + y1) / 2
-    if style.handles == "knob":
-        r = 0.016
-        count = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
-        return [
-            Ball(centre=np.array([x + dx, y, z + r]), half=np.array([r, r, r * 1.2]), material="metal") for dx in count
-        ]
-    if style.handles == "edge":
-        if door:
-            return [box((x - 0.008, y0 + 0.1 * h, z), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal")]
-        return [box((x0 + 0.1 * w, y1 - 0.02, z), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal")]
-    length = min(0.3, 0.45 * h) / 2 if door else min(0.25, 0.4 * w) / 2
-    if door:
-        return [box((x - 0.008, y - length, z), (x + 0.008, y + length, z + 0.028), "metal", 0.004)]
-    return [box((x - length, y - 0.008, z), (x + length, y + 0.008, z + 0.028), "metal", 0.004)]

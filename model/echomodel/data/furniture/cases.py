@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, front
-from echomodel.data.furniture.solids import Solid
+from echomodel.data.furniture.carpentry import Size, base, box, core
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.fronts import front
+from echomodel.data.furniture.solids import Solid
 from echomodel.data.furniture.style import Style
 
 BOARD = 0.02
@@ -34,23 +35,29 @@ def carcass(
     parts = base(style, w * 0.96, d * 0.9, foot, thick, kind) if foot > 0 else []
     crown = style.family in ("classic", "rustic") and h > 0.4
     over = 0.015 + style.overhang * 0.4 if crown else 0.0
-    body = w / 2 - over
-    deep = 0.02 if style.fronts != "recessed" else 0.02 + min(0.05, 0.1 * d)  # recessed fronts stand behind the boards
+    body, lid = w / 2 - over, h - (t if over else 0.0)
+    recessed = style.fronts == "recessed"
+    deep = 0.022 if not recessed else 0.02 + min(0.05, 0.1 * d)  # recessed fronts stand behind the boards
     z0, z1 = -d / 2, d / 2 - deep
+    edge, r = d / 2 if recessed else z1, 0.003 * style.edge
+    parts += [
+        box((s * body - (t if s > 0 else 0), foot, z0), (s * body + (t if s < 0 else 0), lid, edge), "wood", r, "side")
+        for s in (-1, 1)
+    ]
+    parts.append(box((-body, foot, z0), (body, foot + t, edge), "wood", r, "bottom"))
+    parts.append(box((-body, lid - t, z0), (body, lid, edge), "wood", r, "top"))
+    if back or solid:
+        parts.append(box((-body + t / 2, foot, z0), (body - t / 2, lid, z0 + 0.012), "accent", 0.0, "back"))
     if solid:
-        parts.append(box((-body, foot, z0), (body, h - (t if over else 0), z1)))
-    if not solid or style.fronts == "recessed":
-        z1 = d / 2 if style.fronts == "recessed" else z1
-        parts += [
-            box((s * body - (t if s > 0 else 0), foot, z0), (s * body + (t if s < 0 else 0), h, z1)) for s in (-1, 1)
-        ]
-        parts += [box((-body, foot, z0), (body, foot + t, z1)), box((-body, h - t, z0), (body, h, z1))]
-        z1 = d / 2 - deep
-        if back and not solid:
-            parts.append(box((-body, foot, z0), (body, h, z0 + 0.012), "accent"))
+        parts.append(core((-body, foot, z0), (body, lid, z1)))
     if over:
-        parts.append(box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2)))
-    return parts, (-body + t * 0.6, foot + t * 0.6, body - t * 0.6, h - t * 1.1, z1)
+        parts.append(box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), "wood", 0.25 * t * style.corner, "top"))
+    return parts, (-body + t * 0.6, foot + t * 0.6, body - t * 0.6, lid - t * 0.6, z1)
+
+
+def depth_of(d: float, z: float) -> float:
+    """Metres between the back of a carcass `d` deep and the plane z of its fronts."""
+    return z + d / 2 - 0.015
 
 
 def shelves(rect: tuple, d: float, z0: float, rows: int, columns: int, style: Style) -> list[Solid]:
@@ -58,9 +65,12 @@ def shelves(rect: tuple, d: float, z0: float, rows: int, columns: int, style: St
     x0, y0, x1, y1, z1 = rect
     t = BOARD * (0.8 + 0.5 * style.bulk)
     parts: list[Solid] = [
-        box((x0, y - t / 2, z0), (x1, y + t / 2, z1 - 0.01)) for y in np.linspace(y0, y1, rows + 1)[1:-1]
+        box((x0, y - t / 2, z0), (x1, y + t / 2, z1 - 0.01), role="shelf") for y in np.linspace(y0, y1, rows + 1)[1:-1]
     ]
-    parts += [box((x - t / 2, y0, z0), (x + t / 2, y1, z1 - 0.01)) for x in np.linspace(x0, x1, columns + 1)[1:-1]]
+    parts += [
+        box((x - t / 2, y0, z0), (x + t / 2, y1, z1 - 0.01), role="side")
+        for x in np.linspace(x0, x1, columns + 1)[1:-1]
+    ]
     return parts
 
 
@@ -71,7 +81,7 @@ def foot_height(style: Style, h: float, most: float = 0.3) -> float:
 
 def fronted(size: Size, style: Style, foot: float, rows: int, columns: int, kind: str) -> list[Solid]:
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot)
-    return parts + front((x0, y0), (x1, y1), z, rows, columns, kind, style)
+    return parts + front((x0, y0), (x1, y1), z, rows, columns, kind, style, depth_of(size[2], z))
 
 
 def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width: float) -> list[Solid]:
@@ -88,14 +98,15 @@ def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width:
     for i, kind in enumerate(kinds):
         low, high = (float(xs[i]), y0), (float(xs[i + 1]), y1)
         if i:
-            parts.append(box((xs[i] - t / 2, y0, -d / 2), (xs[i] + t / 2, y1, z)))
+            parts.append(box((xs[i] - t / 2, y0, -d / 2), (xs[i] + t / 2, y1, z), role="side"))
         if kind == "open":
             cells = max(1, round((y1 - y0) / 0.32))
             parts += [
-                box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z)) for y in np.linspace(y0, y1, cells + 1)[1:-1]
+                box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z), role="shelf")
+                for y in np.linspace(y0, y1, cells + 1)[1:-1]
             ]
             continue
         rows = 1 if kind == "door" else max(1, round((y1 - y0) / 0.22))
-        parts.append(box((low[0], low[1], -d / 2), (high[0], high[1], z)))
-        parts += front(low, high, z, rows, 1, kind, style)
+        parts.append(core((low[0], low[1], -d / 2), (high[0], high[1], z)))
+        parts += front(low, high, z, rows, 1, kind, style, depth_of(d, z))
     return parts

@@ -9,9 +9,9 @@ import numpy as np
 
 from echomodel.data.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.data.furniture.carpentry import Size, base, box, top
+from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.solids import Ball, Shell, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.stools import stool
-from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.style import Style
 
 

@@ -1,4 +1,4 @@
-"""What a style leaves open about one piece: named numbers, drawn when data are made and read off a description later."""
+"""What a style leaves open about one piece: named numbers, drawn to make data, read off a description later."""
 
 from __future__ import annotations
 

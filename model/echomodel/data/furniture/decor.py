@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
-from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 
@@ -140,7 +140,11 @@ def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[S
 def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A flat screen with a bezel on two feet, a foot plate, or none."""
     w, h, d = size
-    kind = choices.pick("kind", ["feet", "plate", "wall"], [0.45, 0.35, 0.2]) if d < 0.1 else choices.pick("kind", ["feet", "plate"])
+    kind = (
+        choices.pick("kind", ["feet", "plate", "wall"], [0.45, 0.35, 0.2])
+        if d < 0.1
+        else choices.pick("kind", ["feet", "plate"])
+    )
     low = 0.0 if kind == "wall" else h * 0.08
     t = min(d, 0.05) if kind != "wall" else d
     parts: list[Solid] = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
-from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 DOWN = rotation(x=np.pi)

@@ -6,17 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, front
-from echomodel.data.furniture.cases import BOARD, carcass, foot_height, shelves
-from echomodel.data.furniture.solids import Solid, rotation
+from echomodel.data.furniture.carpentry import Size, base, box, core
+from echomodel.data.furniture.cases import BOARD, carcass, depth_of, foot_height, shelves
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.fronts import front
+from echomodel.data.furniture.solids import Solid, rotation
 from echomodel.data.furniture.style import Style
 
 
 def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Open rows and columns with a back or without, some cells closed, some books; or a ladder of boards."""
     w, h, d = size
-    rows, columns = max(1, round(h / choices.between("rows", 0.3, 0.42))), max(1, round(w / choices.between("columns", 0.4, 0.8)))
+    rows, columns = (
+        max(1, round(h / choices.between("rows", 0.3, 0.42))),
+        max(1, round(w / choices.between("columns", 0.4, 0.8))),
+    )
     if style.family == "industrial" and choices.chance("form", 0.6):
         return _rack(size, rows, columns)
     foot = min(0.08, style.leg_height) if choices.chance("raised", 0.5) else 0.02
@@ -27,8 +31,8 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     x0, y0, x1, y1, z = rect
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
     if rows > 2 and choices.chance("front", 0.4):
-        parts.append(box((x0, y0, -d / 2), (x1, float(ys[1]), z)))
-        parts += front((x0, y0), (x1, float(ys[1])), z, 1, max(1, columns), "door", style)
+        parts.append(core((x0, y0, -d / 2), (x1, float(ys[1]), z)))
+        parts += front((x0, y0), (x1, float(ys[1])), z, 1, max(1, columns), "door", style, depth_of(d, z))
     rng = choices.stream("pattern")
     for i in range(columns):
         for j in range(1, rows):
@@ -115,8 +119,9 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot_height(style, h, 0.12), solid=False)
     split = y0 + (y1 - y0) * choices.between("split", 0.3, 0.45)
     columns = max(1, round((x1 - x0) / 0.45))
-    parts.append(box((x0, y0, -d / 2), (x1, split, z)))
-    parts += front((x0, y0), (x1, split), z, 1, columns, "door", style)
+    parts.append(core((x0, y0, -d / 2), (x1, split, z)))
+    parts.append(box((x0, split - 0.01, -d / 2), (x1, split + 0.01, z), role="shelf"))
+    parts += front((x0, y0), (x1, split), z, 1, columns, "door", style, depth_of(d, z))
     bays = np.linspace(x0, x1, columns + 1)
     rng, lattice = choices.stream("pattern"), choices.whole("side", 0, columns)
     for i in range(columns):

@@ -9,8 +9,8 @@ import numpy as np
 
 from echomodel.data.furniture.armchairs import upholstered_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
-from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Turned, rotation
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from echomodel.data.furniture.backs import seat_of
 from echomodel.data.furniture.carpentry import Size, base, box, cushion, top
-from echomodel.data.furniture.solids import Ball, Solid, Turned
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.solids import Ball, Solid, Turned
 from echomodel.data.furniture.style import Style
 
 

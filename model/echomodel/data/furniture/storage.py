@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, front
-from echomodel.data.furniture.cases import BOARD, carcass, foot_height, fronted, mixed, shelves
-from echomodel.data.furniture.solids import Solid, Turned, rotation
+from echomodel.data.furniture.carpentry import Size, base, box, core
+from echomodel.data.furniture.cases import BOARD, carcass, depth_of, foot_height, fronted, mixed, shelves
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.fronts import case, front, sliding
+from echomodel.data.furniture.solids import Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 
@@ -33,33 +34,34 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         x0, y0, x1, y1, z = rect
         mid = y0 + (y1 - y0) * choices.between("split", 0.4, 0.6)
         low, high = ((x0, mid), (x1, y1)) if choices.chance("side", 0.7) else ((x0, y0), (x1, mid))
-        drawer = box((*low, -d / 2), (*high, z))
-        return [*parts, drawer, *front(low, high, z, 1, 1, "drawer", style)]
+        shelf = box((x0, mid - BOARD / 2, -d / 2), (x1, mid + BOARD / 2, z), role="shelf")
+        drawer = core((*low, -d / 2), (*high, z))
+        return [*parts, drawer, shelf, *front(low, high, z, 1, 1, "drawer", style, depth_of(d, z))]
     if kind == "table":
         t = style.top
         low = h - max(0.12, h * 0.25)
         legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
         parts = [
             box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2)),
-            box((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44)),
+            *case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44)),
         ]
-        parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style)
+        parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style, d * 0.85)
         return parts + base(style, w * 0.95, d * 0.92, low, 0.035 * style.bulk, legs)
     return fronted(size, style, foot, choices.pick("rows", [1, 2, 2, 3]), 1, "drawer")
 
 
 def dresser(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Rows of drawers, one to three columns; the top row sometimes split."""
-    w, h, _d = size
+    w, h, d = size
     foot = foot_height(style, h, 0.2)
     rows = int(np.clip(round((h - foot) / choices.between("rows", 0.18, 0.26)), 2, 7))
     columns = 1 if w < 0.75 else choices.whole("columns", 1, 3) if w < 1.3 else choices.whole("columns", 2, 4)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot)
     if columns == 1 and w > 0.6 and choices.chance("form", 0.5):
         mid = y1 - (y1 - y0) / rows
-        upper = front((x0, mid), (x1, y1), z, 1, 2, "drawer", style)
-        return parts + upper + front((x0, y0), (x1, mid), z, rows - 1, 1, "drawer", style)
-    return parts + front((x0, y0), (x1, y1), z, rows, columns, "drawer", style)
+        upper = front((x0, mid), (x1, y1), z, 1, 2, "drawer", style, depth_of(d, z))
+        return parts + upper + front((x0, y0), (x1, mid), z, rows - 1, 1, "drawer", style, depth_of(d, z))
+    return parts + front((x0, y0), (x1, y1), z, rows, columns, "drawer", style, depth_of(d, z))
 
 
 def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -87,13 +89,14 @@ def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         columns = max(1, round((x1 - x0) / 0.48))
         split = y0 + (y1 - y0) * choices.between("split", 0.33, 0.5)
         low_kind, rows = ("door", 1) if choices.chance("front", 0.6) else ("drawer", choices.whole("rows", 2, 4))
-        parts.append(box((x0, y0, -d / 2), (x1, split, z)))
-        parts += front((x0, y0), (x1, split), z, rows, columns, low_kind, style)
+        parts.append(core((x0, y0, -d / 2), (x1, split, z)))
+        parts.append(box((x0, split - BOARD / 2, -d / 2), (x1, split + BOARD / 2, z), role="shelf"))
+        parts += front((x0, y0), (x1, split), z, rows, columns, low_kind, style, depth_of(d, z))
         if style.fronts == "open" or choices.chance("extra", 0.4):
             parts += shelves((x0, split, x1, y1, z), d, -d / 2, choices.whole("count", 2, 5), columns, style)
             return parts
-        parts.append(box((x0, split, -d / 2), (x1, y1, z)))
-        return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style)
+        parts.append(core((x0, split, -d / 2), (x1, y1, z)))
+        return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style, depth_of(d, z))
     if choices.chance("kind", 0.4):
         return fronted(size, style, foot, 1, max(2, round(w / 0.45)), "door")
     return mixed(size, style, choices, foot, choices.between("columns", 0.4, 0.6))
@@ -115,8 +118,8 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for j in range(rows):
             if rng.random() < 0.42:
                 low, high = (float(xs[i]) + 0.01, float(ys[j])), (float(xs[i + 1]) - 0.01, float(ys[j + 1]))
-                parts.append(box((*low, -d / 2 + 0.03), (*high, z - 0.01)))
-                parts += front(low, high, z - 0.01, 1, 1, "drawer", style)
+                parts.append(core((*low, -d / 2 + 0.03), (*high, z - 0.01)))
+                parts += front(low, high, z - 0.01, 1, 1, "drawer", style, depth_of(d, z) - 0.01)
     if gable:
         slope = np.arctan2(h - body, w / 2)
         length = np.hypot(h - body, w / 2)
@@ -138,24 +141,22 @@ def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
     choice = choices.pick("kind", ["doors", "drawers", "sliding", "open"], [0.45, 0.25, 0.15, 0.15])
     if choice == "sliding" and w > 1.2:
         count = 2 if w < 2.0 else 3
-        xs = np.linspace(x0, x1, count + 1)
-        for i in range(count):
-            step = 0.025 * (i % 2)
-            panel = (xs[i] - 0.015, y0, z - 0.005 + step), (xs[i + 1] + 0.015, y1, z + 0.02 + step)
-            parts.append(box(*panel, "glass" if choices.chance("second", 0.3) else "accent"))
-        return parts
+        material = "mirror" if choices.chance("second", 0.3) else "accent"
+        return parts + sliding((x0, y0), (x1, y1), z, count, style, material)
     if choice == "drawers":
         split = y0 + (y1 - y0) * choices.between("split", 0.2, 0.32)
         rows = choices.whole("rows", 1, 3)
-        parts += front((x0, y0), (x1, split), z, rows, max(1, doors // 2), "drawer", style)
-        return parts + front((x0, split), (x1, y1), z, 1, doors, "door", style)
+        parts += front((x0, y0), (x1, split), z, rows, max(1, doors // 2), "drawer", style, depth_of(d, z))
+        parts.append(box((x0, split - BOARD / 2, -d / 2), (x1, split + BOARD / 2, z), role="shelf"))
+        return parts + front((x0, split), (x1, y1), z, 1, doors, "door", style, depth_of(d, z))
     if choice == "open" and doors >= 3:
         edge = x1 - (x1 - x0) / doors
-        case, (_, cy0, _, cy1, cz) = carcass(size, style, foot, kind=kind, solid=False)
-        case.append(box((x0, cy0, -d / 2), (edge, cy1, z)))
-        case += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, choices.whole("rows", 4, 7), 1, style)
-        return case + front((x0, y0), (edge, y1), z, 1, doors - 1, "door", style)
-    return parts + front((x0, y0), (x1, y1), z, 1, doors, "door", style)
+        cabin, (_, cy0, _, cy1, cz) = carcass(size, style, foot, kind=kind, solid=False)
+        cabin.append(core((x0, cy0, -d / 2), (edge, cy1, z)))
+        cabin.append(box((edge - BOARD / 2, cy0, -d / 2), (edge + BOARD / 2, cy1, z), role="side"))
+        cabin += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, choices.whole("rows", 4, 7), 1, style)
+        return cabin + front((x0, y0), (edge, y1), z, 1, doors - 1, "door", style, depth_of(d, z))
+    return parts + front((x0, y0), (x1, y1), z, 1, doors, "door", style, depth_of(d, z))
 
 
 def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -169,7 +170,9 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = foot_height(style, h, 0.45)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
     count = max(2, round(w / choices.between("columns", 0.42, 0.62)))
-    kinds = [str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])]
+    kinds = [
+        str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])
+    ]
     if choices.chance("symmetry", 0.75):
         kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
     xs = np.linspace(x0, x1, count + 1)
@@ -183,6 +186,6 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 parts.append(box((xs[i], middle - 0.01, -d / 2), (xs[i + 1], middle + 0.01, z)))
             continue
         rows = 2 if kind == "drawer" and y1 - y0 > 0.28 else 1
-        parts.append(box((*low_corner, -d / 2), (*high_corner, z)))
-        parts += front(low_corner, high_corner, z, rows, 1, kind, style)
+        parts.append(core((*low_corner, -d / 2), (*high_corner, z)))
+        parts += front(low_corner, high_corner, z, rows, 1, kind, style, depth_of(d, z))
     return parts

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, front, pedestal, top, within
-from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.data.furniture.carpentry import Size, base, box, pedestal, top, within
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.fronts import case, front
+from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 
@@ -60,7 +61,7 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [top(shape, w, d, h, thick, style), drum]
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
-        body = box((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
+        body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
         drawers = front(
             (-w / 2 * 0.9, foot + 0.02),
             (w / 2 * 0.9, h - thick - 0.02),
@@ -69,10 +70,11 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             choices.whole("columns", 1, 3),
             "drawer",
             style,
+            d * 0.9,
         )
         return [
             top(shape, w, d, h, thick, style),
-            body,
+            *body,
             *drawers,
             *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
         ]
@@ -183,8 +185,8 @@ def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]
     if choices.chance("extra", 0.6):
         edge, rear = w * share * 0.47, d * share * 0.47
         drawer = (-edge, h * 0.68), (edge, h - t)
-        parts.append(box((*drawer[0], -rear), (*drawer[1], rear)))
-        parts += front(*drawer, rear, 1, 1, "drawer", style)
+        parts += case((*drawer[0], -rear), (*drawer[1], rear))
+        parts += front(*drawer, rear, 1, 1, "drawer", style, 1.9 * rear)
     return parts
 
 
@@ -199,8 +201,8 @@ def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
     if choices.chance("front", 0.55):
         low, high = (-w * 0.46, h - t - 0.14), (w * 0.46, h - t)
-        parts.append(box((*low, -d * 0.42), (*high, d * 0.42)))
-        parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style)
+        parts += case((*low, -d * 0.42), (*high, d * 0.42))
+        parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style, d * 0.8)
     if choices.chance("extra", 0.5):
         parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent"))
     return parts
@@ -225,8 +227,9 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             foot = 0.1 if style.contrast > 0.5 else 0.02
-            parts.append(box((x0, foot, -d * 0.46), (x1, y1, d * 0.46)))
-            parts += front((x0, foot), (x1, y1), d * 0.46, choices.whole("rows", 2, 4), 1, "drawer", style)
+            parts += case((x0, foot, -d * 0.46), (x1, y1, d * 0.46))
+            rows = choices.whole("rows", 2, 4)
+            parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
             if foot > 0.05:
                 parts += [
                     box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
@@ -240,8 +243,8 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
             low, high = (-w * 0.42, y1 - 0.12), (w * 0.42, y1)
-            parts.append(box((*low, -d * 0.42), (*high, d * 0.42)))
-            parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style)
+            parts += case((*low, -d * 0.42), (*high, d * 0.42))
+            parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style, d * 0.8)
     if hutch:
         parts += _hutch(w, desk_height, h, d, choices)
     return parts
@@ -271,14 +274,16 @@ def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     y1, low = table - t, table - t - 0.14
     if choices.chance("kind", 0.5):
         parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
-        parts.append(box((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45)))
-        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, choices.whole("columns", 1, 4), "drawer", style)
+        parts += case((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45))
+        columns = choices.whole("columns", 1, 4)
+        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, columns, "drawer", style, d * 0.86)
     else:
         unit = w * choices.between("share", 0.26, 0.36)
         for s in (-1, 1):
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
-            parts.append(box((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45)))
-            parts += front((x0, 0.06), (x1, y1), d * 0.45, choices.whole("rows", 2, 4), 1, "drawer", style)
+            parts += case((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45))
+            rows = choices.whole("rows", 2, 4)
+            parts += front((x0, 0.06), (x1, y1), d * 0.45, rows, 1, "drawer", style, d * 0.86)
             parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent"))
     if mirror:
         parts += _mirror(w, table, h, d, style, choices)
@@ -298,7 +303,7 @@ def _mirror(w: float, low: float, high: float, d: float, style: Style, choices: 
             high=(half, tall * 0.46),
             height=0.03,
             turn=rotation(x=np.pi / 2),
-            material="glass",
+            material="mirror",
         )
         return [foot, face]
     half = w * choices.between("spread", 0.28, 0.42)
@@ -307,7 +312,7 @@ def _mirror(w: float, low: float, high: float, d: float, style: Style, choices: 
         centre=np.array([0, (low + high) / 2, z]),
         half=np.array([half, tall / 2, 0.015]),
         radius=radius,
-        material="glass",
+        material="mirror",
     )
     if kind == "panel":
         return [foot, panel]
@@ -318,9 +323,9 @@ def _mirror(w: float, low: float, high: float, d: float, style: Style, choices: 
             centre=np.array([s * (half + wing * 0.47), low + tall * 0.46, z + wing * 0.16]),
             half=np.array([wing / 2, tall * 0.46, 0.012]),
             turn=rotation(y=-s * 0.35),
-            material="glass",
+            material="mirror",
         )
         for s in (-1, 1)
     ]
     knob = Ball(centre=np.array([0, high - 0.02, z]), half=np.full(3, 0.02))
-    return [box((-half, low, z - 0.012), (half, high - 0.02, z + 0.012), "glass"), *wings, knob]
+    return [box((-half, low, z - 0.012), (half, high - 0.02, z + 0.012), "mirror"), *wings, knob]
