@@ -220,7 +220,10 @@ def _asset(room: Room, name: str, user: str) -> Asset:
     geometry, category = room.geometry[user], room.graph.node(user).category
     if name in room.carried:
         return Asset(name, {part.name: tuple(part.slots) for part in geometry.parts}, room.carried[name])
-    forms = {part.name: surface(part.mesh, part.slots, atlas=room.options.atlas) for part in geometry.parts}
+    forms = {
+        part.name: surface(part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease)
+        for part in geometry.parts
+    }
     slots = {part: tuple(form.groups) for part, form in forms.items()}
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
+from echousd.room.surface import CREASE
+
 LICENCE = "Apache-2.0"  # of everything that EchoUSD itself makes
 
 
@@ -35,11 +37,28 @@ class Part:
         name: unique in its geometry; the prim is called `<asset>_<name>`.
         mesh: in the object's frame, metres.
         slots: material slot (a group of `echousd.room.looks`) -> (m,) int face numbers; together every face once.
+        crease: neighbours that fold more sharply than this keep a hard edge, radians.
     """
 
     name: str
     mesh: trimesh.Trimesh
     slots: Mapping[str, np.ndarray]
+    crease: float = CREASE
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """What a piece of furniture weighs.
+
+    Arguments:
+        mass: kilograms. centre: (3,) float, metres, in the object's frame.
+        inertia: (3,) float, moments about the principal axes, kg m². axes: (3, 3) float rotation, its columns are them.
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    axes: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +84,13 @@ class Geometry:
         parts: at least one.
         colliders: at least one; together they cover all parts.
         origin: provenance and licence.
+        mass: what it weighs, None = nobody knows, it is estimated from the category and the box.
     """
 
     parts: tuple[Part, ...]
     colliders: tuple[Collider, ...]
     origin: Origin
+    mass: Mass | None = None
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]

@@ -63,6 +63,10 @@ def look(palette: str, group: str) -> Look:
         "soil": Look(linear("4a3a2c"), 0.95),
         "shade": Look(linear("f6e7c8"), 0.8, emissive=tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))),  # type: ignore[arg-type]
         "screen": Look(linear("15171b"), 0.12),
+        "glass": Look(linear("dfeae8"), 0.08, opacity=0.35),
+        "mirror": Look(linear("c9d2d4"), 0.05, metallic=1.0),
+        "book": Look(linear("7a4a40"), 0.8),
+        "stem": Look(linear("6b5436"), 0.85),
     }[group]
 
 

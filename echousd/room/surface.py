@@ -37,7 +37,9 @@ class Surface:
         return np.stack([self.points.min(0), self.points.max(0)]).astype(np.float32)
 
 
-def surface(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False) -> Surface:
+def surface(
+    mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE
+) -> Surface:
     """A mesh with normals and texture coordinates.
 
     Arguments:
@@ -45,8 +47,9 @@ def surface(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: b
         groups: material group -> face numbers.
         atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
             axes, where one unit of texture space is one metre.
+        crease: neighbours that fold more sharply than this keep a hard edge, radians.
     """
-    normals, normal_index = creased_normals(mesh)
+    normals, normal_index = creased_normals(mesh, crease)
     st, st_index = atlas_unwrap(mesh) if atlas else box_projection(mesh)
     return Surface(
         points=np.asarray(mesh.vertices, np.float32),

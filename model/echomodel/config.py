@@ -128,8 +128,8 @@ class FurnitureConfig:
 
     kinds: tuple[int, ...] = (5, 9, 2, 7, 5, 7, 4, 4, 7)
     numbers: int = 36
-    width: int = 192
-    layers: int = 4
+    width: int = 160
+    layers: int = 3
     voices: int = 4
     echo: bool = True
     temperature: float = 1.0

@@ -248,7 +248,7 @@ class EchoModel:
         edit: GraphEdit | None = None,
         guidance: float = 1.0,
         noise: Tensor | None = None,
-        progress: Progress | None = None,
+        progress: StepListener | None = None,
     ) -> Tensor:
         """Descriptions of all pieces of furniture of S scenes (`echomodel.data.furniture.description`).
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 # Imported when asked for: the command line names the sources without loading the model.
 MODULES = {
+    "parts": "echousd.room.sources.parts",
     "sdf": "echousd.room.sources.sdf",
     "boxes": "echousd.room.sources.boxes",
 }

@@ -1,0 +1,146 @@
+"""Geometry of furniture that is made of solids: exact meshes in a face budget, convex colliders, mass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from echomodel.data.furniture.assembly import Piece, pieces_of
+from echomodel.data.furniture.solids import FINEST, Solid
+from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
+
+SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
+# kg/m³ of what a solid stands for: tubes and shades are hollow, upholstery is foam on a light frame.
+DENSITY = {
+    "wood": 600.0, "accent": 650.0, "fabric": 70.0, "metal": 2600.0, "glass": 2500.0, "ceramic": 900.0, "leaf": 120.0,
+    "soil": 900.0, "shade": 150.0, "screen": 900.0, "cushion": 50.0, "linen": 60.0, "blanket": 60.0, "mirror": 2500.0,
+    "book": 650.0, "stem": 500.0,
+}  # fmt: skip
+CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
+COLLIDERS = 16  # convex pieces of one body at most
+SMALL = 0.002  # share of its box below which a solid alone is no obstacle
+
+
+def assembled(solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin) -> Geometry:
+    """The geometry of one piece of furniture: what is fixed in one part, every drawer and door in a part of its own.
+
+    Arguments:
+        solids: of a furniture program.
+        size: (3,) float, metres; the geometry fills it.
+        faces: most triangles of all parts together; the finest detail that stays below is taken.
+        origin: provenance.
+    """
+    pieces = within_budget(solids, size, faces)
+    bodies: dict[str, list[Piece]] = {"mesh": []}
+    for piece in pieces:
+        bodies.setdefault(piece.joint.body if piece.joint else "mesh", []).append(piece)
+    bodies = {name: members for name, members in bodies.items() if members}
+    parts = tuple(_part(name, members) for name, members in bodies.items())
+    plain = pieces_of([piece.solid for piece in pieces], size, 1)
+    colliders: list[Collider] = []
+    for name in bodies:
+        own = [p for p in plain if (p.joint.body if p.joint else "mesh") == name]
+        hulls = convex_pieces([p.vertices for p in own], float(np.prod(size)))
+        prefix = "collider" if name == "mesh" else f"{name}_collider"
+        names = [prefix] + [f"{prefix}_{n}" for n in range(2, len(hulls) + 1)]
+        colliders += [Collider(word, hull, "convexHull") for word, hull in zip(names, hulls, strict=True)]
+    return Geometry(parts, tuple(colliders), origin, mass=mass_of(plain))
+
+
+def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list[Piece]:
+    """The solids meshed as finely as `faces` triangles allow; where boxes are too many, the smallest are left out."""
+    for detail in range(FINEST, -1, -1):
+        pieces = pieces_of(solids, size, detail)
+        if sum(len(piece.faces) for piece in pieces) <= faces:
+            return pieces
+    volume = [float(np.prod(np.ptp(piece.vertices, axis=0))) for piece in pieces]
+    kept, total = [], 0
+    for number in np.argsort(volume)[::-1].tolist():
+        if total + len(pieces[number].faces) <= faces:
+            kept.append(number)
+            total += len(pieces[number].faces)
+    return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0)
+
+
+def _part(name: str, pieces: Sequence[Piece]) -> Part:
+    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
+    faces = np.concatenate([piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)])
+    mesh = trimesh.Trimesh(np.concatenate([piece.vertices for piece in pieces]), faces, process=False)
+    words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
+    slot = np.repeat(words, [len(piece.faces) for piece in pieces])
+    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cluster:
+    points: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    volume: float
+
+
+def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
+    """Convex hulls (each a closed mesh) around solids; those that waste the least room together share one.
+
+    Arguments:
+        points: vertices (n, 3) of each solid, metres.
+        box: volume of the whole piece's box, m³; what is far smaller joins a neighbour.
+        most: number of hulls.
+    """
+    clusters = [_cluster(p) for p in points]
+    while len(clusters) > 1:
+        small = min(range(len(clusters)), key=lambda k: clusters[k].volume)
+        if len(clusters) <= most and clusters[small].volume >= SMALL * box:
+            break
+        one = clusters.pop(small) if clusters[small].volume < SMALL * box or len(clusters) > 3 * most else None
+        low, high = np.array([c.low for c in clusters]), np.array([c.high for c in clusters])
+        own = np.array([c.volume for c in clusters])
+        if one is not None:
+            joint = np.prod(np.maximum(high, one.high) - np.minimum(low, one.low), axis=1)
+            other = int(np.argmin(joint - own))
+        else:
+            joint = np.prod(
+                np.maximum(high[:, None], high[None]) - np.minimum(low[:, None], low[None]), axis=2
+            ) - own[:, None] - own[None]  # fmt: skip
+            np.fill_diagonal(joint, np.inf)
+            first, other = sorted(int(v) for v in np.unravel_index(np.argmin(joint), joint.shape))
+            one = clusters.pop(other)
+            other = first
+        clusters[other] = _cluster(np.concatenate([clusters[other].points, one.points]))
+    return [_hull(cluster.points) for cluster in clusters]
+
+
+def _cluster(points: np.ndarray) -> _Cluster:
+    low, high = points.min(0), points.max(0)
+    return _Cluster(points, low, high, float(np.prod(np.maximum(high - low, 1e-3))))
+
+
+def _hull(points: np.ndarray) -> trimesh.Trimesh:
+    """The convex hull with exact corners and as few faces as may be."""
+    hull = trimesh.convex.convex_hull(points)
+    return trimesh.Trimesh(hull.vertices, hull.faces, process=False)
+
+
+def mass_of(pieces: Sequence[Piece]) -> Mass:
+    """Mass, centre of mass and moments of inertia from volumes and densities; overlaps count twice."""
+    weight, centre, inertia = [], [], []
+    for piece in pieces:
+        mesh = trimesh.Trimesh(piece.vertices, piece.faces, process=False)
+        volume, extent = abs(float(mesh.volume)), np.ptp(piece.vertices, axis=0)
+        kg = max(volume, 1e-7) * DENSITY[piece.solid.material]
+        weight.append(kg)
+        centre.append((piece.vertices.max(0) + piece.vertices.min(0)) / 2)
+        inertia.append(kg / 12 * np.diag((extent**2).sum() - extent**2))
+    total, places = float(np.sum(weight)), np.array(centre)
+    middle = (np.array(weight)[:, None] * places).sum(0) / total
+    away = places - middle
+    tensor = np.sum(inertia, axis=0) + sum(
+        kg * ((r @ r) * np.eye(3) - np.outer(r, r)) for kg, r in zip(weight, away, strict=True)
+    )
+    values, axes = np.linalg.eigh(tensor)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] *= -1
+    return Mass(total, middle, values, axes)

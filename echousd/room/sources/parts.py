@@ -1,0 +1,71 @@
+"""Furniture made of parts: the model describes every piece, a furniture program builds it sharp, of several materials."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.data.furniture import solids
+from echomodel.data.furniture.description import WIDTH, piece_of
+from echousd.room.geometry import Geometry, Origin
+from echousd.room.joinery import assembled
+from echousd.room.sources.source import ShapeRequest, Shapes, per_asset
+from echousd.room.tensors import floor_centre, graph_batch, seeded
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
+
+ORIGIN = Origin("parts")
+
+
+class AssembledParts:
+    """The source `parts`; needs a model with a furniture branch."""
+
+    title = "furniture made of parts"
+
+    def check(self, model: RoomModel | None) -> None:
+        """Raises ValueError for a model without a furniture branch, or one that describes furniture in other words."""
+        if model is None or not getattr(model, "has_furniture", False):
+            raise ValueError(
+                "these weights have no furniture branch; use --shapes sdf, --shapes boxes or other weights"
+            )
+        own = model.config.furniture  # type: ignore[attr-defined]
+        if sum(own.kinds) + own.numbers != WIDTH:
+            raise ValueError(
+                f"these weights describe furniture by {sum(own.kinds) + own.numbers} numbers, this version by {WIDTH}; "
+                "train them again or use --shapes sdf"
+            )
+
+    def shapes(self, request: ShapeRequest) -> Shapes:
+        """Pieces built from sampled descriptions; those of an edited graph that stay are heard."""
+        described = descriptions(request)
+        size = np.asarray(request.boxes.size, float)
+
+        def make(row: int) -> Geometry:
+            style, choices = piece_of(described[row])
+            parts = solids(request.graph.nodes[row].category, style, choices, size[row])
+            return assembled(parts, size[row], faces=request.faces, origin=ORIGIN)
+
+        return per_asset(request, make)
+
+
+def descriptions(request: ShapeRequest) -> np.ndarray:
+    """(n, WIDTH) float32: the model's description of every object."""
+    SOURCE.check(request.model)
+    graph, boxes, model = request.graph, request.boxes, request.model
+    centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
+    words = sorted(set(request.styles.values()))
+    styles = torch.tensor([words.index(request.styles[name]) for name in graph.names])
+    extra: dict[str, Any] = {} if request.change is None else {"edit": request.change}
+    with request.timer.stage("shapes") as tell:
+        found = model.sample_furniture(  # type: ignore[union-attr]
+            graph_batch(graph), centred, generator=seeded(request.seed, "parts"), steps=request.steps,
+            styles=styles, progress=tell, **extra,
+        )  # fmt: skip
+    return np.asarray(found)
+
+
+SOURCE = AssembledParts()
