@@ -1,4 +1,4 @@
-"""Furniture made of parts: the model describes every piece, a furniture program builds it sharp, of several materials."""
+"""Furniture made of parts: the model describes every piece, a program builds it, sharp and of several materials."""
 
 from __future__ import annotations
 

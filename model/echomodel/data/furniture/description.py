@@ -7,6 +7,7 @@ A kind is told by one number per word, +1 for the one that holds; a proportion o
 from __future__ import annotations
 
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
@@ -41,14 +42,14 @@ def piece_of(vector: np.ndarray) -> tuple[Style, Choices]:
     vector = np.asarray(vector, float)
     if vector.shape != (WIDTH,) or not np.isfinite(vector).all():
         raise ValueError(f"description is {np.shape(vector)} {vector.dtype}, expected ({WIDTH},) finite numbers")
-    kinds = {
+    told: dict[str, Any] = {
         name: words[int(vector[start : start + len(words)].argmax())]
         for start, (name, words) in zip(STARTS, WORDS.items(), strict=False)
     }
     share = (vector[HOT:].clip(-1, 1) + 1) / 2
     numbers = _LOW + (_HIGH - _LOW) * share[: len(PROPORTIONS)]
-    proportions = dict(zip(PROPORTIONS, numbers.tolist(), strict=True))
-    return Style(**kinds, **proportions, size_shift=(0.0, 0.0, 0.0)), Choices(share[len(PROPORTIONS) :])
+    told |= dict(zip(PROPORTIONS, numbers.tolist(), strict=True))
+    return Style(**told, size_shift=(0.0, 0.0, 0.0)), Choices(share[len(PROPORTIONS) :])
 
 
 def draw_styles(count: int, rng: np.random.Generator) -> np.ndarray:
