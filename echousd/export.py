@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
+from pxr import Sdf, Usd, UsdUtils
 
-from echousd.drawables import Drawable, Paint, paint_image, read_drawables, rgb
-from echousd.packing import Package, Reach, take_assets
+from echousd.drawables import Drawable, Paint, paint_image, read_drawables
+from echousd.flattening import flat_layer
+from echousd.packing import Package, Reach
 from echousd.stage import open_stage
-from echousd.stage.read import source
-from echousd.stage.values import check_types, given, reading, targets
+from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.values import reading
 
 if TYPE_CHECKING:
     import trimesh
-
-    from echousd.room.room import Room
 
 ENDINGS = (".usdz", ".glb", ".usda", ".usdc")
 
@@ -40,9 +39,6 @@ def export(
     Raises ValueError for other endings, a file in the way, a stage that does not open, one that names files outside its
     folder and `search`, or a path that is not writable.
     """
-    from echousd.room.assets import layer_bytes
-    from echousd.room.save import write_whole
-
     out = Path(out)
     if out.suffix not in ENDINGS:
         raise ValueError(f"{out}: cannot export to {out.suffix or 'no ending'!r}, allowed: {', '.join(ENDINGS)}")
@@ -62,41 +58,6 @@ def export(
             content = layer_bytes(flat_layer(stage), out.suffix)
     write_whole(out, content)
     return out
-
-
-def flat_layer(
-    stage: Usd.Stage, *, package: Package | None = None, guides: bool = True, layouts: Room | None = None
-) -> Sdf.Layer:
-    """Everything that a stage composes to, in one layer without references, variants or paths of this machine.
-
-    Arguments:
-        package: receives the images; without it textured materials get their plain colour.
-        guides: keep prims of purpose guide (colliders) and physics.
-        layouts: the room whose layouts become variants again.
-    """
-    from echousd.room.compose import place_layouts
-
-    layer = stage.Flatten(False)
-    check_types(layer, source(stage))
-    stage = Usd.Stage.Open(layer)
-    for prim in list(stage.TraverseAll()):
-        if prim.IsValid() and not guides and _is_guide(prim):
-            stage.RemovePrim(prim.GetPath())
-    for prim in stage.TraverseAll():
-        prim.ClearMetadata("assetInfo")  # it holds the absolute path of a file that is no longer needed
-        for attribute in prim.GetAttributes():
-            if attribute.GetTypeName() == Sdf.ValueTypeNames.Double3 and attribute.GetName().startswith("xformOp:"):
-                _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
-    _drop_unused_materials(stage)
-    images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
-    take_assets(layer, package)
-    for image in images:
-        file = image.GetAttribute("inputs:file").Get()
-        if not getattr(file, "path", ""):
-            _paint_plain(image)
-    if layouts is not None and len(layouts.layouts) > 1:
-        place_layouts(stage, layouts)
-    return layer
 
 
 def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
@@ -134,49 +95,6 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
     if not scene.geometry:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to export, found no visible mesh")
     return bytes(scene.export(file_type="glb"))
-
-
-def _is_guide(prim: Usd.Prim) -> bool:
-    guide = prim.IsA(UsdGeom.Imageable) and UsdGeom.Imageable(prim).GetPurposeAttr().Get() == UsdGeom.Tokens.guide
-    return guide or prim.GetTypeName() == "PhysicsScene"
-
-
-def _as_float(attribute: Usd.Attribute) -> None:
-    value, prim, name = given(attribute), attribute.GetPrim(), attribute.GetName()
-    if not isinstance(value, Gf.Vec3d):
-        return
-    prim.RemoveProperty(name)
-    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float3, False).Set(tuple(float(v) for v in value))
-
-
-def _is_image(prim: Usd.Prim) -> bool:
-    """Whether a prim is a shader that reads an image."""
-    file = prim.GetAttribute("inputs:file")
-    return prim.GetTypeName() == "Shader" and bool(file) and file.HasAuthoredValue()
-
-
-def _paint_plain(image: Usd.Prim) -> None:
-    """Give the materials that an image without a file coloured its fallback colour instead."""
-    fallback = image.GetAttribute("inputs:fallback")
-    color = rgb(fallback.Get() if fallback else None, (0.5, 0.5, 0.5))
-    for shader in image.GetParent().GetChildren():
-        colored = shader.GetAttribute("inputs:diffuseColor")
-        if colored and any(c.GetPrimPath() == image.GetPath() for c in colored.GetConnections()):
-            colored.ClearConnections()
-            colored.Set(color)
-    image.SetActive(False)
-
-
-def _drop_unused_materials(stage: Usd.Stage) -> None:
-    """Looks of assets that the room's own looks replace."""
-    bound = {target for prim in stage.TraverseAll() for target in targets(prim, "material:binding")}
-    unused = [p for p in stage.TraverseAll() if p.IsA(UsdShade.Material) and p.GetPath() not in bound]
-    scopes = {prim.GetParent().GetPath() for prim in unused}
-    for path in [prim.GetPath() for prim in unused]:
-        stage.RemovePrim(path)
-    for path in scopes:
-        if not stage.GetPrimAtPath(path).GetAllChildren():
-            stage.RemovePrim(path)
 
 
 def _own_faces(mesh: Drawable) -> list[tuple[Paint, np.ndarray]]:

@@ -23,7 +23,7 @@ def register(app: typer.Typer) -> None:
         import io
 
         from echousd.render import render_file
-        from echousd.room.save import write_whole
+        from echousd.stage.files import write_whole
 
         if output.suffix.lower() != ".png":
             raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")

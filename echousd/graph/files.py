@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Literal
 
+from echomodel.files import whole_file
 from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph
 from echousd.graph.text import graph_from_text
@@ -59,11 +60,8 @@ def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a UTF-8 file beside `path`, then rename it; raises `GraphError`."""
     path = Path(path)
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        beside.write_text(text, "utf-8")
-        beside.replace(path)
+        with whole_file(path) as beside:
+            beside.write_text(text, "utf-8")
     except OSError as error:
         raise GraphError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
-    finally:
-        beside.unlink(missing_ok=True)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,17 +35,6 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
     with Sdf.ChangeBlock():
         finish(layer)
     return layer
-
-
-def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
-    """The layer as it would lie on disk; the same content gives the same bytes. `suffix`: `.usda` or `.usdc`."""
-    if suffix == ".usda":
-        return layer.ExportToString().encode("utf-8")
-    with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
-        path = Path(folder) / f"layer{suffix}"
-        if not layer.Export(str(path)):
-            raise OSError(f"cannot write a layer to {folder}")
-        return path.read_bytes()
 
 
 def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:

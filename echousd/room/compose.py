@@ -19,6 +19,7 @@ from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
+from echousd.stage.files import layer_bytes
 
 LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest first
 
@@ -50,8 +51,8 @@ def room_files(room: Room) -> dict[str, bytes]:
         "materials": materials_layer(room, made, shell_surfaces),
     }
     for name, layer in layers.items():
-        files[f"layers/{name}.usda"] = assets.layer_bytes(layer, ".usda")
-    files[f"{room.name}.usda"] = assets.layer_bytes(root_layer(room), ".usda")
+        files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
+    files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
     return files
 
 
@@ -234,8 +235,8 @@ def _asset(room: Room, name: str, user: str) -> Asset:
     payload = assets.geometry_layer(name, forms, geometry, data)
     component = assets.component_layer(name, category, room.styles[user], extent, slots, data)
     files = {
-        payload_file(name): assets.layer_bytes(payload, ".usdc"),
-        component_file(name): assets.layer_bytes(component, ".usda"),
+        payload_file(name): layer_bytes(payload, ".usdc"),
+        component_file(name): layer_bytes(component, ".usda"),
     }
     return Asset(name, slots, files)
 

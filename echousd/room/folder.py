@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from echomodel.files import flush
 from echousd.room.journal import (
     STAGING,
     Journal,
@@ -20,7 +21,6 @@ from echousd.room.journal import (
     Removal,
     digest,
     digest_of,
-    flush,
     read_journal,
     write_journal,
 )

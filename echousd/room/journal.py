@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import warnings
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from echomodel.files import flush
 from echousd.room.manifest import LARGEST, Digest
 from echousd.room.within import check_links, inside
 
@@ -107,14 +107,3 @@ def read_journal(folder: Path) -> Journal | None:
 def _check_place(folder: Path, place: Path, entry: str) -> None:
     if place.relative_to(folder).parts[0] == STAGING:
         raise ValueError(f"{entry} names {place}, where runs keep their own files; allowed: the room's files")
-
-
-def flush(path: Path) -> None:
-    """Have the system write a file, or the names in a folder, to the disk before anything that comes after it."""
-    if path.is_dir() and os.name != "posix":
-        return
-    file = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(file)
-    finally:
-        os.close(file)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import tempfile
 import warnings
 from collections.abc import Mapping
@@ -12,18 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pxr import Sdf
+from pxr import Sdf, Usd
 
 import echousd
+from echousd.flattening import flat_layer
 from echousd.room import folder as folders
 from echousd.room import ownership
-from echousd.room.assets import layer_bytes
-from echousd.room.compose import LAYERS, room_files
+from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
-from echousd.room.journal import flush
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
 from echousd.room.room import Room
+from echousd.stage import open_stage
+from echousd.stage.files import layer_bytes, write_whole
 
 
 def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
@@ -95,16 +95,16 @@ def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
 
     Raises ValueError for another ending, a file that is in the way, or a path that cannot be written.
     """
-    from echousd.export import flat_layer
-    from echousd.stage import open_stage
-
     if path.suffix not in (".usda", ".usdc"):
         raise ValueError(f"{path}: a flat room ends in .usda or .usdc, found {path.suffix or 'no ending'!r}")
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another file or use --force")
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         root = save_layers(room, Path(scratch) / room.name)
-        write_whole(path, layer_bytes(flat_layer(open_stage(root), layouts=room), path.suffix))
+        layer = flat_layer(open_stage(root))
+    if len(room.layouts) > 1:
+        place_layouts(Usd.Stage.Open(layer), room)
+    write_whole(path, layer_bytes(layer, path.suffix))
     return path
 
 
@@ -142,23 +142,6 @@ def _drawn_by_us(path: Path) -> bool:
             return picture.info.get(MARK[0]) == MARK[1]
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return False
-
-
-def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed") -> None:
-    """Write a file so that it is there as a whole or not at all; raises ValueError where that is impossible.
-
-    Arguments:
-        left: what the error says about the state in which everything else is left.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(content)
-        flush(temporary)
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise ValueError(f"{path}: cannot be written ({error.strerror or error}); {left}") from None
 
 
 def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:

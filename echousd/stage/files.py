@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
-import uuid
+import tempfile
 from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
+from echomodel.files import whole_file
 from echousd.stage.encoding import StageError
 
 WRITABLE = (".usd", ".usda", ".usdc")
@@ -61,20 +61,40 @@ def save_layer(layer: Sdf.Layer, path: str | os.PathLike[str]) -> None:
         raise StageError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(WRITABLE)}")
     if not path.parent.is_dir():
         raise StageError(f"{path}: the folder {path.parent} does not exist")
-    temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:12]}{path.suffix}")
     try:
-        temporary.touch(exist_ok=False)  # with the rights that the umask gives
-        if path.is_file():
-            shutil.copymode(path, temporary)
-        if not layer.Export(str(temporary)):
-            raise StageError(f"{path}: cannot be written")
-        temporary.replace(path)
+        with whole_file(path, path.suffix) as beside:
+            beside.touch()  # with the rights that the umask gives
+            if not layer.Export(str(beside)):
+                raise StageError(f"{path}: cannot be written")
     except (OSError, Tf.ErrorException) as error:
         raise StageError(
             f"{path}: cannot be written ({said(error) if isinstance(error, Tf.ErrorException) else error.strerror})"
         ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
     loaded = Sdf.Layer.Find(str(path.absolute()))
     if loaded:  # a stage of this process has the file open: let it follow
         loaded.Reload(force=True)
+
+
+def layer_bytes(layer: Sdf.Layer, suffix: str) -> bytes:
+    """The layer as it would lie on disk; the same content gives the same bytes. `suffix`: `.usda` or `.usdc`."""
+    if suffix == ".usda":
+        return layer.ExportToString().encode("utf-8")
+    with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
+        path = Path(folder) / f"layer{suffix}"
+        if not layer.Export(str(path)):
+            raise OSError(f"cannot write a layer to {folder}")
+        return path.read_bytes()
+
+
+def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed") -> None:
+    """Write a file so that it is there as a whole or not at all; raises ValueError where that is impossible.
+
+    Arguments:
+        left: what the error says about the state in which everything else is left.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(path) as beside:
+            beside.write_bytes(content)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written ({error.strerror or error}); {left}") from None

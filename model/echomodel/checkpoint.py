@@ -17,6 +17,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
+from echomodel.files import whole_file
 from echomodel.released.config import ReleasedConfig
 from echomodel.released.inference import VQVAE as VQVAE_PREFIX
 from echomodel.released.inference import CheckpointError, infer_config
@@ -208,12 +209,8 @@ def write_released(
     state = {key: value.detach().clone().contiguous() for key, value in nn.Module.state_dict(model).items()}
     target = Path(target)
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
+    with whole_file(target) as beside:
         save_file(state, beside, metadata=metadata)
-        beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def is_released(path: str | os.PathLike[str]) -> bool:

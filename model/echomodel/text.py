@@ -13,6 +13,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
+from echomodel.files import whole_file
+
 PUBLISHED_MODEL, PUBLISHED_WEIGHTS = "ViT-B-32-quickgelu", "openai"  # OpenAI's ViT-B/32 was trained with the quick GELU
 
 
@@ -172,12 +174,8 @@ class CachedTextEncoder:
 
     def _write(self, known: dict[str, Tensor]) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        beside = self.path.with_name(f".{self.path.name}.{os.getpid()}.tmp")
-        try:
+        with whole_file(self.path) as beside:
             save_file(known, beside)
-            beside.replace(self.path)
-        finally:
-            beside.unlink(missing_ok=True)
 
 
 def encoder_named(name: str | None) -> TextEncoder:

@@ -20,6 +20,7 @@ from echomodel.data.catalogues import Loader, MeshEntry, load_mesh
 from echomodel.data.shapeset import ShapeRecord, ShapeSet, finish_set, write_shard
 from echomodel.data.sheet import thumbnail
 from echomodel.data.tsdf import tsdf_from_mesh
+from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 
 HELD_OUT = 0.2
@@ -155,15 +156,13 @@ def _split(rows: list[MeshRow]) -> list[MeshRow]:
 
 def write_table(path: Path, rows: Iterable[MeshRow]) -> None:
     """Write the table as CSV; edit `class`, `use` (1 or 0) and `yaw` (degrees) and build again."""
-    part = path.with_suffix(".part")
-    with part.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for r in rows:
             writer.writerow(
                 [r.key, r.category, int(r.use), f"{r.yaw:g}", r.name, *r.size, r.split, r.licence, r.creator]
             )
-    part.replace(path)
 
 
 def read_table(path: Path) -> list[MeshRow]:
@@ -267,9 +266,8 @@ def _one(
     mesh = prepared(entry, row, loaders)
     tsdf, size = tsdf_from_mesh(mesh), np.asarray(mesh.extents, float)
     thumbnail(mesh).save(folder / "thumbnails" / f"{stem}.png")
-    with part.with_suffix(".tmp").open("wb") as file:
+    with whole_file(part) as beside, beside.open("wb") as file:
         np.savez_compressed(file, tsdf=np.rint(tsdf * 127).astype(np.int8), size=size)
-    part.with_suffix(".tmp").replace(part)
     return np.rint(tsdf * 127).astype(np.float32) / 127, size
 
 

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from echomodel.compact.model import CompactModel
 from echomodel.config import to_json
+from echomodel.files import whole_file
 from echomodel.training.logs import RunLog, plot_log
 from echomodel.training.paper_stage import PaperModel
 from echomodel.training.recipe import Recipe
@@ -161,11 +162,10 @@ class Trainer:
             tensors[f"average.{name}"] = averaged[name]
             for key, value in self.optimizer.state[parameter].items():
                 tensors[f"optimizer.{key}.{name}"] = torch.as_tensor(value)
-        partial = self.folder / "checkpoint.partial"
         metadata = {"step": str(self.step), "recipe": to_json(self.recipe)}
         copies = {key: value.detach().contiguous().clone() for key, value in tensors.items()}
-        save_file(copies, partial, metadata=metadata)
-        partial.replace(self.folder / "checkpoint.safetensors")
+        with whole_file(self.folder / "checkpoint.safetensors") as beside:
+            save_file(copies, beside, metadata=metadata)
         self.average.write(self.folder / "weights.safetensors", self.stage.saved)
 
     def _load(self) -> None:

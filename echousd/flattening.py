@@ -1,0 +1,81 @@
+"""Everything that a stage composes to, in one layer that needs no other file but its images."""
+
+from __future__ import annotations
+
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+
+from echousd.drawables import rgb
+from echousd.packing import Package, take_assets
+from echousd.stage.read import source
+from echousd.stage.values import check_types, given, targets
+
+
+def flat_layer(stage: Usd.Stage, *, package: Package | None = None, guides: bool = True) -> Sdf.Layer:
+    """Everything that a stage composes to, in one layer without references, variants or paths of this machine.
+
+    Arguments:
+        package: receives the images; without it textured materials get their plain colour.
+        guides: keep prims of purpose guide (colliders) and physics.
+    """
+    layer = stage.Flatten(False)
+    check_types(layer, source(stage))
+    stage = Usd.Stage.Open(layer)
+    for prim in list(stage.TraverseAll()):
+        if prim.IsValid() and not guides and _is_guide(prim):
+            stage.RemovePrim(prim.GetPath())
+    for prim in stage.TraverseAll():
+        prim.ClearMetadata("assetInfo")  # it holds the absolute path of a file that is no longer needed
+        for attribute in prim.GetAttributes():
+            if attribute.GetTypeName() == Sdf.ValueTypeNames.Double3 and attribute.GetName().startswith("xformOp:"):
+                _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
+    _drop_unused_materials(stage)
+    images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
+    take_assets(layer, package)
+    for image in images:
+        file = image.GetAttribute("inputs:file").Get()
+        if not getattr(file, "path", ""):
+            _paint_plain(image)
+    return layer
+
+
+def _is_guide(prim: Usd.Prim) -> bool:
+    guide = prim.IsA(UsdGeom.Imageable) and UsdGeom.Imageable(prim).GetPurposeAttr().Get() == UsdGeom.Tokens.guide
+    return guide or prim.GetTypeName() == "PhysicsScene"
+
+
+def _as_float(attribute: Usd.Attribute) -> None:
+    value, prim, name = given(attribute), attribute.GetPrim(), attribute.GetName()
+    if not isinstance(value, Gf.Vec3d):
+        return
+    prim.RemoveProperty(name)
+    prim.CreateAttribute(name, Sdf.ValueTypeNames.Float3, False).Set(tuple(float(v) for v in value))
+
+
+def _is_image(prim: Usd.Prim) -> bool:
+    """Whether a prim is a shader that reads an image."""
+    file = prim.GetAttribute("inputs:file")
+    return prim.GetTypeName() == "Shader" and bool(file) and file.HasAuthoredValue()
+
+
+def _paint_plain(image: Usd.Prim) -> None:
+    """Give the materials that an image without a file coloured its fallback colour instead."""
+    fallback = image.GetAttribute("inputs:fallback")
+    color = rgb(fallback.Get() if fallback else None, (0.5, 0.5, 0.5))
+    for shader in image.GetParent().GetChildren():
+        colored = shader.GetAttribute("inputs:diffuseColor")
+        if colored and any(c.GetPrimPath() == image.GetPath() for c in colored.GetConnections()):
+            colored.ClearConnections()
+            colored.Set(color)
+    image.SetActive(False)
+
+
+def _drop_unused_materials(stage: Usd.Stage) -> None:
+    """Looks of assets that the room's own looks replace."""
+    bound = {target for prim in stage.TraverseAll() for target in targets(prim, "material:binding")}
+    unused = [p for p in stage.TraverseAll() if p.IsA(UsdShade.Material) and p.GetPath() not in bound]
+    scopes = {prim.GetParent().GetPath() for prim in unused}
+    for path in [prim.GetPath() for prim in unused]:
+        stage.RemovePrim(path)
+    for path in scopes:
+        if not stage.GetPrimAtPath(path).GetAllChildren():
+            stage.RemovePrim(path)

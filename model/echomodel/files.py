@@ -1,0 +1,42 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterator[Path]:
+    """A path beside `path` to write to; renamed to `path` at the end of the block, removed where that raised.
+
+    A file that is replaced passes its rights on.
+
+    Arguments:
+        path: the file.
+        ending: of the other name, where the writer goes by it.
+    """
+    path = Path(path)
+    beside = path.with_name(f".{path.name}.{os.getpid()}{ending}")
+    try:
+        yield beside
+        flush(beside)
+        if path.is_file():
+            shutil.copymode(path, beside)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def flush(path: Path) -> None:
+    """Have the system write a file, or the names in a folder, to the disk before anything that comes after it."""
+    if path.is_dir() and os.name != "posix":
+        return
+    file = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)
