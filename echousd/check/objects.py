@@ -76,7 +76,7 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     present = {thing.node.name for thing in objects}
     read = [_readable(lambda prim=prim: relation_of(prim, names)) for prim in prims.relations]  # type: ignore[misc]
     relations = tuple(r for r in read if r is not None and r.subject in present and r.object in present)
-    spec = _readable(lambda: room_spec(prims.graph))
+    spec = _readable(lambda: room_spec(prims))
     assert stage
     return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
 
