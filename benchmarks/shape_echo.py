@@ -17,11 +17,12 @@ import torch
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import shape_predictor
 from echomodel.data.shapeset import ShapeSet
-from echomodel.echo import SAME_STYLE, EchoModel
+from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.samplers import sample
 from echomodel.training.shape_stage import draw_suites, shape_loss
 from echomodel.training.shapes import read
+from echomodel.vocabulary import vocabulary
 
 SUITES = 200
 
@@ -67,7 +68,8 @@ def likeness(model: EchoModel, shapes: HeldOut) -> float:
     category = torch.randint(classes, (SUITES,), generator=generator)
     style = shapes.styles[torch.randint(len(shapes.styles), (SUITES,), generator=generator)]
     number = (style * classes + category).repeat_interleave(2)
-    pair = GraphBatch.single([0, 0], [[0, SAME_STYLE, 1], [1, SAME_STYLE, 0]])
+    same_style = vocabulary().predicate_id("same_style_as")
+    pair = GraphBatch.single([0, 0], [[0, same_style, 1], [1, same_style, 0]])
     graph = replace(GraphBatch.pack([pair] * SUITES), category=category.repeat_interleave(2))
     net, pairs = model.model, pairs_of(graph, model.config.predicates)
     predict = shape_predictor(net, graph, shapes.sizes[number], pairs, net.latent(graph.category, pairs))

@@ -149,7 +149,7 @@ def _word(kind: str) -> tuple[BeforeValidator, WithJsonSchema]:
     def check(value: Any) -> str:
         if not isinstance(value, str):
             raise ValueError(f"found {shown(value)}, allowed: the name of a {kind.replace('_', ' ')}")
-        return getattr(words, kind)(value).name
+        return getattr(vocabulary(), kind)(value).name
 
     words = vocabulary()
     entries: tuple[Any, ...] = {

@@ -17,13 +17,6 @@ from echousd.graph.scene import Node, SceneGraph
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-KINDS: dict[str, tuple[str, Any, tuple[str, ...]]] = {
-    "direction": ("#3b6ea8", "solid", ("left", "right", "front", "behind")),
-    "support": ("#c46a1b", "solid", ("standing_on", "above", "in")),
-    "closeness": ("#7a7f87", "solid", ("close_by", "symmetrical_to")),
-    "comparison": ("#4f8a4a", "dashed", ("bigger_than", "smaller_than", "taller_than", "shorter_than")),
-    "likeness": ("#8a5aa8", "dotted", ("same_style_as", "same_super_category_as", "same_material_as")),
-}
 LABELLED = 80  # arrows that still carry their words; more would cover each other
 
 
@@ -38,11 +31,6 @@ class Arrow:
     both_ways: bool
 
 
-def kind_of(predicate: str) -> str:
-    """`direction`, `support`, `closeness`, `comparison` or `likeness`."""
-    return next(kind for kind, (_, _, predicates) in KINDS.items() if predicate in predicates)
-
-
 def arrows(graph: SceneGraph) -> list[Arrow]:
     """The relations gathered by pair and kind, those that repeat another the other way round left out.
 
@@ -50,7 +38,8 @@ def arrows(graph: SceneGraph) -> list[Arrow]:
     """
     gathered: dict[tuple[str, str, str], list[str]] = defaultdict(list)
     for relation in distinct(graph.relations):
-        gathered[relation.subject, relation.object, kind_of(relation.predicate)].append(relation.predicate)
+        kind = vocabulary().predicate(relation.predicate).kind
+        gathered[relation.subject, relation.object, kind].append(relation.predicate)
     symmetric = {predicate.name for predicate in vocabulary().predicates if predicate.symmetric}
     return [
         Arrow(subject, object_, kind, tuple(word.replace("_", " ") for word in words), set(words) <= symmetric)
@@ -150,18 +139,18 @@ def _curves(joined: list[Arrow], where: dict[str, np.ndarray]) -> list[Curve]:
 def _draw_curve(axes: Axes, curve: Curve, shrink: float, labelled: bool) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    colour, dash, _ = KINDS[curve.arrow.kind]
+    kind = vocabulary().predicate_kind(curve.arrow.kind)
     patch = FancyArrowPatch(
         tuple(curve.start), tuple(curve.end), connectionstyle=f"arc3,rad={curve.bend}",
         arrowstyle="-" if curve.arrow.both_ways else "-|>", mutation_scale=13 * shrink, shrinkA=0, shrinkB=0,
-        color=colour, linestyle=dash, linewidth=1.4 * shrink, zorder=2,
+        color=kind.colour, linestyle=kind.line, linewidth=1.4 * shrink, zorder=2,
     )  # fmt: skip
     axes.add_patch(patch)
     if labelled:
         box = {"boxstyle": "round,pad=0.12", "facecolor": "white", "edgecolor": "none", "alpha": 0.9}
         style: dict[str, Any] = {"ha": "center", "va": "center", "linespacing": 1.0, "zorder": 2.5, "bbox": box}
         words = "\n".join(curve.arrow.words)
-        axes.text(curve.middle[0], curve.middle[1], words, fontsize=7.5 * shrink, color=colour, **style)
+        axes.text(curve.middle[0], curve.middle[1], words, fontsize=7.5 * shrink, color=kind.colour, **style)
 
 
 def _edge(start: np.ndarray, end: np.ndarray, bend: float) -> np.ndarray:
@@ -175,12 +164,12 @@ def _edge(start: np.ndarray, end: np.ndarray, bend: float) -> np.ndarray:
 def _draw_legend(figure: Any, used: set[str], tall: float) -> None:
     from matplotlib.lines import Line2D
 
-    keys = [kind for kind in KINDS if kind in used]
-    lines = [Line2D([], [], color=KINDS[kind][0], linestyle=KINDS[kind][1], linewidth=1.6) for kind in keys]
+    keys = [kind for kind in vocabulary().predicate_kinds if kind.name in used]
+    lines = [Line2D([], [], color=kind.colour, linestyle=kind.line, linewidth=1.6) for kind in keys]
     if lines:
         figure.legend(
             lines,
-            keys,
+            [kind.name for kind in keys],
             loc="lower center",
             bbox_to_anchor=(0.5, 0.04 / tall),
             ncols=len(keys),
@@ -201,11 +190,11 @@ def to_dot(graph: SceneGraph) -> str:
         label = node.name if node.name == node.category else f"{node.name}\n{node.category}"
         lines.append(f"  {quoted(node.name)} [label={quoted(label)}, fillcolor={quoted(colour)}];")
     for arrow in arrows(graph):
-        colour, dash, _ = KINDS[arrow.kind]
+        kind = vocabulary().predicate_kind(arrow.kind)
         heads = ", dir=none" if arrow.both_ways else ""
         label = ", ".join(arrow.words)
         lines.append(
             f"  {quoted(arrow.subject)} -> {quoted(arrow.object)} "
-            f"[label={quoted(label)}, color={quoted(colour)}, style={dash}{heads}];"
+            f"[label={quoted(label)}, color={quoted(kind.colour)}, style={kind.line}{heads}];"
         )
     return "\n".join([*lines, "}"]) + "\n"

@@ -12,8 +12,6 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.graph.scene import Relation, SceneGraph
 
-# Where the subject wants to be from its object, in steps across (right) and up (front) the page.
-DIRECTIONS = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "behind": (0, -1)}
 WIDTH, HEIGHT = 1.9, 0.62  # of a box, inches
 CELL = np.array([2.75, 1.6])  # what one box and the words beside it take up, inches
 TRIES = 16  # starts of small graphs, of which the clearest picture is kept
@@ -43,8 +41,9 @@ def places(graph: SceneGraph) -> np.ndarray:
     simple = networkx.Graph(pairs)
     simple.add_nodes_from(index.values())
     ends = np.array(sorted(pairs), int).reshape(-1, 2)
-    stated = [(index[r.subject], index[r.object], DIRECTIONS.get(r.predicate)) for r in relations]
-    pulls = [(subject, object_, *way) for subject, object_, way in stated if way]
+    # Where the subject wants to be from its object, in steps across (right, +Z) and up (front, +X) the page.
+    steps = [(index[r.subject], index[r.object], *vocabulary().predicate(r.predicate).step[::-1]) for r in relations]
+    pulls = [pull for pull in steps if any(pull[2:])]
     directed = np.array([pull[:2] for pull in pulls], int).reshape(-1, 2)
     ways = np.array([pull[2:] for pull in pulls], float).reshape(-1, 2)
     best, least = np.zeros((count, 2)), np.inf

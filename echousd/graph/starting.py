@@ -56,20 +56,6 @@ HABITS = (
     Habit(("plant",), ("tv_stand", "sideboard", "bookshelf", *SOFAS), ("close_by",)),
 )
 
-TYPICAL = {
-    "bedroom": {"double_bed": 1, "nightstand": 2, "wardrobe": 1, "pendant_lamp": 1},
-    "living_room": {"multi_seat_sofa": 1, "coffee_table": 1, "tv_stand": 1, "armchair": 1, "side_table": 1, "plant": 1},
-    "dining_room": {"dining_table": 1, "dining_chair": 4, "sideboard": 1, "pendant_lamp": 1},
-    "living_dining_room": {
-        "multi_seat_sofa": 1,
-        "coffee_table": 1,
-        "tv_stand": 1,
-        "dining_table": 1,
-        "dining_chair": 4,
-        "pendant_lamp": 2,
-    },
-    "study": {"desk": 1, "office_chair": 1, "bookshelf": 1, "ceiling_lamp": 1},
-}
 MAX_COUNT = 100
 
 
@@ -86,7 +72,7 @@ def starting_graph(
     Raises `GraphError` for unknown words, counts that are none and a room that is left empty.
     """
     room = RoomSpec(room) if isinstance(room, str) else room
-    wanted = dict(TYPICAL[room.type])
+    wanted = dict(vocabulary().room_type(room.type).contents)
     for word, count in (counts or {}).items():
         if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MAX_COUNT:
             raise GraphError(f"count of {word}: found {count!r}, allowed: an integer from 0 to {MAX_COUNT}")

@@ -115,12 +115,14 @@ def axis_handicap(
 
 
 def required_order(n: int, triplets: np.ndarray) -> np.ndarray:
-    """(n, n, 2) float: sign that left, right, front and behind ask of (second - first) in x and in z."""
+    """(n, n, 2) float: sign that the relations with a direction ask of (second - first) in x and in z."""
     order = np.zeros((n, n, 2))
-    for name, column, sign in (("left", 1, 1.0), ("right", 1, -1.0), ("front", 0, -1.0), ("behind", 0, 1.0)):
-        chosen = triplets[triplets[:, 1] == vocabulary().predicate_id(name)]
-        order[chosen[:, 0], chosen[:, 2], column] = sign
-        order[chosen[:, 2], chosen[:, 0], column] = -sign
+    for predicate in vocabulary().predicates:
+        chosen = triplets[triplets[:, 1] == predicate.id]
+        for column, sign in enumerate(predicate.step):
+            if sign:
+                order[chosen[:, 0], chosen[:, 2], column] = -sign
+                order[chosen[:, 2], chosen[:, 0], column] = sign
     return order
 
 
@@ -134,7 +136,8 @@ def carriers(
     n = len(categories)
     rows = [vocabulary().category(word) for word in categories]
     out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(row.support, FREE) for row in rows], int)
-    told = triplets[triplets[:, 1] == vocabulary().predicate_id("standing_on")]
+    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
+    told = triplets[np.isin(triplets[:, 1], resting)]
     for subject, _, target in told:
         if subject != target and not _reaches(out, int(target), int(subject)):
             out[subject] = target

@@ -1,13 +1,17 @@
-"""The margins of the relations of a graph with their gradients in closed form, one pass per family of predicates.
+"""The margins of the relations of a graph with their gradients: one pass per family of predicates.
 
-These are the margins of `echomodel.rules` (a test compares both, values and gradients); written out for numpy because
-the automatic gradients of many small tensors took most of the time of a repair.
+The margins are those of `echomodel.rules`. Those of SG-FRONT's predicates are written out here with their gradients in
+closed form (a test compares both, values and gradients), because the automatic gradients of many small tensors take
+twelve times as long; any other predicate's gradient is torch's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
+from echomodel.vocabulary import Predicate, vocabulary
 from echousd.repair.footprints import (
     FIRST,
     SECOND,
@@ -20,7 +24,7 @@ from echousd.repair.footprints import (
     pairs_of,
     penetration,
 )
-from echousd.repair.geometry import spread
+from echousd.repair.geometry import COLUMNS, spread
 
 
 def relation_margins(
@@ -36,24 +40,20 @@ def relation_margins(
     """
     from echomodel.rules import sets
 
-    chosen = sets.rule_set(rules)
-    strict = chosen is sets.STRICT
-    families = {
-        (sets.LEFT, sets.RIGHT, sets.FRONT, sets.BEHIND): _beside,
-        (sets.CLOSE,): _close,
-        (sets.ABOVE,): _above,
-        (sets.ON,): _standing_on,
-        (sets.BIGGER, sets.SMALLER): _volumes,
-        (sets.TALLER, sets.SHORTER): _tops,
-        (sets.SYMMETRICAL,): _symmetrical,
-    }
+    told = sets.rule_set(rules)
+    measured, strict = told.margins, told is sets.STRICT
     ends, predicate = triplets[:, [0, 2]], triplets[:, 1]
-    every = pairs_of(size, position - (centre[0], 0.0, centre[1]), yaw, ends, oriented=chosen.oriented)
+    every = pairs_of(size, position - (centre[0], 0.0, centre[1]), yaw, ends, oriented=told.oriented)
     value, gradient = np.zeros(len(triplets)), every.zeros()
-    for family, margin in families.items():
-        rows = np.flatnonzero(np.isin(predicate, [word for word in family if word in chosen.margins]))
-        if len(rows):
-            value[rows], gradient[rows] = margin(every.take(rows), predicate[rows], strict)
+    known = [number for number in np.unique(predicate).tolist() if number in measured]
+    rows = {number: vocabulary().predicates[number] for number in known}
+    for margin in {CLOSED[row.name]: None for row in rows.values() if row.name in CLOSED}:
+        family = [number for number, row in rows.items() if CLOSED.get(row.name) is margin]
+        chosen = np.flatnonzero(np.isin(predicate, family))
+        value[chosen], gradient[chosen] = margin(every.take(chosen), [rows[i] for i in predicate[chosen]], strict)
+    chosen = np.flatnonzero(np.isin(predicate, [number for number, row in rows.items() if row.name not in CLOSED]))
+    if len(chosen):
+        value[chosen], gradient[chosen] = _automatic(size, position, yaw, triplets[chosen], rules, centre)
     return value, spread(gradient, ends, len(size))
 
 
@@ -62,13 +62,32 @@ def _smaller(one: Values, two: Values) -> Values:
     return np.where(first, one[0], two[0]), np.where(first[:, None, None], one[1], two[1])
 
 
-def _beside(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
+def _automatic(
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, rules: str, centre: np.ndarray
+) -> Values:
+    """Margins (e,) by `echomodel.rules` and torch's gradients (e, 2, 6) by the two boxes of each relation."""
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.rules import margins
+
+    ends, row = triplets[:, [0, 2]].ravel(), torch.arange(len(triplets))
+    boxes = Boxes(*(torch.from_numpy(np.asarray(values[ends], float)) for values in (size, position, yaw)))
+    free = boxes.size.requires_grad_(), boxes.position.requires_grad_()
+    apart = torch.stack([2 * row, torch.from_numpy(triplets[:, 1].astype(np.int64)), 2 * row + 1], 1)
+    margin = margins(boxes, apart, rules=rules, center=torch.from_numpy(np.asarray(centre, float)))
+    by_size, by_position = torch.autograd.grad(margin.sum(), free, allow_unused=True, materialize_grads=True)
+    gradient = torch.cat([by_position, by_size * boxes.size.detach()], 1)
+    return margin.detach().numpy(), gradient.reshape(-1, 2, COLUMNS).numpy()
+
+
+def _beside(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
     """On the side that is asked for and not running into the object."""
-    from echomodel.rules.sets import APART, BEHIND, FRONT, LEFT, OVERLAP
+    from echomodel.rules.sets import APART, OVERLAP
 
     r = np.arange(len(pair))
-    by_x = np.isin(predicate, (FRONT, BEHIND))
-    sign = np.where(np.isin(predicate, (LEFT, BEHIND)), -1.0, 1.0)
+    step = np.array([relation.step for relation in relations])
+    by_x, sign = step[:, 0] != 0, step.sum(1)
     gradient = pair.zeros()
     gradient[r, FIRST, np.where(by_x, 0, 2)] = sign
     gradient[r, SECOND, np.where(by_x, 0, 2)] = -sign
@@ -77,28 +96,28 @@ def _beside(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
     return _smaller((along - np.where(by_x & (not strict), -APART, APART), gradient), (OVERLAP - ratio, -by_box))
 
 
-def _close(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
+def _close(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
     from echomodel.rules.sets import NEAR
 
     distance, gradient = corner_distance(pair)
     return NEAR - distance, -gradient
 
 
-def _symmetrical(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
+def _symmetrical(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
     from echomodel.rules.sets import NEAR
 
     distance, gradient = mirror_distance(pair, point=not strict)
     return NEAR - distance, -gradient
 
 
-def _above(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
+def _above(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
     from echomodel.rules.sets import TOUCH
 
     value, gradient = _rise(pair, to_top=True)
     return _smaller((value - TOUCH, gradient), penetration(pair))
 
 
-def _standing_on(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
+def _standing_on(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
     from echomodel.rules.sets import TOUCH
 
     value, gradient = _rise(pair, to_top=strict)
@@ -115,28 +134,41 @@ def _rise(pair: Pairs, *, to_top: bool) -> Values:
     return pair.position[:, FIRST, 1] - (pair.top() if to_top else pair.position[..., 1])[:, SECOND], gradient
 
 
-def _volumes(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
-    from echomodel.rules.sets import BIGGER, VOLUME
+def _volumes(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
+    from echomodel.rules.sets import VOLUME
 
     volume, gradient = pair.size.prod(-1), pair.zeros()
     gradient[:, :, 3:] = volume[..., None]
-    return _larger(volume, gradient, predicate == BIGGER, VOLUME, strict)
+    return _larger(volume, gradient, relations, VOLUME, strict)
 
 
-def _tops(pair: Pairs, predicate: np.ndarray, strict: bool) -> Values:
-    from echomodel.rules.sets import HEIGHT, TALLER
+def _tops(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
+    from echomodel.rules.sets import HEIGHT
 
     gradient = pair.zeros()
     gradient[..., 1], gradient[..., 4] = 1.0, pair.size[..., 1]
-    return _larger(pair.top(), gradient, predicate == TALLER, HEIGHT, strict)
+    return _larger(pair.top(), gradient, relations, HEIGHT, strict)
 
 
-def _larger(quantity: np.ndarray, gradient: np.ndarray, more: np.ndarray, needed: float, strict: bool) -> Values:
+def _larger(
+    quantity: np.ndarray, gradient: np.ndarray, relations: Sequence[Predicate], needed: float, strict: bool
+) -> Values:
     """How much more (or less) the subject has of a quantity than the object: (s - o) / larger, as published / s."""
     s, o = quantity.T
     by = np.where(s >= o, FIRST, SECOND) if strict else np.full(len(s), FIRST)
     base = quantity[np.arange(len(s)), by]
     base = np.maximum(base, 1e-6) if strict else np.where(np.abs(base) < 1e-12, 1e-12, base)
-    ratio, sign = (s - o) / base, np.where(more, 1.0, -1.0)
+    ratio, sign = (s - o) / base, np.array([float(relation.rank) for relation in relations])
     weight = np.stack((1.0 - ratio * (by == FIRST), -1.0 - ratio * (by == SECOND)), 1)
     return sign * ratio - needed, (sign / base)[:, None, None] * (weight[..., None] * gradient)
+
+
+CLOSED: dict[str, Callable[[Pairs, Sequence[Predicate], bool], Values]] = {
+    **dict.fromkeys(("left", "right", "front", "behind"), _beside),
+    "close_by": _close,
+    "above": _above,
+    "standing_on": _standing_on,
+    **dict.fromkeys(("bigger_than", "smaller_than"), _volumes),
+    **dict.fromkeys(("taller_than", "shorter_than"), _tops),
+    "symmetrical_to": _symmetrical,
+}

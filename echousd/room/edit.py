@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.models import load_model
@@ -79,7 +80,7 @@ def edit(
         found = sample_boxes(model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer)
         found, told = finished_boxes(pinned, found, styles, repair, timer)
         layouts.append(found)
-        notes = told if number == 0 else notes
+        notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
     assets = {name: saved.assets[name] for name in geometry}
     if fresh:
@@ -116,7 +117,7 @@ def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
     fresh |= {new.name for old, new in diff.changed if (old.category, old.size) != (new.category, new.size)}
     moving = {relation.subject for relation in diff.related}
     moving |= {new.name for old, new in diff.changed if (old.position, old.yaw) != (new.position, new.yaw)}
-    on = [(r.subject, r.object) for r in after.relations if r.predicate in ("standing_on", "above")]
+    on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
     for _ in on:  # what stands on something goes with it, and what stands on that
         moving |= {subject for subject, carrier in on if carrier in moving | fresh}
     return fresh, {name for name in moving - fresh if not after.node(name).locked}

@@ -14,6 +14,7 @@ from echousd.room.room import Provenance, Room, RoomOptions, check_seed
 from echousd.room.sources import DEFAULT, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
+from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import relation_verdicts
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def generate(
     styles = style_groups(graph)
     sampled = sample_boxes(echo, graph, seed=seed, number=0, steps=steps, timer=timer)
     boxes, notes = finished_boxes(graph, sampled, styles, repair, timer)
+    notes = (*echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
         found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, timer=timer)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.vocabulary import vocabulary
+
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
 
@@ -17,7 +19,7 @@ ROOM_STYLE = "room"
 
 
 def style_groups(graph: SceneGraph) -> dict[str, str]:
-    """Object name -> name of its style; objects joined by `same_style_as` or by one `style` are one group.
+    """Object name -> name of its style; objects that share a `style`, or that a relation unites, are one group.
 
     A group without a name is called `set_<its first object>`. Objects of no group have the style `room`, so that a room
     looks of one piece.
@@ -35,7 +37,7 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
         if node.style:
             parent[root(node.name)] = root(by_style.setdefault(node.style, node.name))
     for relation in graph.relations:
-        if relation.predicate == "same_style_as":
+        if "style" in vocabulary().predicate(relation.predicate).unites:
             parent[root(relation.subject)] = root(relation.object)
     members: dict[str, list[str]] = {}
     for node in graph.nodes:

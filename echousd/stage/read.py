@@ -215,7 +215,6 @@ _FIELDS = {
     usd.YAW: "yaw",
     usd.LOCKED: "locked",
 }
-_PREDICATES = frozenset(predicate.name for predicate in vocabulary().predicates)
 
 
 def value(prim: Usd.Prim, name: str) -> Any:
@@ -238,7 +237,7 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
         return None
     predicate, confidence = value(prim, usd.PREDICATE), value(prim, usd.CONFIDENCE)
     # Words and numbers that leave nothing to check, as the nodes are valid.
-    if isinstance(predicate, str) and predicate in _PREDICATES and confidence in (None, 1.0):
+    if isinstance(predicate, str) and predicate in vocabulary().predicate_names and confidence in (None, 1.0):
         return Relation.model_construct(subject=subject, predicate=predicate, object=object_, confidence=1.0)
     if predicate is None:
         raise StageError(f"{place(prim)}: {usd.PREDICATE} has no value, allowed: one predicate")

@@ -143,7 +143,7 @@ class CompactConfig:
     """The compact echo model: sizes of its parts and of its vocabulary.
 
     Arguments:
-        categories, predicates, room_types: sizes of the vocabulary.
+        categories, predicates, room_types: how many of the vocabulary's words, from the first on, the networks know.
         rules: names of the rule sets that relations may be meant in.
     """
 

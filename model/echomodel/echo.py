@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
+from echomodel.compact.learned import in_learned_words, unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
@@ -21,8 +22,8 @@ from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener
 from echomodel.released.packed import PackedLinear
 from echomodel.samplers import Predict, guided, sample
+from echomodel.vocabulary import vocabulary
 
-SAME_STYLE, SAME_MATERIAL = 13, 15
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 
 
@@ -127,7 +128,7 @@ class EchoModel:
         config = self.config
         graph = self._checked(graph)
         known, known_mask = self._known(graph, known, known_mask)
-        scale = self.model.statistics.scale(graph.category)
+        scale = self.model.statistics.scale(in_learned_words(graph, config).category)
         given = None if known is None else known.encode(scale)
         conditional = self._layout_predictor(graph, self.graph_latent(graph, edit), rules)
         if guidance != 1.0:
@@ -154,14 +155,20 @@ class EchoModel:
     @torch.no_grad()
     def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
         """Latent nodes (N, latent width) that both branches read; `edit` routes them through the manipulator's edit."""
-        pairs = pairs_of(graph, self.config.predicates)
+        now = in_learned_words(graph, self.config)
+        pairs = pairs_of(now, self.config.predicates)
         if edit is None:
-            return self.model.latent(graph.category, pairs)
-        old = pairs_of(graph.with_triplets(edit.before.to(self.device)), self.config.predicates)
+            return self.model.latent(now.category, pairs)
+        before = in_learned_words(graph.with_triplets(edit.before.to(self.device)), self.config)
+        old = pairs_of(before, self.config.predicates)
         added = edit.added.to(self.device)
         return self.model.latent(
-            graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
+            now.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
         )
+
+    def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
+        """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
+        return unlearned(graph, self.config)
 
     @torch.no_grad()
     def sample_shapes(
@@ -278,7 +285,7 @@ class EchoModel:
         graph = with_whole_styles(graph, joined(graph, styles))
         bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
-            self.model, graph, boxes.size, self.graph_latent(graph, edit), equal,
+            self.model, in_learned_words(graph, self.config), boxes.size, self.graph_latent(graph, edit), equal,
             settings.temperature * start[equal] if noise is None else start,
             generator=generator, steps=steps, sampler=sampler, known=known, known_mask=known_mask,
             guidance=guidance, bare_latent=None if guidance == 1.0 else self.graph_latent(bare), progress=progress,
@@ -288,6 +295,7 @@ class EchoModel:
         config = self.config
         if rules not in config.rules:
             raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
+        graph = in_learned_words(graph, config)
         chosen = torch.full_like(graph.room_type, config.rules.index(rules))
         return layout_predictor(self.model, graph, pairs_of(graph, config.predicates), latent, chosen)
 
@@ -297,7 +305,7 @@ class EchoModel:
         """The denoiser of `count` draws behind one another, each of all objects of the graph."""
 
         def of(one: GraphBatch, latent: Tensor) -> Predict:
-            many = GraphBatch.pack([one] * count)
+            many = GraphBatch.pack([in_learned_words(one, self.config)] * count)
             pairs = pairs_of(many, self.config.predicates)
             return shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
 
@@ -320,8 +328,7 @@ class EchoModel:
             return torch.cat([decode(latents(part)).float() for part in codes.split(4)])
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
-        config = self.config
-        graph.check(categories=config.categories, predicates=config.predicates, room_types=config.room_types)
+        graph.check()
         return graph.to(self.device)
 
     def _known(
@@ -365,7 +372,7 @@ class EchoModel:
 def equal_furniture(graph: GraphBatch) -> Tensor:
     """(N,) int64: for every node the first node of its class that relations of style or material join it to."""
     triplets = graph.triplets
-    joins = torch.isin(triplets[:, 1], triplets.new_tensor([SAME_STYLE, SAME_MATERIAL]))
+    joins = torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("shape")))
     joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
     return _first_joined(graph.num_nodes, triplets[joins][:, [0, 2]])
 
@@ -373,7 +380,7 @@ def equal_furniture(graph: GraphBatch) -> Tensor:
 def joined(graph: GraphBatch, styles: Tensor | None = None) -> Tensor:
     """(N,) int64: for every node the first node of its style, by relations of style and by `styles` (N,), -1 = none."""
     triplets = graph.triplets
-    ends = triplets[triplets[:, 1] == SAME_STYLE][:, [0, 2]]
+    ends = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("style")))][:, [0, 2]]
     if styles is not None:
         styles = styles.to(triplets.device)
         same = (styles[:, None] == styles) & (graph.scene[:, None] == graph.scene) & (styles >= 0)

@@ -172,16 +172,16 @@ class GraphBatch:
         """The same nodes with other relations; `triplets` (E, 3) int64."""
         return replace(self, triplets=triplets)
 
-    def check(self, *, categories: int | None = None, predicates: int = 16, room_types: int | None = None) -> None:
-        """Check the values against a vocabulary's sizes (None = the shipped one).
+    def check(self) -> None:
+        """Check the values against the vocabulary.
 
         Raises:
             ValueError: no node, an unknown class, predicate or room type id, an end that is no node, a relation of
                 an object to itself or across scenes, scenes out of order, or a floor that is none; the message names
                 the entry at fault.
         """
-        categories = len(vocabulary().categories) if categories is None else categories
-        room_types = len(vocabulary().room_types) if room_types is None else room_types
+        words = vocabulary()
+        categories, predicates, room_types = len(words.categories), len(words.predicates), len(words.room_types)
         if not self.num_nodes:
             raise ValueError("graph has no nodes, at least one is needed")
         _within("category of node", self.category, categories)

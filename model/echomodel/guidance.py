@@ -8,11 +8,10 @@ from torch import Tensor
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.floors import footprint, signed_distance
 from echomodel.rules import margins, measured
-from echomodel.rules.sets import CLOSE, SYMMETRICAL
 from echomodel.samplers import Predict
+from echomodel.vocabulary import vocabulary
 
 SLACK = 0.03  # metres or ratio that the guidance asks for beyond what the rule does
-EMPHASIS = {CLOSE: 3.0, SYMMETRICAL: 8.0}  # they must hit a small spot against many relations of other kinds
 
 
 def relation_guided(
@@ -44,9 +43,8 @@ def relation_guided(
     wanted = triplets[torch.isin(triplets[:, 1], known)]
     if not len(wanted) and floor is None:
         return predict
-    emphasis = torch.ones(len(wanted), device=wanted.device)
-    for predicate, factor in EMPHASIS.items():
-        emphasis[wanted[:, 1] == predicate] = factor
+    weights = [entry.emphasis for entry in vocabulary().predicates]
+    emphasis = torch.tensor(weights, device=wanted.device)[wanted[:, 1]]
 
     def guided(x: Tensor, level: Tensor) -> Tensor:
         clean = predict(x, level)

@@ -46,6 +46,10 @@ class RoomModel(Protocol):
         """Whether `sample_shapes` works."""
         ...
 
+    def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
+        """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
+        ...
+
     def sample_layout(
         self,
         graph: GraphBatch,

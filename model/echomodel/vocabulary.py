@@ -5,13 +5,16 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from importlib import resources
-from typing import Any
+from typing import Any, Literal
 
 SUPPORTS = ("floor", "table", "wall", "ceiling")
+MEASURES = ("place", "size", None)
+UNITES = ("style", "shape")
 ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
 # at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top
 STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near")
@@ -63,30 +66,73 @@ class Category:
 
 @dataclass(frozen=True)
 class Predicate:
-    """A relation with its SG-FRONT id and spelling and its logic.
+    """Everything that the product knows of a relation, but for the code of its rule (`echomodel.rules`).
 
-    `inverse` is None where no predicate says the same of the swapped pair. `order` names the order that the predicate
-    belongs to (left and right share one) and `rank` is 1 where the subject comes after the object, -1 where before.
-    `swapped` are words that mean this predicate with subject and object exchanged; they are named in errors only.
+    Arguments:
+        id: its position; SG-FRONT's own id where SG-FRONT has it.
+        sgfront: SG-FRONT's spelling, None where SG-FRONT lacks it.
+        inverse: what says the same of the swapped pair, None where nothing does.
+        order, rank: the order that it belongs to (left and right share one), and 1 where the subject comes after the
+            object, -1 where before.
+        kind: its `PredicateKind`.
+        measures: what its rule asks of boxes, `place` or `size`; None where it is not measured.
+        step: signs (x, z) of the way from the object to the subject, (0, 0) where it names no direction.
+        mirror_x, mirror_z: what it becomes where the room is mirrored along an axis, None = itself.
+        emphasis, loss_weight: weight of its margin in guidance and in the training loss; what is rare and must hit a
+            small spot needs more than one.
+        rests: the subject stands on the object: repair puts it onto the object's top.
+        follows: the subject goes along where the object is moved.
+        unites: what the two objects have in common, of `style` and `shape`.
+        aliases: other words for it.
+        swapped: words that mean it with subject and object exchanged; they are named in errors only.
     """
 
     name: str
     id: int
-    sgfront: str
-    inverse: str | None
-    symmetric: bool
-    transitive: bool
-    order: str | None
-    rank: int
+    kind: str
+    sgfront: str | None = None
+    inverse: str | None = None
+    symmetric: bool = False
+    transitive: bool = False
+    order: str | None = None
+    rank: int = 0
+    measures: str | None = None
+    step: tuple[int, int] = (0, 0)
+    mirror_x: str | None = None
+    mirror_z: str | None = None
+    emphasis: float = 1.0
+    loss_weight: float = 1.0
+    rests: bool = False
+    follows: bool = False
+    unites: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
     swapped: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class RoomType:
-    """A kind of room and what people call it."""
+class PredicateKind:
+    """Predicates that are drawn alike: the colour `#rrggbb` and the line (`solid`, `dashed`, `dotted`) of arrows."""
 
     name: str
+    colour: str
+    line: Literal["solid", "dashed", "dotted"]
+
+
+@dataclass(frozen=True)
+class RoomType:
+    """A kind of room.
+
+    Arguments:
+        contents: (category, count) of what such a room usually holds.
+        scans: what SG-FRONT's scans of such rooms are called before the dash; the first is written.
+        like: the room type that weights take it for which do not know it, "" = there is none.
+        aliases: what people call it.
+    """
+
+    name: str
+    contents: tuple[tuple[str, int], ...]
+    scans: tuple[str, ...] = ()
+    like: str = ""
     aliases: tuple[str, ...] = ()
 
 
@@ -96,11 +142,16 @@ class UnknownWord(ValueError):
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """All words in a fixed order: the position of a category is its class id in the compact model."""
+    """All words in a fixed order; the position of a category, predicate or room type is its id in `GraphBatch`.
+
+    Raises:
+        ValueError: a row names something that does not exist, or ids that are no positions.
+    """
 
     categories: tuple[Category, ...]
     structure: tuple[str, ...]
     coarse_categories: tuple[str, ...]
+    predicate_kinds: tuple[PredicateKind, ...]
     predicates: tuple[Predicate, ...]
     room_types: tuple[RoomType, ...]
     unsupported: tuple[str, ...]
@@ -116,8 +167,7 @@ class Vocabulary:
             index = {word: i for i, entry in enumerate(entries) for word in entry.aliases}
             index.update({entry.name: i for i, entry in enumerate(entries)})
             self._index[kind] = index
-        for row in self.categories:
-            self._check(row)
+        self._check()
 
     def category(self, word: str) -> Category:
         """The category called `word` (name or alias, any case, spaces or hyphens); raises `UnknownWord`."""
@@ -131,31 +181,58 @@ class Vocabulary:
         """The room type called `word` (name or alias); raises `UnknownWord`."""
         return self.room_types[self._find("room type", word)]
 
+    @cached_property
+    def sgfront_predicates(self) -> dict[int, str]:
+        """Id and spelling of SG-FRONT's predicates, `in` (0) among them."""
+        return {entry.id: entry.sgfront for entry in self.predicates if entry.sgfront is not None}
+
+    def uniting(self, what: str) -> tuple[int, ...]:
+        """Ids of the predicates whose objects have `what` (one of `UNITES`) in common."""
+        return tuple(entry.id for entry in self.predicates if what in entry.unites)
+
+    @cached_property
+    def predicate_names(self) -> frozenset[str]:
+        """The names of all predicates, without aliases."""
+        return frozenset(entry.name for entry in self.predicates)
+
+    def predicate_kind(self, name: str) -> PredicateKind:
+        """The kind of predicates called `name`; raises StopIteration for none."""
+        return next(kind for kind in self.predicate_kinds if kind.name == name)
+
     def category_id(self, word: str) -> int:
         """Position of a category: its class id in the compact model."""
         return self._find("category", word)
 
     def predicate_id(self, word: str) -> int:
-        """SG-FRONT id of a predicate, 0 (`in`) to 15."""
+        """Position of a predicate, which is SG-FRONT's id where SG-FRONT has it."""
         return self.predicates[self._find("predicate", word)].id
 
     def room_type_id(self, word: str) -> int:
         """Position of a room type."""
         return self._find("room type", word)
 
-    def _check(self, row: Category) -> None:
-        """Raise ValueError where a row names something that does not exist."""
-        names = {entry.name for entry in self.categories}
-        for what, words, allowed in (
-            ("coarse", (row.coarse,), set(self.coarse_categories)),
-            ("support", (row.support,), set(SUPPORTS)),
-            ("role", (row.role,), set(ROLES)),
-            ("belongs_to", row.belongs_to, names),
-            ("admits", tuple(word for word, _ in row.admits), names | set(ROLES)),
-        ):
-            for word in words:
-                if word not in allowed:
-                    raise ValueError(f"category {row.name}: {what} is {word!r}, allowed: {', '.join(sorted(allowed))}")
+    def _check(self) -> None:
+        categories, predicates = ({entry.name for entry in rows} for rows in (self.categories, self.predicates))
+        for row in self.categories:
+            _known(f"category {row.name}", "coarse", (row.coarse,), self.coarse_categories)
+            _known(f"category {row.name}", "support", (row.support,), SUPPORTS)
+            _known(f"category {row.name}", "role", (row.role,), ROLES)
+            _known(f"category {row.name}", "belongs_to", row.belongs_to, categories)
+            _known(f"category {row.name}", "stands", (row.stands,), STANCES)
+            _known(f"category {row.name}", "admits", (word for word, _ in row.admits), categories | set(ROLES))
+        kinds = {kind.name for kind in self.predicate_kinds}
+        for position, relation in enumerate(self.predicates):
+            where = f"predicate {relation.name}"
+            if relation.id != position:
+                raise ValueError(f"{where}: id is {relation.id}, expected its position {position}")
+            _known(where, "kind", (relation.kind,), kinds)
+            _known(where, "measures", (relation.measures,), MEASURES)
+            for what in ("inverse", "mirror_x", "mirror_z"):
+                _known(where, what, (getattr(relation, what),), predicates | {None})
+            _known(where, "unites", relation.unites, UNITES)
+        for room in self.room_types:
+            _known(f"room type {room.name}", "contents", (word for word, _ in room.contents), categories)
+            _known(f"room type {room.name}", "like", (room.like,), {"", *(other.name for other in self.room_types)})
 
     def _find(self, kind: str, word: str) -> int:
         index = self._index[kind]
@@ -188,6 +265,12 @@ class Vocabulary:
         return self._names(kind)[position]
 
 
+def _known(where: str, what: str, words: Iterable[str | None], allowed: Collection[str | None]) -> None:
+    for word in words:
+        if word not in allowed:
+            raise ValueError(f"{where}: {what} is {word!r}, allowed: {', '.join(sorted(map(str, allowed)))}")
+
+
 def _alike(one: str, other: str) -> float:
     return difflib.SequenceMatcher(None, one, other).ratio()
 
@@ -197,9 +280,26 @@ def normalised(word: str) -> str:
     return re.sub(r"[\s\-]+", "_", word.strip().lower())
 
 
-@cache
 def vocabulary() -> Vocabulary:
-    """The vocabulary that ships with the package."""
+    """The vocabulary that is spoken: the one that ships with the package, but within `speaking`."""
+    return _spoken[-1] if _spoken else _shipped()
+
+
+@contextmanager
+def speaking(words: Vocabulary) -> Iterator[Vocabulary]:
+    """Within the block, `vocabulary()` is `words`: how a new row is tried out."""
+    _spoken.append(words)
+    try:
+        yield words
+    finally:
+        _spoken.pop()
+
+
+_spoken: list[Vocabulary] = []
+
+
+@cache
+def _shipped() -> Vocabulary:
     raw = json.loads(resources.files("echomodel").joinpath("vocabulary.json").read_text("utf-8"))
 
     def fixed(value: Any) -> Any:
@@ -212,6 +312,7 @@ def vocabulary() -> Vocabulary:
         categories=tuple(Category(**frozen(entry)) for entry in raw["categories"]),
         structure=tuple(raw["structure"]),
         coarse_categories=tuple(raw["coarse_categories"]),
+        predicate_kinds=tuple(PredicateKind(**entry) for entry in raw["predicate_kinds"]),
         predicates=tuple(Predicate(**frozen(entry)) for entry in raw["predicates"]),
         room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
         unsupported=tuple(raw["unsupported"]),

@@ -136,3 +136,18 @@ def test_untidy_models_keep_equal_sizes():
         assert np.array_equal(other.yaw, room.yaw)
     assert np.std([other.size[0, 0] for other in found]) > 0.01
     assert any(np.abs(other.position - room.position).max() > 1.0 for other in found)
+
+
+def test_a_set_of_16_relations_is_still_read(tmp_path, monkeypatch):
+    new = build_rooms(tmp_path / "new", 3, seed=5, styles=4)
+    monkeypatch.setattr(roomset, "PAIR", np.dtype(("<u2", len(roomset.RULES))))
+    monkeypatch.setattr(roomset, "TABLES", (*roomset.TABLES[:-1], ("pairs", roomset.PAIR)))
+    monkeypatch.setattr(roomset, "MAGIC", roomset.MAGIC_OF_16)
+    build_rooms(tmp_path / "old", 3, seed=5, styles=4)
+    monkeypatch.undo()
+    old = roomset.RoomSet(tmp_path / "old")
+    sizes = [next((tmp_path / name).glob("*.bin")).stat().st_size for name in ("old", "new")]
+    assert sizes[0] < sizes[1]
+    for number in range(3):
+        for rules in roomset.RULES:
+            assert np.array_equal(old.relations(number, rules=rules), new.relations(number, rules=rules))

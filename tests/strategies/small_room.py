@@ -56,6 +56,9 @@ class StandIn:
         self.shift = shift
         self.edits: list = []
 
+    def unlearned(self, graph):
+        return ()
+
     def sample_layout(self, graph, *, generator, steps=None, known=None, known_mask=None, edit=None, progress=None):
         self.edits.append(edit)
         used: dict[str, int] = {}

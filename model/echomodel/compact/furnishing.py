@@ -10,8 +10,8 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing
 from echomodel.config import Sampler
 from echomodel.graph import GraphBatch
-from echomodel.rules.labels import SAME_STYLE
 from echomodel.samplers import Predict, Progress, guided, sample
+from echomodel.vocabulary import vocabulary
 
 
 def furniture_predictor(model: CompactModel, graph: GraphBatch, size: Tensor, latent: Tensor) -> Predict:
@@ -32,7 +32,7 @@ def with_whole_styles(graph: GraphBatch, groups: Tensor) -> GraphBatch:
     """
     alike = (groups[:, None] == groups) & (graph.scene[:, None] == graph.scene)
     subject, target = (alike & ~torch.eye(len(groups), dtype=torch.bool, device=groups.device)).nonzero(as_tuple=True)
-    told = torch.stack([subject, torch.full_like(subject, SAME_STYLE), target], dim=1)
+    told = torch.stack([subject, torch.full_like(subject, vocabulary().predicate_id("same_style_as")), target], dim=1)
     return graph.with_triplets(torch.cat([graph.triplets, told]).unique(dim=0))
 
 

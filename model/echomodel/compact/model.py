@@ -86,7 +86,7 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half:
         "format": FORMAT,
         "config": to_json(model.config),
         "statistics": json.dumps(model.statistics.to_json()),
-        "vocabulary": json.dumps(_words()),
+        "vocabulary": json.dumps(_words(model.config)),
         "parts": json.dumps(list(parts)),
     }
     partial = path.with_suffix(".partial")
@@ -127,10 +127,8 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
 
 def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
     """Each part's settings from the file that holds the part; what all parts share must be equal."""
-    words, joined, first = json.dumps(_words()), None, None
+    joined, first = None, None
     for path, header in metadata.items():
-        if header.get("vocabulary") != words:
-            raise WeightsError(f"{path}: was trained with another vocabulary than this version's")
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
         if "layout" in parts and "drafts" not in raw["layout"]:
             raise WeightsError(f"{path}: is of an earlier version, whose layout branch did not draft; train it again")
@@ -140,6 +138,8 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
                 "from it with the recipe's field 'warm'"
             )
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
+        if json.loads(header.get("vocabulary", "{}")) != _words(own):
+            raise WeightsError(f"{path}: was trained with other words than the first of this version's vocabulary")
         for other in (set(PARTS) - set(parts)) & set(raw):
             # settings of a part that lies in another file; an older version's may hold fields that are gone
             with suppress(ValueError):
@@ -169,10 +169,11 @@ def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:
     model.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
 
 
-def _words() -> dict[str, list[str]]:
+def _words(config: CompactConfig) -> dict[str, list[str]]:
+    """The first words of the vocabulary, as many as the networks know; new rows stand behind them."""
     words = vocabulary()
     return {
-        "categories": [entry.name for entry in words.categories],
-        "predicates": [entry.name for entry in words.predicates],
-        "room_types": [entry.name for entry in words.room_types],
+        "categories": [entry.name for entry in words.categories[: config.categories]],
+        "predicates": [entry.name for entry in words.predicates[: config.predicates]],
+        "room_types": [entry.name for entry in words.room_types[: config.room_types]],
     }

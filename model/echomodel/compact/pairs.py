@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import torch
 from torch import Tensor
 
+from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.vocabulary import vocabulary
 
@@ -50,8 +50,11 @@ def ordered_pairs(counts: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     return receiver[different], sender[different], scale
 
 
-def pairs_of(graph: GraphBatch, predicates: int = 16) -> Pairs:
-    """The pairs of a graph; parallel triplets merge, repeated ones count once, inverses are filled in."""
+def pairs_of(graph: GraphBatch, predicates: int = CompactConfig.predicates) -> Pairs:
+    """The pairs of a graph, told its predicates below R = `predicates`, as the weights know them.
+
+    Parallel triplets merge, repeated ones count once, inverses are filled in.
+    """
     counts = graph.node_counts
     receiver, sender, scale = ordered_pairs(counts)
     index = pair_index(graph, counts)
@@ -85,11 +88,11 @@ def _pair_number(receiver: Tensor, sender: Tensor, scene: Tensor, counts: Tensor
     return before[of] + row * (counts[of] - 1) + column - (column > row).long()
 
 
-@cache
-def inverse_predicates(predicates: int = 16) -> Tensor:
-    """(R,) int64, the predicate that holds from object to subject, -1 where none follows."""
+def inverse_predicates(predicates: int = CompactConfig.predicates) -> Tensor:
+    """(R,) int64, the predicate below R that holds from object to subject, -1 where none follows."""
     out = torch.full((predicates,), -1)
-    for predicate in vocabulary().predicates:
+    for predicate in vocabulary().predicates[:predicates]:
         if predicate.inverse is not None:
-            out[predicate.id] = vocabulary().predicate_id(predicate.inverse)
+            inverse = vocabulary().predicate_id(predicate.inverse)
+            out[predicate.id] = inverse if inverse < predicates else -1
     return out

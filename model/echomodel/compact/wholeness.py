@@ -8,7 +8,7 @@ from scipy import ndimage
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.rules.sets import ON
+from echomodel.vocabulary import vocabulary
 
 FILLED = 60  # voxels that a shape spans on every axis of its box-normalised grid
 TOP = 58  # voxel from which on a column counts as reaching the top of the box
@@ -54,7 +54,8 @@ def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
     """
     out = torch.ones(len(grids), device=grids.device)
     high = (grids[:, :, TOP:] < 0).any(2)  # (N, x, z): columns that reach the top
-    for above, _, below in triplets[triplets[:, 1] == ON].tolist():
+    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
+    for above, _, below in triplets[torch.isin(triplets[:, 1], triplets.new_tensor(resting))].tolist():
         gap = boxes.position[above, 1] - boxes.position[below, 1] - boxes.size[below, 1]
         if above == below or abs(float(gap)) > PLAY:
             continue

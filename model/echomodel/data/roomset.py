@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.graph import GraphBatch
 
-MAGIC = b"ECHOROM2"
+MAGIC = b"ECHOROM3"
+MAGIC_OF_16 = b"ECHOROM2"  # earlier sets: 16 bits per pair and rule set
 RULES = ("strict", "sgfront")
 ROOM = np.dtype(
     [("objects", "<u4"), ("corners", "<u4"), ("openings", "<u4"), ("pairs", "<u4"), ("type", "u1"), ("held_out", "u1"),
@@ -40,7 +41,8 @@ OPENING = np.dtype(
     [("kind", "u1"), ("hinge", "u1"), ("swing", "u1"), ("edge", "<u2"), ("offset", "<f4"), ("width", "<f4"),
      ("height", "<f4"), ("sill", "<f4")]
 )  # fmt: skip
-PAIR = np.dtype(("<u2", len(RULES)))
+PAIR = np.dtype(("<u4", len(RULES)))  # one bit per predicate
+BITS = 32
 TABLES = (("rooms", ROOM), ("objects", OBJECT), ("corners", CORNER), ("openings", OPENING), ("pairs", PAIR))
 ROOMS_PER_SHARD = 1000
 HELD_OUT_EVERY = 20  # every twentieth room is kept out of training
@@ -112,10 +114,13 @@ def write_shard(
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
         objects["size"], objects["position"], objects["yaw"] = room.size, room.position, room.yaw
-        pairs = np.zeros((n * n, len(RULES)), "<u2")
+        pairs = np.zeros((n * n, len(RULES)), PAIR.base)
         for column, rules in enumerate(RULES):
             subject, predicate, object_ = labels[rules][k].T
-            np.bitwise_or.at(pairs[:, column], subject * n + object_, (1 << predicate).astype("<u2"))
+            if predicate.max(initial=0) >= BITS:
+                word = words.predicates[predicate.max()].name
+                raise ValueError(f"predicate {word} has number {predicate.max()}: a room set holds those below {BITS}")
+            np.bitwise_or.at(pairs[:, column], subject * n + object_, (1 << predicate).astype(PAIR.base))
         tables["rooms"].append(np.array([entry], ROOM))
         tables["objects"].append(objects)
         tables["corners"].append(np.asarray(room.floor_polygon, "<f4"))
@@ -292,7 +297,7 @@ def _rounded(room: RoomBoxes) -> RoomBoxes:
 
 def _triplets(bits: np.ndarray, counts: np.ndarray, thinned: tuple[float, np.random.Generator] | None) -> np.ndarray:
     """(E, 3) triplets of the packed rooms from their pairs' bits (n * n per room, row = subject)."""
-    pair, predicate = np.nonzero((bits[:, None] >> np.arange(16, dtype=np.uint16)) & 1)
+    pair, predicate = np.nonzero((bits[:, None] >> np.arange(8 * bits.itemsize, dtype=bits.dtype)) & 1)
     if thinned:
         keep = thinned[1].random(len(pair)) >= thinned[0]
         pair, predicate = pair[keep], predicate[keep]
@@ -311,14 +316,15 @@ def _column(rules: str) -> int:
 
 def _tables(path: Path) -> dict[str, np.ndarray]:
     raw = np.memmap(path, np.uint8, mode="r")
-    if bytes(raw[:8]) != MAGIC:
+    if bytes(raw[:8]) not in (MAGIC, MAGIC_OF_16):
         raise ValueError(f"{path}: not a shard of rooms (begins with {bytes(raw[:8])!r}, expected {MAGIC!r})")
+    tables = TABLES if bytes(raw[:8]) == MAGIC else (*TABLES[:-1], ("pairs", np.dtype(("<u2", len(RULES)))))
     counts = np.frombuffer(raw[8 : 8 + 8 * len(TABLES)].tobytes(), "<u8").astype(int)
-    need = 8 + 8 * len(TABLES) + sum(int(n) * dtype.itemsize for n, (_, dtype) in zip(counts, TABLES, strict=True))
+    need = 8 + 8 * len(TABLES) + sum(int(n) * dtype.itemsize for n, (_, dtype) in zip(counts, tables, strict=True))
     if len(raw) != need:
         raise ValueError(f"{path}: damaged shard, {len(raw)} bytes of {need}; remove it and build again")
     out, start = {}, 8 + 8 * len(TABLES)
-    for number, (name, dtype) in zip(counts, TABLES, strict=True):
+    for number, (name, dtype) in zip(counts, tables, strict=True):
         out[name] = np.frombuffer(raw, dtype.base, int(number) * int(np.prod(dtype.shape)), start)
         out[name] = out[name].reshape(int(number), *dtype.shape)
         start += int(number) * dtype.itemsize

@@ -20,14 +20,9 @@ from echomodel.vocabulary import vocabulary
 
 ROOMS = ("bedroom", "livingroom", "diningroom", "library", "all")
 SPLITS = ("trainval", "test")  # the paper's; test is what its tables are computed on
-SCENE, FLOOR, IN, STANDING_ON = "_scene_", "floor", 0, 7
+SCENE, FLOOR, IN = "_scene_", "floor", 0
 BOUNDS = 14
 SDF_LIMIT = 0.2
-# What a scan is called before its dash -> our room type.
-ROOM_TYPES = {
-    "Bedroom": "bedroom", "MasterBedroom": "bedroom", "SecondBedroom": "bedroom", "LivingRoom": "living_room",
-    "DiningRoom": "dining_room", "LivingDiningRoom": "living_dining_room", "Library": "study",
-}  # fmt: skip
 
 
 class SGFrontError(ValueError):
@@ -59,7 +54,8 @@ class Scan:
     @property
     def room_type(self) -> str:
         """Our room type, told by the scan's name (the name itself where it is of no known kind)."""
-        return ROOM_TYPES.get(self.name.split("-")[0], self.name.split("-")[0])
+        kind = self.name.split("-")[0]
+        return next((room.name for room in vocabulary().room_types if kind in room.scans), kind)
 
     def room(self) -> RoomBoxes:
         """The furniture as a labelled room; the floor becomes the polygon, its relations are left out."""
@@ -132,9 +128,10 @@ class SGFront:
         names = self._lines(f"classes_{room}.txt")
         self.fine_classes = tuple(sorted(set(names)))
         self.predicates = ("in", *self._lines("relationships.txt"))
-        if len(self.predicates) != 16:
+        expected = len(vocabulary().sgfront_predicates)
+        if len(self.predicates) != expected:
             path = self.folder / "relationships.txt"
-            raise SGFrontError(f"{path}: holds {len(self.predicates) - 1} relationships, expected 15")
+            raise SGFrontError(f"{path}: holds {len(self.predicates) - 1} relationships, expected {expected - 1}")
         self.mapping = self._mapping()
         self.classes = self.fine_classes if large else tuple(sorted({self.mapping[n] for n in self.fine_classes}))
         self.scans = self._scans()

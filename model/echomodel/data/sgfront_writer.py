@@ -9,17 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.sgfront import FLOOR, SPLITS, STANDING_ON, small_mapping
+from echomodel.data.sgfront import FLOOR, IN, SPLITS, small_mapping
 from echomodel.metrics.room_figures import footprints
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
-SCAN_NAMES = {
-    "bedroom": "MasterBedroom", "living_room": "LivingRoom", "dining_room": "DiningRoom",
-    "living_dining_room": "LivingDiningRoom", "study": "Library",
-}  # fmt: skip
-ABOVE = 6
 ON_FLOOR = 0.04  # metres
 
 
@@ -50,7 +45,8 @@ def write_sgfront(
     labels = label_rooms(rooms, rules="sgfront", drop=drop, rng=rng)
     scans, boxes, rows = [], {}, []
     for number, (entry, edges) in enumerate(zip(rooms, labels, strict=True)):
-        name = f"{SCAN_NAMES[vocabulary().room_type(entry.room_type).name]}-{number}"
+        kind = vocabulary().room_type(entry.room_type)
+        name = f"{(kind.scans or (kind.name,))[0]}-{number}"
         shift = np.append(rng.uniform(-5, 5, 2), 0.0)[[0, 2, 1]].round(3)
         scans.append(_graph(name, entry, edges))
         boxes[name], params = _boxes(entry, shift)
@@ -60,7 +56,8 @@ def write_sgfront(
     mapping = small_mapping()
     _write(folder / f"classes_{room}.txt", "".join(f"{name}\n" for name in sorted(mapping)))
     _write(folder / "mapping.json", json.dumps(mapping, indent=1))
-    _write(folder / "relationships.txt", "".join(f"{p.sgfront}\n" for p in vocabulary().predicates if p.id))
+    spelled = vocabulary().sgfront_predicates
+    _write(folder / "relationships.txt", "".join(f"{word}\n" for number, word in spelled.items() if number != IN))
     if split == "trainval":
         _write(folder / f"centered_bounds_{room}_trainval.txt", _bounds(np.concatenate(rows)))
 
@@ -79,10 +76,10 @@ def _graph(name: str, room: RoomBoxes, edges: np.ndarray) -> dict:
     words = vocabulary()
     floor = len(room) + 1
     objects = {str(k + 1): words.category(word).sgfront for k, word in enumerate(room.categories)}
-    spelled = {p.id: p.sgfront for p in words.predicates}
-    relations = [[int(s) + 1, int(o) + 1, int(p), spelled[int(p)]] for s, p, o in edges]
+    spelled = words.sgfront_predicates
+    relations = [[int(s) + 1, int(o) + 1, int(p), spelled[int(p)]] for s, p, o in edges if int(p) in spelled]
     for k in range(len(room)):
-        predicate = STANDING_ON if room.position[k, 1] < ON_FLOOR else ABOVE
+        predicate = words.predicate_id("standing_on" if room.position[k, 1] < ON_FLOOR else "above")
         relations.append([k + 1, floor, predicate, spelled[predicate]])
     return {"scan": name, "objects": {**objects, str(floor): FLOOR}, "relationships": relations}
 

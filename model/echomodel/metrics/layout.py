@@ -81,7 +81,7 @@ def relation_scores(
     kept, measured = {}, {}
     for predicate in vocabulary().predicates:
         chosen = counted & (triplets[:, 1] == predicate.id)
-        if 0 < predicate.id <= 12:
+        if predicate.measures:
             measured[predicate.name] = int(chosen.sum())
             kept[predicate.name] = int((chosen & (verdict == 1)).sum())
     return RelationScores(kept, measured)

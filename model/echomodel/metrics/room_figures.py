@@ -244,7 +244,7 @@ def _relations(rooms: Sequence[RoomBoxes]) -> dict[str, float]:
     """Share of ordered pairs that carry each relation, by the rules of SG-FRONT."""
     pairs = sum(len(room) * (len(room) - 1) for room in rooms)
     ids = np.concatenate([edges[:, 1] for edges in label_rooms(rooms, rules="sgfront")]) if rooms else np.zeros(0, int)
-    return {p.name: float((ids == p.id).sum() / max(pairs, 1)) for p in vocabulary().predicates if 0 < p.id < 13}
+    return {p.name: float((ids == p.id).sum() / max(pairs, 1)) for p in vocabulary().predicates if p.measures}
 
 
 def _overlap(rooms: Iterable[RoomBoxes]) -> dict[str, float]:

@@ -97,6 +97,7 @@ class ReleasedEcho:
         Raises:
             ValueError: no layout branch, no box statistics, a category without a class, or no text features.
         """
+        graph = in_published_words(graph)
         scenes, objects = self._scenes(graph)
         change = None if edit is None else self._change(graph, scenes, edit)
         whole, _ = pack_scenes(scenes)
@@ -130,6 +131,7 @@ class ReleasedEcho:
         Raises:
             ValueError: no shape branch, a category without a class, or no text features.
         """
+        graph = in_published_words(graph)
         scenes, objects = self._scenes(graph)
         change = None if edit is None else self._change(graph, scenes, edit)
         whole, _ = pack_scenes(scenes)
@@ -139,6 +141,14 @@ class ReleasedEcho:
         grids = torch.cat([self.model.vqvae.decode(part)[:, 0] for part in latents.split(DECODED)])
         # A quarter turn: the point (x, y, z) of a published shape is (-z, y, x) in its box (SPEC: section 10).
         return grids.transpose(1, 3).flip(1).contiguous() - LEVEL
+
+    def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
+        """One sentence for every relation of the graph that SG-FRONT lacks; categories have classes, see `labels`."""
+        words = vocabulary()
+        return tuple(
+            f"the weights do not know the relation {words.predicates[number].name}: repaired and checked, not generated"
+            for number in sorted({*graph.triplets[:, 1].tolist()} - words.sgfront_predicates.keys())
+        )
 
     def labels(self, graph: GraphBatch) -> list[str]:
         """The model's class of each node: the category's own name there, else its coarse class.
@@ -181,7 +191,7 @@ class ReleasedEcho:
         from echomodel.echo import touched_nodes
 
         changes, start = [], 0
-        befores = replace(graph, triplets=edit.before).unpack()
+        befores = in_published_words(replace(graph, triplets=edit.before)).unpack()
         touched = touched_nodes(graph, edit) & ~edit.added
         labels = self.labels(graph)
         for before in befores:
@@ -196,6 +206,12 @@ class ReleasedEcho:
             changes.append(GraphChange(old, added, tuple(touched[start:stop].nonzero()[:, 0].tolist())))
             start = stop
         return pack_changes(scenes, changes)
+
+
+def in_published_words(graph: GraphBatch) -> GraphBatch:
+    """The graph without the relations that SG-FRONT lacks."""
+    known = graph.triplets.new_tensor(list(vocabulary().sgfront_predicates))
+    return graph.with_triplets(graph.triplets[torch.isin(graph.triplets[:, 1], known)])
 
 
 def floor_relations(category: Tensor, triplets: Tensor) -> Tensor:

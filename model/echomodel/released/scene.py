@@ -45,7 +45,7 @@ def published_scene(
         if name not in index or (name in STRUCTURE and position < len(labels)):
             allowed = ", ".join(sorted(set(classes) - {*STRUCTURE}))
             raise ValueError(f"label of node {position} is {name!r}, allowed: {allowed}")
-    predicates = {p.id: p.sgfront for p in vocabulary().predicates}
+    predicates = vocabulary().sgfront_predicates
     triples = torch.as_tensor(triples, dtype=torch.int64).reshape(-1, 3)
     for row, (subject, predicate, target) in enumerate(triples.tolist()):
         if predicate not in predicates:

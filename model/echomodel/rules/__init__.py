@@ -2,6 +2,17 @@
 
 from echomodel.rules.labels import label_relations, label_rooms
 from echomodel.rules.margins import margins, measured, verdicts
-from echomodel.rules.sets import RULE_SETS, RuleSet, rule_set
+from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, rule, rule_set
 
-__all__ = ["RULE_SETS", "RuleSet", "label_relations", "label_rooms", "margins", "measured", "rule_set", "verdicts"]
+__all__ = [
+    "RULE_SETS",
+    "Rule",
+    "RuleSet",
+    "label_relations",
+    "label_rooms",
+    "margins",
+    "measured",
+    "rule",
+    "rule_set",
+    "verdicts",
+]

@@ -11,10 +11,9 @@ import torch
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import pairs
 from echomodel.rules.margins import _Tensors
-from echomodel.rules.sets import SYMMETRICAL, RuleSet, rule_set
+from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import UnknownWord, vocabulary
 
-SAME_STYLE, SAME_SUPER_CATEGORY, SAME_MATERIAL = 13, 14, 15
 # A label must survive the rounding of its boxes to float32 and to a tenth of a millimetre.
 SLACK = 3e-4
 
@@ -70,7 +69,8 @@ def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet) -> np
     pair = pairs(boxes, torch.from_numpy(subject), torch.from_numpy(object_), centre, oriented=rules.oriented)
     same_category, same = _likeness(rooms, subject, object_)
     columns = {predicate: rule(pair).numpy() >= SLACK for predicate, rule in rules.labels.items()}
-    columns[SYMMETRICAL] &= same_category
+    for predicate in rules.same_category & columns.keys():
+        columns[predicate] &= same_category
     columns.update(same)
     kept = [
         np.stack([subject[mask], np.full(int(mask.sum()), predicate), object_[mask]], -1)
@@ -122,10 +122,11 @@ def _likeness(
     same_model = (model[subject] == model[object_]) & (model[subject] != "")
     same_group = (style[subject] == style[object_]) & (style[subject] >= 0)
     same_coarse = coarse[subject] == coarse[object_]
+    of = vocabulary().predicate_id
     return category[subject] == category[object_], {
-        SAME_STYLE: same_group | same_model,
-        SAME_SUPER_CATEGORY: same_coarse,
-        SAME_MATERIAL: same_model | (same_group & same_coarse),
+        of("same_style_as"): same_group | same_model,
+        of("same_super_category_as"): same_coarse,
+        of("same_material_as"): same_model | (same_group & same_coarse),
     }
 
 

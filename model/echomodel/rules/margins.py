@@ -8,7 +8,8 @@ import torch
 from torch import Tensor
 
 from echomodel.rules.geometry import BoxesLike, pairs
-from echomodel.rules.sets import SIZES, RuleSet, rule_set
+from echomodel.rules.sets import RuleSet, rule_set
+from echomodel.vocabulary import vocabulary
 
 
 class _Tensors:
@@ -90,11 +91,12 @@ def _margins(
     centre = node_centres(boxes.position, scene, center)
     out = boxes.size.new_zeros(len(triplets))
     placed = boxes.of_fixed_size() if rigid else boxes
+    sizes = {entry.id for entry in vocabulary().predicates if entry.measures == "size"}  # all others are of place
     for predicate, rule in rules.margins.items():
         chosen = (triplets[:, 1] == predicate).nonzero()[:, 0]
         if len(chosen):
             subject, object_ = triplets[chosen, 0], triplets[chosen, 2]
-            of = boxes if predicate in SIZES else placed
+            of = boxes if predicate in sizes else placed
             pair = pairs(of, subject, object_, centre, oriented=rules.oriented)
             out = out.index_copy(0, chosen, rule(pair))
     return out

@@ -1,14 +1,18 @@
-"""The two sets of rules: `sgfront` (what the published code measures) and `strict` (the same words, meant)."""
+"""The two sets of rules: `sgfront` (what the published code measures) and `strict` (the same words, meant).
+
+A rule is registered here or with `@rule("name")` in a module that `echomodel.rules` imports, and nowhere else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
 
 from echomodel.rules.geometry import TINY, PairGeometry
+from echomodel.vocabulary import vocabulary
 
 Margin = Callable[[PairGeometry], Tensor]
 
@@ -18,27 +22,63 @@ VOLUME = 0.15  # relative difference of volume for bigger and smaller
 HEIGHT = 0.1  # relative difference of the tops for taller and shorter
 TOUCH = 0.04  # metres of vertical play for standing on
 NEAR = 0.45  # metres for close by and symmetrical to
-LEFT, RIGHT, FRONT, BEHIND, CLOSE, ABOVE, ON, BIGGER, SMALLER, TALLER, SHORTER, SYMMETRICAL = range(1, 13)
-SIZES = frozenset({BIGGER, SMALLER, TALLER, SHORTER})  # what sizes answer for; all others are relations of place
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What one predicate means in one set of rules.
+
+    Arguments:
+        margin: signed margin (P,) float of pairs, metres or ratio, satisfied iff >= 0; None where it is not measured.
+        label: margin that a pair needs to be labelled with the predicate; None where rooms are not labelled with it.
+        open: the bound itself does not count (satisfied iff > 0).
+        same_category: only objects of one category are labelled with it.
+    """
+
+    margin: Margin | None
+    label: Margin | None = None
+    open: bool = False
+    same_category: bool = False
 
 
 @dataclass(frozen=True)
 class RuleSet:
-    """Named rules: per predicate id a signed margin (metres or ratio), satisfied iff >= 0.
+    """Named rules: what each predicate means, by its name.
 
     Arguments:
         name: `strict` or `sgfront`.
         oriented: whether boxes are measured with their yaw (else as the published code does).
-        margins: predicate id -> margin of a batch of pairs, (P,) float.
-        open: predicates whose bound itself does not count (satisfied iff > 0).
-        labels: predicate id -> margin that a pair needs to be labelled with it.
+        rules: predicate -> rule; one of a predicate that the vocabulary does not hold is not asked.
     """
 
     name: str
     oriented: bool
-    margins: Mapping[int, Margin]
-    open: frozenset[int]
-    labels: Mapping[int, Margin]
+    rules: dict[str, Rule]
+
+    @property
+    def margins(self) -> dict[int, Margin]:
+        """Predicate id -> margin of a batch of pairs."""
+        return {number: rule.margin for number, rule in self._by_id() if rule.margin is not None}
+
+    @property
+    def labels(self) -> dict[int, Margin]:
+        """Predicate id -> margin that a pair needs to be labelled with it."""
+        return {number: rule.label for number, rule in self._by_id() if rule.label is not None}
+
+    @property
+    def open(self) -> frozenset[int]:
+        """Ids of the predicates whose bound itself does not count."""
+        return frozenset(number for number, rule in self._by_id() if rule.open)
+
+    @property
+    def same_category(self) -> frozenset[int]:
+        """Ids of the predicates that only objects of one category are labelled with."""
+        return frozenset(number for number, rule in self._by_id() if rule.same_category)
+
+    def _by_id(self) -> Iterator[tuple[int, Rule]]:
+        words = vocabulary()
+        known = words.predicate_names
+        return ((words.predicate_id(name), rule) for name, rule in self.rules.items() if name in known)
 
 
 def _beside(axis: int, sign: float, needed: float) -> Margin:
@@ -110,51 +150,61 @@ def _symmetrical(pair: PairGeometry) -> Tensor:
     return NEAR - pair.mirror_distance(point=False)
 
 
-_SGFRONT: dict[int, Margin] = {
-    LEFT: _beside(2, -1.0, APART),
-    RIGHT: _beside(2, 1.0, APART),
-    FRONT: _beside(0, 1.0, -APART),
-    BEHIND: _beside(0, -1.0, -APART),
-    CLOSE: _close,
-    ON: _sgfront_standing_on,
-    BIGGER: _relative(_volumes, 1.0, VOLUME),
-    SMALLER: _relative(_volumes, -1.0, VOLUME),
-    TALLER: _relative(_tops, 1.0, HEIGHT),
-    SHORTER: _relative(_tops, -1.0, HEIGHT),
-    SYMMETRICAL: _sgfront_symmetrical,
-}
+def _named(margins: Mapping[str, Margin], *, open_: Collection[str] = ()) -> dict[str, Rule]:
+    """Rules that label what they measure."""
+    return {
+        name: Rule(margin, margin, open=name in open_, same_category=name == "symmetrical_to")
+        for name, margin in margins.items()
+    }
 
-SGFRONT = RuleSet(
-    name="sgfront",
-    oriented=False,
-    margins=_SGFRONT,
-    open=frozenset({ON, SYMMETRICAL}),
-    # Labels need a real distance where the check tolerates a wrong one; only the floor carries `standing on`, because
-    # the check compares the bottoms of the two.
-    labels={
-        **{predicate: margin for predicate, margin in _SGFRONT.items() if predicate != ON},
-        FRONT: _beside(0, 1.0, APART),
-        BEHIND: _beside(0, -1.0, APART),
-        ABOVE: _higher,
-    },
+
+STRICT = RuleSet(
+    "strict",
+    oriented=True,
+    rules=_named(
+        {
+            "left": _beside(2, -1.0, APART),
+            "right": _beside(2, 1.0, APART),
+            "front": _beside(0, 1.0, APART),
+            "behind": _beside(0, -1.0, APART),
+            "close_by": _close,
+            "above": _above,
+            "standing_on": _standing_on,
+            "bigger_than": _relative_to_larger(_volumes, 1.0, VOLUME),
+            "smaller_than": _relative_to_larger(_volumes, -1.0, VOLUME),
+            "taller_than": _relative_to_larger(_tops, 1.0, HEIGHT),
+            "shorter_than": _relative_to_larger(_tops, -1.0, HEIGHT),
+            "symmetrical_to": _symmetrical,
+        }
+    ),
 )
 
-_STRICT: dict[int, Margin] = {
-    LEFT: _beside(2, -1.0, APART),
-    RIGHT: _beside(2, 1.0, APART),
-    FRONT: _beside(0, 1.0, APART),
-    BEHIND: _beside(0, -1.0, APART),
-    CLOSE: _close,
-    ABOVE: _above,
-    ON: _standing_on,
-    BIGGER: _relative_to_larger(_volumes, 1.0, VOLUME),
-    SMALLER: _relative_to_larger(_volumes, -1.0, VOLUME),
-    TALLER: _relative_to_larger(_tops, 1.0, HEIGHT),
-    SHORTER: _relative_to_larger(_tops, -1.0, HEIGHT),
-    SYMMETRICAL: _symmetrical,
-}
-
-STRICT = RuleSet(name="strict", oriented=True, margins=_STRICT, open=frozenset(), labels=_STRICT)
+SGFRONT = RuleSet(
+    "sgfront",
+    oriented=False,
+    rules=_named(
+        {
+            "left": _beside(2, -1.0, APART),
+            "right": _beside(2, 1.0, APART),
+            "front": _beside(0, 1.0, -APART),
+            "behind": _beside(0, -1.0, -APART),
+            "close_by": _close,
+            "standing_on": _sgfront_standing_on,
+            "bigger_than": _relative(_volumes, 1.0, VOLUME),
+            "smaller_than": _relative(_volumes, -1.0, VOLUME),
+            "taller_than": _relative(_tops, 1.0, HEIGHT),
+            "shorter_than": _relative(_tops, -1.0, HEIGHT),
+            "symmetrical_to": _sgfront_symmetrical,
+        },
+        open_=("standing_on", "symmetrical_to"),
+    ),
+)
+# Labels need a real distance where the check tolerates a wrong one; only the floor carries `standing on`, because the
+# check compares the bottoms of the two.
+SGFRONT.rules["front"] = replace(SGFRONT.rules["front"], label=_beside(0, 1.0, APART))
+SGFRONT.rules["behind"] = replace(SGFRONT.rules["behind"], label=_beside(0, -1.0, APART))
+SGFRONT.rules["standing_on"] = replace(SGFRONT.rules["standing_on"], label=None)
+SGFRONT.rules["above"] = Rule(None, _higher)
 
 RULE_SETS = {rules.name: rules for rules in (STRICT, SGFRONT)}
 
@@ -164,3 +214,26 @@ def rule_set(name: str) -> RuleSet:
     if name not in RULE_SETS:
         raise ValueError(f"unknown rules {name!r}: allowed are {', '.join(RULE_SETS)}")
     return RULE_SETS[name]
+
+
+def rule(predicate: str, *, sets: Sequence[str] = ("strict",), labels: bool = False) -> Callable[[Margin], Margin]:
+    """Decorator that registers a margin as what a predicate of the vocabulary means.
+
+    Arguments:
+        predicate: name of its row.
+        sets: rule sets that measure it.
+        labels: whether rooms are labelled with it too (only what is labelled can be learned).
+
+    Raises:
+        ValueError: an unknown set, or one that has a rule for the predicate.
+    """
+
+    def register(margin: Margin) -> Margin:
+        for name in sets:
+            rules = rule_set(name).rules
+            if predicate in rules:
+                raise ValueError(f"predicate {predicate!r} has a rule in the set {name!r} already")
+            rules[predicate] = Rule(margin, margin if labels else None)
+        return margin
+
+    return register

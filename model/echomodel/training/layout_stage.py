@@ -16,7 +16,6 @@ from echomodel.samplers import sample
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.vocabulary import vocabulary
 
-EMPHASIS = {5: 4.0, 6: 2.0, 7: 4.0, 12: 8.0}  # rare relations that must hit a small region: close by, above, on, mirror
 DRAFT = 0.3  # weight of each draft's own denoising loss
 OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
 SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
@@ -98,11 +97,12 @@ def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Ten
     lifted = torch.cat([decoded.position[:, :1], decoded.position[:, 1:2].clamp_min(0), decoded.position[:, 2:]], dim=1)
     boxes = Boxes(decoded.size.clamp(0.05, 8.0), lifted, decoded.yaw)
     pair, predicate = batch.predicates.nonzero(as_tuple=True)
-    ruled = ((predicate >= 1) & (predicate <= 12)).nonzero()[:, 0]
+    ids = [entry.id for entry in vocabulary().predicates if entry.measures]
+    ruled = torch.isin(predicate, predicate.new_tensor(ids)).nonzero()[:, 0]
     pair, predicate = pair[ruled], predicate[ruled]
     triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
     total, weights = level.new_zeros(()), level.new_zeros(())
-    emphasis = level.new_tensor([EMPHASIS.get(number, 1.0) for number in range(batch.predicates.shape[1])])
+    emphasis = level.new_tensor([entry.loss_weight for entry in vocabulary().predicates])
     own = batch.rules[batch.graph.scene[triplets[:, 0]]]
     for number, name in enumerate(rules):
         chosen = triplets[own == number]

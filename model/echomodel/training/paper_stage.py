@@ -123,7 +123,7 @@ class PaperStage:
         return published_scene(_labels(room), triples, classes=classes, text=self.text, edges=True)
 
     def _pseudo(self, graph: SceneGraphTensors, room: RoomBoxes, generator: torch.Generator) -> GraphChange:
-        labels, words = [*_labels(room), "floor", "_scene_"], {p.id: p.sgfront for p in vocabulary().predicates}
+        labels, words = [*_labels(room), "floor", "_scene_"], vocabulary().sgfront_predicates
 
         def relation_text(subject: int, predicate: int, target: int) -> Tensor:
             return self.text([edge_text(labels[subject], words[predicate], labels[target])])[0]

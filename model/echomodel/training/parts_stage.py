@@ -13,7 +13,6 @@ from echomodel.data.furniture.description import draw_styles
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.graph import GraphBatch
 from echomodel.objectives import add_noise, draw_levels
-from echomodel.rules.labels import SAME_MATERIAL, SAME_STYLE
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import PackedRooms, draw_batch
 from echomodel.training.shape_stage import ShapeBatch, draw_suites, first_of_group, shifted
@@ -126,7 +125,7 @@ def silenced(pairs: Pairs, silent: Tensor, graph: GraphBatch) -> Pairs:
     """The pairs without what is said of style and material in the `silent` scenes (S,)."""
     told = pairs.told.clone()
     width = told.shape[1] // 2
-    columns = [predicate + side for predicate in (SAME_STYLE, SAME_MATERIAL) for side in (0, width)]
+    columns = [predicate + side for predicate in vocabulary().uniting("shape") for side in (0, width)]
     rows = silent[graph.scene[pairs.receiver]]
     for column in columns:
         told[rows, column] = 0

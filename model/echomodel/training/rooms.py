@@ -11,18 +11,18 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
+from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
 from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
 from echomodel.openingrows import padded_rows
 from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import vocabulary
 
-PREDICATES = 16
+PREDICATES = CompactConfig.predicates  # that the network is told; rules may measure more
 DENSE = 0.4  # share of the training rooms whose graphs tell 30 to 100 % of all relations
 UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.25, 0.2
 SELDOM = 0.3  # weight of sizes and styles among the relations that a sparse graph tells
-SWAPS_X = ((3, 4),)  # mirrored along x: front <-> behind
-SWAPS_Z = ((1, 2),)  # mirrored along z: left <-> right
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,8 @@ def _bits(graph: GraphBatch) -> Tensor:
     number = torch.full((graph.num_nodes, graph.num_nodes), -1)
     number[receiver, sender] = torch.arange(len(receiver))
     hot = torch.zeros(len(receiver), PREDICATES, dtype=torch.int32)
-    hot[number[graph.triplets[:, 0], graph.triplets[:, 2]], graph.triplets[:, 1]] = 1
+    told = graph.triplets[graph.triplets[:, 1] < PREDICATES]
+    hot[number[told[:, 0], told[:, 2]], told[:, 1]] = 1
     return (hot << torch.arange(PREDICATES, dtype=torch.int32)).sum(1, dtype=torch.int32)
 
 
@@ -190,10 +191,9 @@ def _mirror(
     yaw *= 1 - 2 * along_x[scene].float()
     turned = torch.pi - yaw
     yaw.copy_(torch.where(along_z[scene], torch.remainder(turned + torch.pi, 2 * torch.pi) - torch.pi, yaw))
-    for mask, swaps in ((along_x[pair_scene], SWAPS_X), (along_z[pair_scene], SWAPS_Z)):
-        order = torch.arange(PREDICATES)
-        for a, b in swaps:
-            order[a], order[b] = b, a
+    words = vocabulary()
+    for mask, axis in ((along_x[pair_scene], "mirror_x"), (along_z[pair_scene], "mirror_z")):
+        order = [words.predicate_id(getattr(row, axis) or row.name) for row in words.predicates[:PREDICATES]]
         holds = torch.where(mask[:, None], holds[:, order], holds)
     return holds
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import arrows, draw_graph, to_dot
-from echousd.graph.placing import DIRECTIONS, HEIGHT, WIDTH, places
+from echousd.graph.placing import HEIGHT, WIDTH, places
 
 
 def overlaps(place: np.ndarray) -> int:
@@ -25,9 +26,9 @@ def test_boxes_keep_apart_and_directions_hold(room):
     assert overlaps(place) == 0
     where = dict(zip(graph.names, place, strict=True))
     for relation in graph.relations:
-        if relation.predicate in DIRECTIONS:
-            along = (where[relation.subject] - where[relation.object]) @ DIRECTIONS[relation.predicate]
-            assert along > 0, relation
+        front, right = vocabulary().predicate(relation.predicate).step
+        if front or right:
+            assert (where[relation.subject] - where[relation.object]) @ (right, front) > 0, relation
 
 
 def test_the_same_graph_gives_the_same_picture(tmp_path):

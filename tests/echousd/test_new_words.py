@@ -1,0 +1,109 @@
+"""One row each (and a rule's code) adds a relation, a category and a room type to everything that the product does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+import echousd
+from echomodel.boxes import Boxes
+from echomodel.rules import margins, rule, rule_set
+from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
+from echousd.check import check_room
+from echousd.cli.main import command
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
+from echousd.graph.picture import draw_graph, to_dot
+from echousd.repair import repair_boxes
+
+LEVEL = 0.05  # metres
+
+
+@pytest.fixture
+def music():
+    """The vocabulary with a harp, a music room, and `in_line_with`: centres at one place along the room."""
+    words = vocabulary()
+    harp = Category(
+        name="harp", coarse="cabinet", sgfront="bookshelf", support="floor", role="decor", look="plant", density=40.0,
+        ade20k="sculpture", colour="#112233", aliases=("concert_harp",),
+    )  # fmt: skip
+    line = Predicate(
+        name="in_line_with", id=len(words.predicates), kind="closeness", inverse="in_line_with", symmetric=True,
+        measures="place", emphasis=4.0, aliases=("level_with",),
+    )  # fmt: skip
+    room = RoomType("music_room", contents=(("harp", 1), ("stool", 1), ("bookshelf", 1)), like="living_room")
+
+    @rule("in_line_with")
+    def in_line(pair):
+        return LEVEL - pair.offset[:, 0].abs()
+
+    more = replace(
+        words, categories=(*words.categories, harp), predicates=(*words.predicates, line),
+        room_types=(*words.room_types, room),
+    )  # fmt: skip
+    with speaking(more):
+        yield more
+    del rule_set("strict").rules["in_line_with"]
+
+
+def stated() -> SceneGraph:
+    graph = starting_graph(RoomSpec("music room", size=(4.0, 4.0)), {"concert harp": 1, "armchair": 1})
+    told = (Relation("stool", "level with", "harp"), Relation("armchair", "front", "harp"))
+    return graph.replaced(relations=(*graph.relations, *told))
+
+
+def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
+    graph = stated()
+    graph.to_stage(tmp_path / "graph.usda")
+    graph = load_graph(tmp_path / "graph.usda")
+    assert graph.room.type == "music_room"
+    assert graph.relation("stool", "in_line_with", "harp")
+    assert SceneGraph.from_yaml(graph.to_yaml()) == graph
+
+    room = echousd.generate(graph, seed=3, shapes="boxes")
+    verdicts = {(v.subject, v.predicate): v.state for v in room.verdicts}
+    assert set(verdicts.values()) == {"kept"}
+    assert ("stool", "in_line_with") in verdicts
+    assert {note for note in room.notes if "do not know" in note} == {
+        "the weights do not know the category harp: generated as bookshelf",
+        "the weights do not know the room type music_room: generated as living_room",
+        "the weights do not know the relation in_line_with: guided, repaired and checked, not generated",
+    }
+    apart = room.boxes.position[graph.names.index("stool")] - room.boxes.position[graph.names.index("harp")]
+    assert abs(float(apart[0])) <= LEVEL
+
+    root = room.save(tmp_path / "music")
+    report = check_room(root)
+    assert report.ok, report
+    draw_graph(graph, tmp_path / "graph.png")
+    assert (tmp_path / "graph.png").stat().st_size > 1000
+    assert "#112233" in to_dot(graph)
+
+
+def test_the_command_line_speaks_them(music, tmp_path):
+    command().main(["new", str(tmp_path / "g.usda"), "--room", "music_room"], standalone_mode=False)
+    assert load_graph(tmp_path / "g.usda").names == ("harp", "stool", "bookshelf")
+
+
+def test_repair_follows_the_rule_of_a_new_relation(music):
+    size, yaw = np.ones((2, 3)), np.zeros(2)
+    position = np.array([[0.0, 0.0, -1.0], [0.6, 0.0, 1.0]])
+    triplets = np.array([[0, music.predicate_id("in_line_with"), 1]])
+    before = margins(Boxes(size, position, yaw), torch.from_numpy(triplets))
+    assert float(before) == pytest.approx(LEVEL - 0.6)
+    done = repair_boxes(["harp", "armchair"], size, position, yaw, triplets)
+    assert done.verdict.tolist() == [1]
+    assert abs(done.position[0, 0] - done.position[1, 0]) <= LEVEL
+    np.testing.assert_allclose(done.size, size)
+
+
+def test_a_rule_is_registered_once(music):
+    with pytest.raises(ValueError, match="predicate 'left' has a rule in the set 'strict' already"):
+        rule("left")(lambda pair: pair.offset[:, 0])
+
+
+def test_outside_the_block_they_are_unknown():
+    with pytest.raises(ValueError, match="unknown category 'harp'"):
+        Node("harp", "harp")
