@@ -13,7 +13,7 @@ from pxr import Sdf, Usd, UsdUtils
 
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.flattening import flat_layer
-from echousd.packing import Package, Reach
+from echousd.packing import Package, Reach, without_clock
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.values import reading
@@ -73,7 +73,7 @@ def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
         make = UsdUtils.CreateNewARKitUsdzPackage if arkit else UsdUtils.CreateNewUsdzPackage
         if not make(Sdf.AssetPath(str(flat)), str(packed)):
             raise ValueError(f"{root}: cannot be packed as usdz")
-        return packed.read_bytes()
+        return without_clock(packed.read_bytes())
 
 
 def glb(stage: Usd.Stage, reach: Reach) -> bytes:

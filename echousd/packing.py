@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
+import struct
 import warnings
+import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -14,6 +17,7 @@ from echousd.stage.encoding import StageError
 from echousd.textures import TextureError, file_of, texture_bytes
 
 PACKED = (".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")  # what a usdz may hold beside layers
+EARLIEST = (0, (1 << 5) | 1)  # time and date as a zip archive stores them
 SEARCH_PATH = "PXR_AR_DEFAULT_SEARCH_PATH"
 FOLDER = "textures"
 UDIM_TILES = range(1001, 1101)
@@ -151,6 +155,18 @@ def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:
         renamed[path] = package.take(path, where) if package is not None else ""
     UsdUtils.ModifyAssetPaths(layer, lambda path: renamed.get(path, ""))
     return renamed
+
+
+def without_clock(archive: bytes) -> bytes:
+    """The zip archive with the earliest time there is, 1 January 1980, on all its files: equal rooms, equal bytes."""
+    out = bytearray(archive)
+    with zipfile.ZipFile(io.BytesIO(archive)) as package:
+        entry = package.start_dir
+        for file in package.infolist():
+            for time in (file.header_offset + 10, entry + 12):
+                struct.pack_into("<HH", out, time, *EARLIEST)
+            entry += 46 + sum(struct.unpack_from("<HHH", archive, entry + 28))
+    return bytes(out)
 
 
 def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[str, str]]:

@@ -22,7 +22,7 @@ def register(app: typer.Typer) -> None:
         relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
         unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
         output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
-        seed: Annotated[int, typer.Option(help="Seed of the new randomness.", min=0, max=2**63 - 1)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
         shapes: Annotated[str, typer.Option(help="Of new objects. sdf: from the model; boxes: plain boxes.")] = "sdf",
         weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
         repair: Annotated[

@@ -40,7 +40,7 @@ def register(app: typer.Typer) -> None:
                 "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
             ),
         ],
-        seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0, max=2**63 - 1)] = 0,
+        seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
         preset: Annotated[
             str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
         ] = None,
@@ -70,7 +70,10 @@ def register(app: typer.Typer) -> None:
         wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
         """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD."""
+        from echousd.room.manifest import check_seed
+
         started = time.perf_counter()
+        check_seed(seed)
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
         with writing(output, flat=flat, force=force, wait=wait), progress_bar() as listen:

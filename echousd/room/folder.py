@@ -76,17 +76,23 @@ def write_together(
         remove: relative paths that no longer belong to the room, deleted at the very end.
 
     Raises:
-        ValueError: something cannot be written, or would be outside of the folder; then nothing was changed.
+        ValueError: something cannot be written, would be outside of the folder, or another process is writing there;
+            then nothing was changed.
     """
-    created = not folder.exists()
+    with locked(folder):
+        changed = _stage(folder, files, list(last), list(remove))
+        recover(folder)
+    return changed
+
+
+def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: list[str]) -> list[str]:
+    """Write what differs and the journal into the staging folder, and return the paths that will change."""
     staging = folder / STAGING
-    last, remove = list(last), list(remove)
     order = [path for path in files if path not in last] + [path for path in last if path in files]
     for path in (*order, *remove):
         if inside(folder, path, "a file of the room").is_dir():
             raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         _discard(staging)
         staging.mkdir()
         changed = [path for path in order if not _holds(folder / path, files[path])]
@@ -99,9 +105,8 @@ def write_together(
         gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
         write_journal(staging, Journal(move=move, remove=gone))
     except OSError as error:
-        shutil.rmtree(folder if created else staging, ignore_errors=True)
+        shutil.rmtree(staging, ignore_errors=True)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
-    recover(folder)
     return changed
 
 

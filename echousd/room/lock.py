@@ -64,7 +64,7 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
                 )
             if file is None:
                 time.sleep(POLL)
-                _create(folder)  # the other writer may have removed it with the last of its files
+                created += _create(folder)  # the other writer may have removed it with the last of its files
         with _guard:
             _held[key] = (thread, 1)
         yield

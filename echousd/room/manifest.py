@@ -39,6 +39,12 @@ class Manifest(BaseModel):
     meshes: dict[str, dict[str, Any]] = {}
 
 
+def check_seed(seed: int) -> None:
+    """Raises ValueError for a seed that no layer stores as a whole number."""
+    if not 0 <= seed <= MAX_SEED:
+        raise ValueError(f"seed is {seed}, allowed: 0 to {MAX_SEED}")
+
+
 def find_manifest(folder: Path, root: str = "") -> dict[str, Any] | None:
     """The manifest of the room in `folder`, or None if there is none of ours.
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
-from echousd.room.manifest import MAX_SEED
+from echousd.room.manifest import check_seed
 from echousd.room.styles import style_groups
 
 if TYPE_CHECKING:
@@ -72,12 +72,6 @@ class Provenance:
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
-
-
-def check_seed(seed: int) -> None:
-    """Raises ValueError for what a layer cannot store as a whole number."""
-    if not 0 <= seed <= MAX_SEED:
-        raise ValueError(f"seed is {seed}, allowed: 0 to {MAX_SEED}")
 
 
 @dataclass(frozen=True, eq=False)

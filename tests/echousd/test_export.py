@@ -27,6 +27,20 @@ def world_bounds(stage, path="/Room"):
     return UsdGeom.BBoxCache(0, ["default"]).ComputeWorldBound(stage.GetPrimAtPath(path)).ComputeAlignedRange()
 
 
+@pytest.mark.parametrize("arkit", [False, True])
+def test_usdz_knows_no_clock(root, tmp_path, arkit):
+    first = export(root, tmp_path / "room.usdz", arkit=arkit)
+    with zipfile.ZipFile(first) as package:
+        assert {file.date_time for file in package.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert package.testzip() is None
+        for file in package.infolist():  # the files' own headers say the same
+            time, date = struct.unpack_from("<HH", first.read_bytes(), file.header_offset + 10)
+            assert (time, date) == (0, 33)
+    assert Usd.Stage.Open(str(first)).GetPrimAtPath("/Room/Objects")
+    (tmp_path / "later").mkdir()
+    assert export(root, tmp_path / "later/other.usdz", arkit=arkit).read_bytes() == first.read_bytes()
+
+
 def test_usdz_for_the_web_is_one_flat_text_layer(root, tmp_path):
     path = export(root, tmp_path / "room.usdz")
     with zipfile.ZipFile(path) as package:
