@@ -23,7 +23,7 @@ def bed_group(room: Builder, category: str) -> Item | None:
     if category == "kids_bed":
         size = (max(size[0], 0.7), size[1], max(size[2], 1.2))
     bed: Item | None = None
-    for attempt in range(30):
+    for attempt in range(40):
         # With two nightstands the group needs its whole width at the wall; a crowded room gives up one of them.
         sides = min(count, 2 if attempt < 16 else 1 if attempt < 22 else 0)
         width = size[0] + sides * (stand[0] + 0.05)
@@ -40,13 +40,14 @@ def bed_group(room: Builder, category: str) -> Item | None:
         if sides == 1:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
         x, z = wall.point(along, size[2] / 2 + room.wall_gap())
-        bed = room.put(category, size, x, z, wall.yaw, style, doors=attempt < 24)
-        if bed and (_sides_kept_free(room, bed) or attempt > 24):
+        bed = room.put(category, size, x, z, wall.yaw, style)
+        if bed and _sides_kept_free(room, bed):
             break
         if bed:
             room.items.remove(bed)
             bed = None
     if bed is None:
+        room.lost = True
         return None
     if vanity:
         _vanity(room, bed, style)

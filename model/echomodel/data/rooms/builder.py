@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.furniture.sizes import sample_size
+from echomodel.data.furniture.sizes import sample_size, size_statistics
 from echomodel.data.rooms.floor import Floor, Wall
 
 HALF_PI = math.pi / 2
@@ -18,6 +18,7 @@ ACCESS = {
     "wardrobe": 0.6, "cabinet": 0.5, "children_cabinet": 0.5, "dresser": 0.5, "sideboard": 0.45, "bookshelf": 0.45,
     "shelf": 0.4, "wine_cabinet": 0.45, "tv_stand": 0.4, "console_table": 0.35, "dressing_table": 0.5, "desk": 0.5,
 }  # fmt: skip
+SMALLEST, LARGEST = 0.55, 1.15  # times the 5th and 95th percentile of the class
 BODY = 1.8  # metres that a free zone is high
 
 
@@ -72,6 +73,7 @@ class Builder:
         self.items: list[Item] = []
         self.zones: list[tuple[Item, Item]] = []  # what stays free, and whose it is
         self.wanted: dict[str, int] = {}
+        self.lost = False  # what the room is for found no place
 
     # -- draws ---------------------------------------------------------------------------------------------------
 
@@ -130,7 +132,8 @@ class Builder:
         return not any(overlaps(zone, other, 0.03) for other in self.items if other not in ignore)
 
     def add(self, item: Item, style: int) -> Item:
-        item.style = style
+        item.style, item.size = style, _of_its_kind(item)
+        item.__post_init__()
         self.items.append(item)
         zone = front_zone(item)
         if zone is not None:
@@ -226,6 +229,13 @@ class Builder:
             if placed:
                 return placed
         return None
+
+
+def _of_its_kind(item: Item) -> Size:
+    """The size of an item, no side far beyond what such furniture comes in."""
+    table = size_statistics(item.category)
+    x, y, z = np.clip(item.size, SMALLEST * table.low, LARGEST * table.high).tolist()
+    return x, y, z
 
 
 def front_zone(item: Item) -> Item | None:

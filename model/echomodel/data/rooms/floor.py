@@ -13,7 +13,7 @@ from echomodel.openings import STEP, WINDOW_DEPTH, Opening, numbered, overlap
 Rectangle = tuple[float, float, float, float]  # x0, z0, x1, z1
 SHARED_JAMB = 0.1  # metres of wall between two openings
 OUTWARDS, PASSAGES = 0.15, 0.12  # shares of the doors that open out of the room, and that have no leaf
-TALL, LOW = 1.15, 0.5  # metres; what is higher does not stand before windows, or before those that reach the floor
+OVER_SILL = 0.28  # metres; what is higher does not stand before a window
 FRENCH = 0.15  # share of the windows that reach down to the floor
 ARM = 0.3  # share of the larger rooms' outlines that have a corridor as an arm
 CORRIDOR = 1.0  # what a cut must leave of a side
@@ -107,7 +107,7 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
     removed = tuple(
         _cut(half_x, half_z, sx, sz, *size) for (sx, sz), size in zip(CORNERS, sizes, strict=True) if size[0]
     )
-    walls = _walls(polygon)
+    walls = walls_of(polygon)
     area = 4 * half_x * half_z - sum(w * d for w, d in sizes)
     height = float(np.round(quantile(statistics.height, rng.standard_normal()), 2))
     openings: list[Opening] = []
@@ -117,7 +117,7 @@ def sample_floor(statistics: RoomTypeStatistics, rng: np.random.Generator) -> Fl
         _open(openings, "window", walls, height, rng)
     at = {wall.edge: wall for wall in walls}
     windows = [_before(at[o.edge], o, WINDOW_DEPTH) for o in openings if o.kind == "window"]
-    tops = [TALL if o.sill > 0.5 else LOW for o in openings if o.kind == "window"]
+    tops = [o.sill + OVER_SILL for o in openings if o.kind == "window"]
     return Floor(
         half_x, half_z, polygon, height, removed, walls, tuple(openings),
         tuple(_before(at[o.edge], o, needed(o)) for o in openings if o.kind != "window"),
@@ -193,7 +193,8 @@ def _trace(half_x: float, half_z: float, sizes: list[tuple[float, float]]) -> tu
     return tuple(points)
 
 
-def _walls(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
+def walls_of(polygon: tuple[tuple[float, float], ...]) -> tuple[Wall, ...]:
+    """The sides of an outline, whose inside lies where its turn goes."""
     walls = []
     for edge, ((x0, z0), (x1, z1)) in enumerate(zip(polygon, (*polygon[1:], polygon[0]), strict=True)):
         length = math.hypot(x1 - x0, z1 - z0)

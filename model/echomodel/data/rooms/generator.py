@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ from echomodel.roomboxes import RoomBoxes
 
 # Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
 MIX = {"bedroom": 0.40, "living_dining_room": 0.27, "living_room": 0.14, "dining_room": 0.11, "study": 0.08}
+REDRAWS = 4  # rooms in which what they are for finds no place are drawn anew so often
 STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
 
 
@@ -44,12 +46,13 @@ def generate_room(
         room_type = list(MIX)[int(np.searchsorted(np.cumsum(list(MIX.values())), rng.random() * 0.999999))]
     statistics = statistics or room_type_statistics(room_type)
     size_shift = room_requests()["size"] if size_shift is None else size_shift
-    while True:
+    for attempt in itertools.count():
         builder = Builder(sample_floor(statistics, rng), rng, styles, size_shift)
         builder.wanted = wanted(statistics, builder.floor.area, rng)
         furnish(builder, room_type)
-        if len(builder.items) > 1:
+        if len(builder.items) > 1 and (not builder.lost or attempt >= REDRAWS):
             return _boxes(builder, name, room_type)
+    raise AssertionError("unreachable")
 
 
 def generate_rooms(

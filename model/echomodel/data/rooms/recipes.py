@@ -8,6 +8,7 @@ import numpy as np
 
 from echomodel.data.rooms.beds import BEDS, bed_group
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item
+from echomodel.data.rooms.floor import Wall
 from echomodel.data.rooms.lamps import ceiling_lamps, on_top
 from echomodel.data.rooms.sofas import SOFAS, sofa_group, television
 from echomodel.data.rooms.statistics import RoomTypeStatistics
@@ -35,9 +36,11 @@ STORAGE = (
     "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
     "children_cabinet",
 )  # fmt: skip
+LOUNGERS = ("armchair", "lounge_chair")
 SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
+BOARDS = ("dining_table", "desk", "table", "dressing_table")
 DINING_CHAIRS = ("dining_chair", "chinese_chair")
-DESK_SEATS = ("office_chair", "dining_chair", "chair", "dressing_chair", "stool", "lounge_chair")
+DESK_SEATS = ("office_chair", "dining_chair", "chair", "dressing_chair", "stool")
 
 
 def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator) -> dict[str, int]:
@@ -205,8 +208,10 @@ def _rest(room: Builder) -> None:
     """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
     sofa = next((item for item in room.items if item.category in (*SOFAS, *BEDS)), None)
     for _ in range(room.take("tv_stand")):
-        if sofa is None or not television(room, sofa):
-            room.against_wall("tv_stand", corner=0.05, margin=0.2, yaw=None if sofa is None else sofa.yaw + math.pi)
+        if sofa is None:
+            room.against_wall("tv_stand", corner=0.05, margin=0.2)
+        else:
+            television(room, sofa)
     table = next((item for item in room.items if item.category == "dining_table"), None)
     for category in STORAGE:
         count = room.take(category)
@@ -225,6 +230,9 @@ def _rest(room: Builder) -> None:
             if category != "nightstand" and room.chance(0.5):
                 room.against_wall(category, corner=0.3, near=sofa)
     on_top(room)
+    if any(item.category in BOARDS for item in room.items):  # chairs that found no place at a table stay out
+        for category in (*DINING_CHAIRS, "chair", "office_chair", "dressing_chair"):
+            room.take(category)
     for category in [c for c in room.wanted if c not in ("pendant_lamp", "ceiling_lamp")]:
         count = room.take(category)
         size, style = room.size(category), room.style()
@@ -256,14 +264,25 @@ def _by_the_wall(room: Builder, category: str) -> None:
 
 def _loose(room: Builder, category: str, size: tuple[float, float, float], style: int) -> None:
     """A loose seat: with its back to a wall, now and then turned into the room, or on open floor."""
-    if room.chance(0.6):
+    group = [item for item in room.items if item.category in ("coffee_table", *SOFAS)]
+    if room.chance(0.6) or (group and category in LOUNGERS):
         for _ in range(8):
             spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
             if spot is None:
                 break
-            askew = category in ("lounge_chair", "armchair") and room.chance(0.3)
+            if group and category in LOUNGERS and not _faces(*spot, group[0]):
+                continue
+            askew = category in LOUNGERS and not group and room.chance(0.3)
             turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.3, 0.8) if askew else 0.0
             x, z = spot[0].point(spot[1], size[2] / 2 + (room.uniform(0.15, 0.3) if askew else room.uniform(0.02, 0.1)))
             if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
                 return
-    room.somewhere(category, size=size, style=style)
+    if not (group and category in LOUNGERS):
+        room.somewhere(category, size=size, style=style)
+
+
+def _faces(wall: Wall, along: float, group: Item) -> bool:
+    """Whether what stands there with its back to the wall looks towards a group."""
+    x, z = wall.point(along, 0.0)
+    dx, dz = group.x - x, group.z - z
+    return math.sin(wall.yaw) * dx + math.cos(wall.yaw) * dz > 0.3 * math.hypot(dx, dz)

@@ -63,8 +63,10 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
         per_side = 1
     if count == 6 and length > 1.9 and room.chance(0.6):
         per_side = 3
+    while per_side > 1 and (per_side - 1) * (size[0] + 0.02) > length - 0.1:
+        per_side -= 1
     tuck = room.rng.normal(0.085, 0.08)
-    spacing = max(length / per_side * room.uniform(0.85, 1.0), size[0] + 0.02)
+    spacing = max(length / per_side * room.uniform(0.85, 0.97), size[0] + 0.02)
     across = depth / 2 + size[2] / 2 - tuck
     places = []
     for side in (-1, 1):
