@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import expand
+from echomodel.objectives import add_noise, expand
 from echomodel.schedule import alpha_sigma, sampling_levels
 
 Predict = Callable[[Tensor, Tensor], Tensor]
@@ -115,21 +115,30 @@ def sample(
     known_mask: Tensor | None = None,
     generator: torch.Generator | None = None,
     progress: Progress | None = None,
+    draft: Tensor | None = None,
+    start: float = 1.0,
 ) -> Tensor:
     """Run a sampler by name.
 
     Arguments:
         x: (N, ...) start, standard normal noise.
+        draft, start: (N, ...) samples to begin with in place of nothing, and the level up to which they are drowned in
+            the noise (SDEdit, Meng et al. 2022); of the steps the share `start` is taken.
         known, known_mask: (N, ...) values and (N,) bool, nodes that keep their values from first to last.
         generator: source of the noise that `ancestral` adds.
         progress: called with (steps done, steps) after every step.
 
     Raises:
-        ValueError: the sampler is not known, or steps < 1.
+        ValueError: the sampler is not known, steps < 1, or `start` is not in (0, 1].
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
+    if not 0 < start <= 1:
+        raise ValueError(f"start is {start}, allowed: above 0, up to 1")
     levels = sampling_levels(steps)
+    if draft is not None and start < 1:
+        levels = sampling_levels(max(1, round(steps * start))) * start
+        x = add_noise(draft, x, torch.full((len(x),), start, dtype=x.dtype, device=x.device), objective)
     options = {"known": known, "known_mask": known_mask, "generator": generator, "progress": progress}
     return SAMPLERS[sampler](predict, x, levels, objective, **options)
 

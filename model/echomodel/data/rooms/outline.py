@@ -2,38 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from echomodel.data.rooms.floor import OVER_SILL, Floor, Rectangle, needed, walls_of
-from echomodel.openings import WINDOW_DEPTH, Opening, signed_area, zone
+from echomodel.data.rooms.floor import OVER_SILL, Floor, Rectangle, walls_of
+from echomodel.openings import signed_area
 
 FINEST = 0.25  # metres: cells in which slanted outlines are approximated
 MOST = 12  # corners along an axis above which an outline counts as slanted
+HEIGHT = 2.6  # metres
 BEYOND = 1.0  # metres by which what is cut away reaches out of the bounding box
 
 
-def floor_of(polygon: np.ndarray, openings: Sequence[Opening] = (), height: float = 2.6) -> Floor:
+def floor_of(polygon: np.ndarray, rows: np.ndarray, height: float = HEIGHT) -> Floor:
     """The floor of a room that already has one, about the middle of its bounding box.
 
     Arguments:
-        polygon: (k, 2) float, corners (x, z) in either turn, metres. openings: in its edges. height: metres.
+        polygon: (k, 2) float, corners (x, z) in either turn, metres.
+        rows: (o, ROW) float, doors and windows as `echomodel.openingrows` tells them.
+        height: of the room, metres.
     """
     corners = np.asarray(polygon, float)
     corners = corners - (corners.max(0) + corners.min(0)) / 2
     half_x, half_z = corners.max(0)
-    doors = [_bounds(zone(corners, o, needed(o))) for o in openings if o.kind != "window"]
-    windows = [(_bounds(zone(corners, o, WINDOW_DEPTH)), o.sill + OVER_SILL) for o in openings if o.kind == "window"]
+    before = [(_before(row), float(row[7]) + OVER_SILL, bool(row[9] > 0.5)) for row in rows]
+    doors = [rectangle for rectangle, _, window in before if not window]
+    windows = [(rectangle, top) for rectangle, top, window in before if window]
     turned = corners if signed_area(corners) > 0 else corners[::-1]
     outline = tuple((float(x), float(z)) for x, z in turned)
     return Floor(
-        float(half_x), float(half_z), outline, height, tuple(_cut_away(corners)), walls_of(outline), tuple(openings),
+        float(half_x), float(half_z), outline, height, tuple(_cut_away(corners)), walls_of(outline), (),
         tuple(doors), tuple(windows), abs(signed_area(corners)),
     )  # fmt: skip
 
 
-def _bounds(points: np.ndarray) -> Rectangle:
+def _before(row: np.ndarray) -> Rectangle:
+    """The rectangle before an opening that stays free."""
+    jambs = row[:4].reshape(2, 2)
+    points = np.concatenate([jambs, jambs + row[4:6] * row[6]])
     (x0, z0), (x1, z1) = points.min(0), points.max(0)
     return float(x0), float(z0), float(x1), float(z1)
 
