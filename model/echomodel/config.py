@@ -40,6 +40,7 @@ class LayoutConfig:
         sampler: default sampler.
         guidance: default step length of the relation guidance, 0 = off (see `echomodel.guidance`).
         guidance_rounds: its steps per call of the denoiser.
+        start: default level of noise at which sampling begins, on an arrangement by the room generator; 1 = on noise.
     """
 
     width: int = 192
@@ -52,6 +53,7 @@ class LayoutConfig:
     sampler: Sampler = "ancestral"
     guidance: float = 0.1
     guidance_rounds: int = 4
+    start: float = 1.0
 
 
 @dataclass(frozen=True)

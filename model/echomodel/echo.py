@@ -17,6 +17,8 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
 from echomodel.compact.wholeness import bearing, group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
+from echomodel.drafts import drafted
+from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener
@@ -102,6 +104,7 @@ class EchoModel:
         guidance: float = 1.0,
         relation_guidance: float | None = None,
         noise: Tensor | None = None,
+        start: float | None = None,
         progress: StepListener | None = None,
     ) -> Boxes:
         """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`.
@@ -117,6 +120,9 @@ class EchoModel:
             relation_guidance: strength of the pull of the rules' margins on the denoised boxes at every step, 0 = off,
                 None = the config's.
             noise: (N, 8) starting noise in place of the generator's.
+            start: level of noise at which sampling begins, on the room generator's arrangement of the same furniture
+                (`echomodel.drafts`), 1 = on noise alone, None = the config's. Where boxes are known or a floor is not,
+                sampling begins on noise.
             progress: called with (steps done, steps).
 
         Returns:
@@ -141,10 +147,14 @@ class EchoModel:
                 conditional, graph.triplets, scale,
                 rules=rules, strength=strength, rounds=config.layout.guidance_rounds, floor=graph.floor[graph.scene],
             )  # fmt: skip
+        begin, draft = config.layout.start if start is None else start, None
+        if begin < 1 and known is None and bool(floors_known(graph.floor).all()):
+            draft = drafted(graph, generator, rules=rules)[0].to(self.device).encode(scale)
         x = self._noise((graph.num_nodes, 8), generator, noise)
         vectors = sample(
             sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,
             known=given, known_mask=known_mask, generator=generator, progress=progress,
+            draft=draft, start=1.0 if draft is None else begin,
         )  # fmt: skip
         boxes = Boxes.decode(vectors, scale)
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
