@@ -6,14 +6,22 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from echousd.room.finished import Room
     from echousd.room.pipeline import generate
-    from echousd.room.room import Provenance, Room, RoomOptions, Verdict
+    from echousd.room.room import Provenance, RoomOptions, Verdict
 
+# `generate` needs torch, the plain data does not: each is imported on first use.
+_HOME = {
+    "Provenance": "echousd.room.room",
+    "Room": "echousd.room.finished",
+    "RoomOptions": "echousd.room.room",
+    "Verdict": "echousd.room.room",
+    "generate": "echousd.room.pipeline",
+}
 __all__ = ["Provenance", "Room", "RoomOptions", "Verdict", "generate"]
 
 
-def __getattr__(name: str) -> Any:  # `generate` needs torch, the plain data does not
-    if name not in __all__:
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
         raise AttributeError(f"module 'echousd.room' has no attribute {name!r}")
-    home = "echousd.room.pipeline" if name == "generate" else "echousd.room.room"
-    return getattr(importlib.import_module(home), name)
+    return getattr(importlib.import_module(_HOME[name]), name)

@@ -13,7 +13,7 @@ import echousd
 from echousd.room import assets, cameras, looks, materials, physics, shell
 from echousd.room.geometry import LICENCE
 from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name, shell_mesh
-from echousd.room.room import Room
+from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
@@ -33,7 +33,7 @@ class Asset:
     files: Mapping[str, bytes]
 
 
-def room_files(room: Room) -> dict[str, bytes]:
+def room_files(room: RoomData) -> dict[str, bytes]:
     """Relative path -> content of everything that a room consists of, except the preview and the manifest."""
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
@@ -56,7 +56,7 @@ def room_files(room: Room) -> dict[str, bytes]:
     return files
 
 
-def layer_data(room: Room, name: str) -> dict[str, Any]:
+def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     """The customLayerData of a layer: who made it, from what, and under which licence."""
     return {
         "asset_name": name,
@@ -67,7 +67,7 @@ def layer_data(room: Room, name: str) -> dict[str, Any]:
     }
 
 
-def geometry_layer(room: Room, shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
+def geometry_layer(room: RoomData, shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
     """`layers/geometry.usda`: every object references its asset; the shell's meshes."""
     stage = _room_stage(room, "geometry")
     root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
@@ -88,14 +88,14 @@ def geometry_layer(room: Room, shell_surfaces: Mapping[str, tuple[str, Surface]]
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
 
 
-def graph_layer(room: Room) -> Sdf.Layer:
+def graph_layer(room: RoomData) -> Sdf.Layer:
     """`layers/graph.usda`: nodes, labels and relations, as asked for."""
     layer = write_graph_layer(room.graph)
     layer.customLayerData = {**layer.customLayerData, **layer_data(room, f"{room.name}_graph")}
     return layer
 
 
-def layout_layer(room: Room) -> Sdf.Layer:
+def layout_layer(room: RoomData) -> Sdf.Layer:
     """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
     stage = _room_stage(room, "layout")
     stage.OverridePrim("/Room")
@@ -103,7 +103,7 @@ def layout_layer(room: Room) -> Sdf.Layer:
     return stage.GetRootLayer()
 
 
-def place_layouts(stage: Usd.Stage, room: Room) -> None:
+def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
     """Author the objects' xformOps (replacing those there are), as variants `layout_0` ... where there are several."""
     for name in room.names:
         prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
@@ -124,7 +124,7 @@ def place_layouts(stage: Usd.Stage, room: Room) -> None:
     variants.SetVariantSelection("layout_0")
 
 
-def physics_layer(room: Room, shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
+def physics_layer(room: RoomData, shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
     """`layers/physics.usda`."""
     stage = _room_stage(room, "physics")
     stage.OverridePrim("/Room")
@@ -142,7 +142,7 @@ def physics_layer(room: Room, shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
 
 
 def materials_layer(
-    room: Room, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]
+    room: RoomData, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]
 ) -> Sdf.Layer:
     """`layers/materials.usda`."""
     stage = _room_stage(room, "materials")
@@ -167,7 +167,7 @@ def materials_layer(
     return stage.GetRootLayer()
 
 
-def root_layer(room: Room) -> Sdf.Layer:
+def root_layer(room: RoomData) -> Sdf.Layer:
     """The root layer: metadata, sublayers, lights and cameras."""
     stage = _room_stage(room, "")
     layer = stage.GetRootLayer()
@@ -189,7 +189,7 @@ def root_layer(room: Room) -> Sdf.Layer:
     return assets.without_stage(stage, _add_sublayers)
 
 
-def room_points(room: Room) -> np.ndarray:
+def room_points(room: RoomData) -> np.ndarray:
     """(n, 3) float, metres: corners of the floor (and the walls) and of all boxes, in the frame of `/Room`."""
     size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
     plan = shell.box_corners(size, position, np.asarray(room.boxes.yaw, float))
@@ -201,7 +201,7 @@ def room_points(room: Room) -> np.ndarray:
     return np.concatenate(points)
 
 
-def room_volume(room: Room) -> cameras.Volume:
+def room_volume(room: RoomData) -> cameras.Volume:
     """Box around the floor and all furniture, metres."""
     points = room_points(room)
     return cameras.Volume(points.min(0), points.max(0))
@@ -217,7 +217,7 @@ def _add_sublayers(layer: Sdf.Layer) -> None:
     layer.subLayerPaths = [f"./layers/{name}.usda" for name in LAYERS]
 
 
-def _asset(room: Room, name: str, user: str) -> Asset:
+def _asset(room: RoomData, name: str, user: str) -> Asset:
     geometry, category = room.geometry[user], room.graph.node(user).category
     if name in room.carried:
         return Asset(name, {part.name: tuple(part.slots) for part in geometry.parts}, room.carried[name])
@@ -241,7 +241,7 @@ def _asset(room: Room, name: str, user: str) -> Asset:
     return Asset(name, slots, files)
 
 
-def _shell(room: Room) -> dict[str, tuple[str, Surface]]:
+def _shell(room: RoomData) -> dict[str, tuple[str, Surface]]:
     floor = shell.floor_mesh(room.floor)
     parts = {"Floor": ("floor", surface(floor, {"floor": np.arange(len(floor.faces))}))}
     scale = 1 / 1.6  # one picture of boards is 1.6 m
@@ -259,7 +259,7 @@ def _scaled_st(form: Surface, scale: float) -> Surface:
     return replace(form, st=(form.st * scale).astype(np.float32))
 
 
-def _place(stage: Usd.Stage, room: Room, layout: int) -> None:
+def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:
     boxes = room.layouts[layout] if room.layouts else room.boxes
     for number, name in enumerate(room.names):
         xform = UsdGeom.Xformable(stage.OverridePrim(f"{OBJECTS}/{name}"))
@@ -272,6 +272,6 @@ def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:
     UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
 
 
-def _room_stage(room: Room, layer: str) -> Usd.Stage:
+def _room_stage(room: RoomData, layer: str) -> Usd.Stage:
     name = f"{room.name}_{layer}" if layer else room.name
     return assets.new_stage("Room", ".usda", layer_data(room, name))

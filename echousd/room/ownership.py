@@ -10,14 +10,14 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 from echousd.room.folder import backup_name
 from echousd.room.journal import STAGING, digest, digest_of
 from echousd.room.paths import component_file, payload_file
-from echousd.room.room import Room
+from echousd.room.room import RoomData
 from echousd.room.styles import free_name
 from echousd.room.within import inside
 
 LAYER_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 
 
-def free_assets(folder: Path, room: Room, recorded: Mapping[str, str]) -> dict[str, str]:
+def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> dict[str, str]:
     """Object name -> asset name, where new assets keep off names whose files in `folder` are somebody else's."""
     renamed: dict[str, str] = {}
     present = {path.name for path in (folder / "assets").glob("*")} | set(room.assets.values())

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
+from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.models import check_preset, load_model
 from echousd.room.progress import Listener, StageTimer
-from echousd.room.room import Provenance, Room, RoomOptions
+from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import DEFAULT, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups

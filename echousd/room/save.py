@@ -21,12 +21,12 @@ from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
-from echousd.room.room import Room
+from echousd.room.room import RoomData
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 
 
-def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
+def save_room(room: RoomData, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
     """Write the layered room and its preview; see `Room.save`."""
     with locked(folder, wait=wait):
         root = save_layers(room, folder, force=force)
@@ -35,7 +35,7 @@ def save_room(room: Room, folder: Path, *, force: bool = False, preview: bool = 
         return root
 
 
-def save_layers(room: Room, folder: Path, *, force: bool = False) -> Path:
+def save_layers(room: RoomData, folder: Path, *, force: bool = False) -> Path:
     """Write the layers, assets and the manifest of a room; see `Room.save`.
 
     Warns of every file that is kept because somebody else wrote or edited it, and names it.
@@ -47,7 +47,7 @@ def save_layers(room: Room, folder: Path, *, force: bool = False) -> Path:
         return _save_layers(room, folder, old)
 
 
-def _save_layers(room: Room, folder: Path, old: Mapping[str, Any]) -> Path:
+def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
     recorded: dict[str, str] = dict(old.get("files", {}))
     # A folder that was renamed or copied keeps its root's name: other layers refer to it.
     room = replace(room, name=old.get("name") or identifier(folder.resolve().name))
@@ -90,7 +90,7 @@ def identifier(word: str) -> str:
     return name if not name[0].isdigit() else f"_{name}"
 
 
-def save_flat(room: Room, path: Path, *, force: bool = False) -> Path:
+def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
     """Write the room as one `.usda` or `.usdc` file without references (variants of the layout included).
 
     Raises ValueError for another ending, a file that is in the way, or a path that cannot be written.
@@ -144,7 +144,7 @@ def _drawn_by_us(path: Path) -> bool:
         return False
 
 
-def manifest_of(room: Room, files: dict[str, str]) -> dict[str, Any]:
+def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
     """What was asked for, what made the room, what became of every relation, and which files are ours."""
     kept = sum(v.state == "kept" for v in room.verdicts)
     broken = sum(v.state == "broken" for v in room.verdicts)
