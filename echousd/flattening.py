@@ -6,7 +6,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from echousd.drawables import rgb
 from echousd.packing import Package, take_assets
-from echousd.stage.read import source
+from echousd.stage.files import source
 from echousd.stage.values import check_types, given, targets
 
 

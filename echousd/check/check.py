@@ -14,7 +14,8 @@ from echousd.check.placement import Misplacement, find_misplaced
 from echousd.check.relations import Judged, judge
 from echousd.check.validity import Fault, find_faults
 from echousd.stage.encoding import StageError
-from echousd.stage.read import find_rooms, opened, source
+from echousd.stage.files import opened, source
+from echousd.stage.read import find_rooms
 
 
 @dataclass(frozen=True)

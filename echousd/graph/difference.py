@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.openings import sentence
-from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
+
+if TYPE_CHECKING:
+    from echousd.graph.scene import SceneGraph
 
 
 @dataclass(frozen=True)

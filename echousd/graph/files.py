@@ -41,7 +41,7 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
         raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    return graph_from_text(text, TEXT_FORMS[path.suffix.lower()], str(path))
+    return graph_from_text(SceneGraph, text, TEXT_FORMS[path.suffix.lower()], str(path))
 
 
 def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:

@@ -14,7 +14,7 @@ from echomodel.openings import USUAL, Opening, edge_lengths, inward_normal, numb
 from echousd.graph.consistency import GraphError
 
 if TYPE_CHECKING:
-    from echousd.graph.scene import RoomSpec
+    from echousd.graph.nodes import RoomSpec
 
 LISTS = {"doors": "door", "windows": "window", "passages": "passage"}  # key of a text -> kind
 FROM_WALL = 0.1  # metres from the corner to a door whose offset nobody says

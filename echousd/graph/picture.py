@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
+from echousd.graph.nodes import Node
 from echousd.graph.placing import HEIGHT, WIDTH, distinct, places
-from echousd.graph.scene import Node, SceneGraph
+from echousd.graph.scene import SceneGraph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.graph.scene import Relation, SceneGraph
+from echousd.graph.nodes import Relation
+from echousd.graph.scene import SceneGraph
 
 WIDTH, HEIGHT = 1.9, 0.62  # of a box, inches
 CELL = np.array([2.75, 1.6])  # what one box and the words beside it take up, inches

@@ -8,7 +8,8 @@ from typing import Any
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, check_triples
-from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.nodes import Node, Relation, RoomSpec
+from echousd.graph.scene import SceneGraph
 
 BEDS = ("double_bed", "single_bed", "kids_bed")
 SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "sofa", "loveseat_sofa", "chaise_longue_sofa")

@@ -12,7 +12,7 @@ import difflib
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import yaml
 
@@ -20,21 +20,27 @@ from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph.consistency import GraphError
 from echousd.graph.fields import IDENTIFIER, shown
+from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
-from echousd.graph.scene import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
+
+if TYPE_CHECKING:
+    from echousd.graph.scene import SceneGraph
 
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
-def graph_from_text(text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
-    """Read a graph from YAML or JSON text; raises `GraphError` as `source:line: what was found, what is allowed`."""
+def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
+    """Read a graph of class `kind` from YAML or JSON text.
+
+    Raises `GraphError` as `source:line: what was found, what is allowed`.
+    """
     try:
         located = parse_json(text) if form == "json" else parse_yaml(text)
     except GraphError as error:
         raise GraphError(_with_source(source, str(error))) from None
     try:
-        return graph_from_plain(located.data)
+        return graph_from_plain(kind, located.data)
     except GraphError as error:
         path, line = _written(located, error.about), None
         if path:
@@ -61,7 +67,7 @@ def _written(located: Located, about: Path) -> Path:
     return about
 
 
-def graph_from_plain(data: Any) -> SceneGraph:
+def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     """The graph in plain data (mappings, lists, texts, numbers) of either form; raises `GraphError`."""
     if not isinstance(data, Mapping):
         raise GraphError(f"found {shown(data)}, allowed: a mapping with {', '.join(TOP_KEYS)}")
@@ -82,7 +88,7 @@ def graph_from_plain(data: Any) -> SceneGraph:
     relations = [
         _built(Relation, _relation(entry, ("relations", i)), ("relations", i)) for i, entry in enumerate(stated or ())
     ]
-    return SceneGraph(room, tuple(nodes), tuple(relations))
+    return kind(room, tuple(nodes), tuple(relations))
 
 
 def _room(data: Mapping[str, Any]) -> RoomSpec:

@@ -3,9 +3,10 @@
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer
 from echousd.stage.foreign import foreign_graph, relations_from_boxes
-from echousd.stage.read import read_graph, read_rooms
+from echousd.stage.graphs import read_graph, write_graph
+from echousd.stage.read import read_rooms
 from echousd.stage.update import update_graph
-from echousd.stage.write import graph_layer, write_graph
+from echousd.stage.write import graph_layer
 
 __all__ = [
     "StageError",

@@ -38,6 +38,19 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     return stage
 
 
+def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:
+    """The stage itself, or the one in the file at that path."""
+    if isinstance(stage, Usd.Stage):
+        return stage
+    return open_stage(stage)
+
+
+def source(stage: Usd.Stage) -> str:
+    """What an error message calls the stage: its file, or the identifier of its anonymous root layer."""
+    layer = stage.GetRootLayer()
+    return layer.realPath or layer.identifier
+
+
 def said(error: Tf.ErrorException) -> str:
     """The most specific thing that USD says about an error, in one line."""
     texts = [str(getattr(entry, "commentary", "")).strip() for entry in error.args]

@@ -16,7 +16,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import UnknownWord, normalised, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.stage.encoding import StageError
-from echousd.stage.read import opened, source
+from echousd.stage.files import opened, source
 from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"

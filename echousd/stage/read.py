@@ -14,6 +14,7 @@ from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneG
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
+from echousd.stage.files import opened, source
 
 
 @dataclass
@@ -25,22 +26,6 @@ class RoomPrims:
     nodes: list[Usd.Prim] = field(default_factory=list)
     relations: list[Usd.Prim] = field(default_factory=list)
     openings: list[Usd.Prim] = field(default_factory=list)
-
-
-def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
-    """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
-
-    A stage without a scene graph becomes one all the same if its prims carry semantics labels and bounds
-    (`foreign_graph`). Raises StageError, and GraphError's text with the file's name, for what is not valid.
-    """
-    stage = opened(stage)
-    with values.reading(stage):
-        rooms = find_rooms(stage)
-        if rooms or room is not None:
-            return room_graph(the_room(stage, room, rooms))
-        from echousd.stage.foreign import foreign_graph
-
-        return foreign_graph(stage)
 
 
 def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
@@ -61,21 +46,6 @@ def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None =
         raise StageError(f"{source(stage)}: {len(rooms)} rooms, say which one of {paths}")
     what = f"no room {str(room)!r}" if room is not None else "no scene graph (no EchoSceneGraph prim)"
     raise StageError(f"{source(stage)}: {what}" + (f", allowed: {paths}" if rooms else ""))
-
-
-def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:
-    """The stage itself, or the one in the file at that path."""
-    if isinstance(stage, Usd.Stage):
-        return stage
-    from echousd.stage.files import open_stage
-
-    return open_stage(stage)
-
-
-def source(stage: Usd.Stage) -> str:
-    """What an error message calls the stage: its file, or the identifier of its anonymous root layer."""
-    layer = stage.GetRootLayer()
-    return layer.realPath or layer.identifier
 
 
 def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:

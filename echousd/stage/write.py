@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from pxr import Sdf, Usd
+from pxr import Sdf
 
 from echousd.stage import encoding as usd
 
@@ -33,24 +33,6 @@ def graph_layer(graph: SceneGraph, *, root: str = "/Room", identifier: str = ".u
     return layer
 
 
-def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/Room") -> None:
-    """Author `graph` at the prim path `root` of a layer, or of a stage's edit target (a variant's, too).
-
-    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`).
-    Raises StageError for a root that is no absolute prim path, nothing authored.
-    """
-    path = prim_path(root)
-    if _holds_graph(target, path):
-        from echousd.stage.update import update_graph
-
-        update_graph(target, graph, room=root)
-    elif isinstance(target, Usd.Stage):
-        edit_target = target.GetEditTarget()
-        author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))
-    else:
-        author(target, graph, path)
-
-
 def prim_path(root: str | Sdf.Path) -> Sdf.Path:
     """`root` as an absolute prim path; raises StageError."""
     text = str(root)
@@ -58,15 +40,6 @@ def prim_path(root: str | Sdf.Path) -> Sdf.Path:
     if not valid or not Sdf.Path(text).IsPrimPath() or not Sdf.Path(text).IsAbsolutePath():
         raise usd.StageError(f"room {text!r} is no prim path, allowed: an absolute path of identifiers such as /Room")
     return Sdf.Path(text)
-
-
-def _holds_graph(target: Sdf.Layer | Usd.Stage, room: Sdf.Path) -> bool:
-    if not target.GetPrimAtPath(room):
-        return False
-    from echousd.stage.read import find_rooms
-
-    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
-    return any(prims.room.GetPath() == room for prims in find_rooms(stage))
 
 
 def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:

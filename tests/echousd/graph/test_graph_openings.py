@@ -75,7 +75,7 @@ def test_faults_name_their_line(old: str, new: str, said: str) -> None:
         GraphError,
         match="^" + re.escape("room.yaml:" + said).replace("room:\\ openings:\\ ", "(room: openings: |room: )?"),
     ):
-        graph_from_text(TEXT.replace(old, new), "yaml", "room.yaml")
+        graph_from_text(SceneGraph, TEXT.replace(old, new), "yaml", "room.yaml")
 
 
 def test_a_door_into_what_is_locked() -> None:

@@ -1,0 +1,157 @@
+"""What a scene graph consists of: the room, its nodes, its relations, each frozen and checked when it is made."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from echomodel.openings import check_openings, rectangle
+from echousd.graph import fields as field
+from echousd.graph.consistency import GraphError
+
+
+class PlainModel(BaseModel):
+    """Frozen, without unknown fields, and with errors of one line."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise self._explained(fields, error) from None
+
+    @classmethod
+    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> GraphError:
+        first = error.errors(include_url=False)[0]
+        cause = first["ctx"]["error"] if first["type"] == "value_error" else None
+        message = first["msg"] if cause is None else str(cause)
+        where = ".".join(str(part) for part in first["loc"])
+        if first["type"] == "extra_forbidden":
+            message = f"unknown field, allowed: {', '.join(cls.model_fields)}"
+        about = (*first["loc"], *getattr(cause, "about", ()))
+        return GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return ""
+
+    def replaced(self, **fields: Any) -> Any:
+        """A copy with other values in `fields`, validated."""
+        return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **fields})
+
+
+class RoomSpec(PlainModel):
+    """The room: its type, and where known its floor (corners around it, or the extents of its bounding box) and height.
+
+    Arguments:
+        type: room type or an alias of one.
+        floor_polygon: at least three corners (x, z), metres.
+        size: (x, z) extents of the floor, metres; with a polygon, those of its bounding box.
+        height: metres.
+        openings: doors, windows and passages in the walls; wall i is the edge from corner i of the floor to the next,
+            of a rectangle the one at -z, +x, +z and -x.
+    """
+
+    type: field.RoomTypeWord
+    floor_polygon: field.Corners = None
+    size: field.Extents = None
+    height: field.Height = None
+    openings: field.Openings = ()
+
+    def __init__(self, type: str, **fields: Any) -> None:
+        super().__init__(type=type, **fields)
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return "room: "
+
+    @model_validator(mode="after")
+    def _agrees(self) -> RoomSpec:
+        if self.floor_polygon and self.size:
+            found = field.bounding_extents(self.floor_polygon)
+            if max(abs(a - b) for a, b in zip(found, self.size, strict=True)) > 1e-3:
+                raise ValueError(f"size is {self.size} but floor_polygon spans {found}; leave one of them out")
+        for position in range(len(self.openings)):
+            try:
+                check_openings(self.openings[: position + 1], self.corners, self.height)
+            except ValueError as error:
+                raise GraphError(str(error), ("openings", position)) from None
+        return self
+
+    @property
+    def extents(self) -> field.Point | None:
+        """(x, z) extents of the floor's bounding box in metres, None where nothing is known."""
+        return field.bounding_extents(self.floor_polygon) if self.floor_polygon else self.size
+
+    @property
+    def corners(self) -> np.ndarray | None:
+        """(k, 2) float, the floor's corners (x, z) in metres, None where nothing is known."""
+        if self.floor_polygon:
+            return np.asarray(self.floor_polygon, float)
+        return rectangle(*self.size) if self.size else None
+
+
+class Node(PlainModel):
+    """An object of the room.
+
+    Arguments:
+        name: valid USD identifier, unique in the graph.
+        category: category or an alias of one.
+        style: objects with the same style group belong together.
+        size: (x, y, z) extents in the object frame, metres, where fixed.
+        position: (x, y, z) centre of the bottom face in the room frame, metres, where fixed.
+        yaw: radians about +Y, where fixed.
+        locked: the object stays as it is when the room is generated again.
+        attributes: free data, identifiers to texts, numbers or booleans.
+    """
+
+    name: field.Name
+    category: field.CategoryWord
+    style: field.Style = None
+    size: field.Size = None
+    position: field.Position = None
+    yaw: field.Angle = None
+    locked: field.Flag = False
+    attributes: field.Attributes = Field(default_factory=dict)
+
+    def __init__(self, name: str, category: str, **fields: Any) -> None:
+        super().__init__(name=name, category=category, **fields)
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        return f"object {field.shown(fields['name'])}: "
+
+
+class Relation(PlainModel):
+    """`subject predicate object`, such as bed left wardrobe: the bed is left of the wardrobe in the room's frame.
+
+    Arguments:
+        subject: name of a node.
+        predicate: predicate or an alias of one.
+        object: name of another node.
+        confidence: 0 to 1.
+    """
+
+    subject: field.Name
+    predicate: field.PredicateWord
+    object: field.Name
+    confidence: field.Confidence = 1.0
+
+    def __init__(self, subject: str, predicate: str, object: str, confidence: float = 1.0, **fields: Any) -> None:
+        super().__init__(subject=subject, predicate=predicate, object=object, confidence=confidence, **fields)
+
+    @classmethod
+    def _title(cls, fields: dict[str, Any]) -> str:
+        said = " ".join(str(fields[part]) for part in ("subject", "predicate", "object"))
+        return f"relation {field.shown(said)}: "
+
+    @property
+    def triple(self) -> tuple[str, str, str]:
+        """(subject, predicate, object)."""
+        return self.subject, self.predicate, self.object
+
+    def __str__(self) -> str:
+        return " ".join(self.triple)

@@ -1,0 +1,52 @@
+"""Graphs in and out of any stage: ours or somebody else's to read, empty or with a graph already to write."""
+
+from __future__ import annotations
+
+import os
+
+from pxr import Sdf, Usd
+
+from echousd.graph import SceneGraph
+from echousd.stage import values
+from echousd.stage.files import opened
+from echousd.stage.foreign import foreign_graph
+from echousd.stage.read import find_rooms, room_graph, the_room
+from echousd.stage.update import update_graph
+from echousd.stage.write import author, prim_path
+
+
+def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
+    """The scene graph on a stage or in a file; `room` is the prim path of the room, needed where there are several.
+
+    A stage without a scene graph becomes one all the same if its prims carry semantics labels and bounds
+    (`foreign_graph`). Raises StageError, and GraphError's text with the file's name, for what is not valid.
+    """
+    stage = opened(stage)
+    with values.reading(stage):
+        rooms = find_rooms(stage)
+        if rooms or room is not None:
+            return room_graph(the_room(stage, room, rooms))
+        return foreign_graph(stage)
+
+
+def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/Room") -> None:
+    """Author `graph` at the prim path `root` of a layer, or of a stage's edit target (a variant's, too).
+
+    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`).
+    Raises StageError for a root that is no absolute prim path, nothing authored.
+    """
+    path = prim_path(root)
+    if _holds_graph(target, path):
+        update_graph(target, graph, room=root)
+    elif isinstance(target, Usd.Stage):
+        edit_target = target.GetEditTarget()
+        author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))
+    else:
+        author(target, graph, path)
+
+
+def _holds_graph(target: Sdf.Layer | Usd.Stage, room: Sdf.Path) -> bool:
+    if not target.GetPrimAtPath(room):
+        return False
+    stage = target if isinstance(target, Usd.Stage) else Usd.Stage.Open(target)
+    return any(prims.room.GetPath() == room for prims in find_rooms(stage))

@@ -1,0 +1,84 @@
+"""One direction of imports: no circle, and every package knows only those below it."""
+
+import ast
+from pathlib import Path
+
+import networkx
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# package -> what it must not import, in a function or above it (imports for type hints alone are none)
+FORBIDDEN = {
+    "echomodel": ("echousd", "pxr", "typer", "rich"),
+    "echousd.graph": ("pxr", "torch", "echousd.stage", "echousd.repair", "echousd.room", "echousd.check"),
+    "echousd.stage": ("torch", "echousd.repair", "echousd.room", "echousd.check", "echousd.cli", "typer", "rich"),
+    "echousd.repair": ("pxr", "echousd.stage", "echousd.room", "echousd.check", "echousd.cli", "typer", "rich"),
+    "echousd.check": ("echousd.room", "echousd.cli", "typer", "rich"),
+    "echousd.room": ("echousd.check", "echousd.cli", "typer", "rich"),
+    "echousd.export": ("echousd.room", "echousd.cli"),
+}
+
+
+def modules():
+    """Module name -> path, of both packages."""
+    found = {}
+    for folder, package in ((ROOT, "echousd"), (ROOT / "model", "echomodel")):
+        for path in (folder / package).rglob("*.py"):
+            found[".".join(path.relative_to(folder).with_suffix("").parts).removesuffix(".__init__")] = path
+    return found
+
+
+def imported(path):
+    """Names of the modules and objects that a file imports, wherever it does, except for type hints alone."""
+    tree = ast.parse(path.read_text("utf-8"))
+    hints = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for part in node.body
+        for inner in ast.walk(part)
+    }
+    names = set()
+    for node in ast.walk(tree):
+        if id(node) in hints:
+            continue
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+@pytest.fixture(scope="module")
+def imports():
+    return {module: imported(path) for module, path in modules().items()}
+
+
+def test_no_circle(imports):
+    graph = networkx.DiGraph()
+    for module, names in imports.items():
+        for name in names:
+            target = name if name in imports else name.rpartition(".")[0]
+            if target in imports:
+                graph.add_edge(module, target)
+    assert graph.number_of_edges() > 300
+    assert [sorted(group) for group in networkx.strongly_connected_components(graph) if len(group) > 1] == []
+
+
+@pytest.mark.parametrize("package", FORBIDDEN)
+def test_packages_know_only_those_below(imports, package):
+    wrong = [
+        f"{module} imports {name}"
+        for module, names in imports.items()
+        if f"{module}.".startswith(f"{package}.")
+        for name in sorted(names)
+        if f"{name}.".startswith(tuple(f"{other}." for other in FORBIDDEN[package]))
+    ]
+    assert wrong == []
+
+
+def test_a_hint_is_no_import_and_a_function_hides_none(tmp_path):
+    path = tmp_path / "module.py"
+    path.write_text("if TYPE_CHECKING:\n    from a import b\n\ndef f():\n    from c import d\n    import e.f\n")
+    assert imported(path) == {"c.d", "e.f"}
