@@ -64,7 +64,7 @@ def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
         (("-o", "{tmp}/room", "--preset", "huge"), "preset is 'huge', allowed: compact, paper, released"),
         (("-o", "{tmp}/room", "--preset", "released"), "convert a published checkpoint (echousd convert) and name"),
         (("-o", "{tmp}/room", "--preset", "paper"), "no weights ship for the preset 'paper': train it and name the"),
-        (("-o", "{tmp}/room", "--shapes", "lego"), "shapes is 'lego', allowed: sdf, boxes"),
+        (("-o", "{tmp}/room", "--shapes", "lego"), "shapes is 'lego', allowed: parts, sdf, boxes"),
         (("-o", "{tmp}/room", "--crate-version", "12"), "crate version is '12', allowed: 0.7.0 and newer"),
     ],
 )

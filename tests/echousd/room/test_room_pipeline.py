@@ -129,7 +129,7 @@ class Empty(StandIn):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: sdf, boxes"),
+        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: parts, sdf, boxes"),
         ({"samples": 0}, "samples is 0, allowed: 1 to 1000"),
         ({"seed": -1}, "seed is -1, allowed: 0 to 9223372036854775807"),
         ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),

@@ -119,7 +119,7 @@ def test_a_source_refuses_a_model_before_the_long_work(slabs):
 
 
 def test_unknown_sources_are_named():
-    with pytest.raises(ValueError, match="shapes is 'lego', allowed: sdf, boxes"):
+    with pytest.raises(ValueError, match="shapes is 'lego', allowed: parts, sdf, boxes"):
         sources.shape_source("lego")
 
 
