@@ -12,6 +12,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
+from echousd.graph.floors import with_plan_of
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
@@ -48,7 +49,8 @@ def edit(
 
     Arguments:
         root: root layer of a room that `generate` made.
-        graph: what its graph (`read_room(root).graph`) shall become.
+        graph: what its graph (`read_room(root).graph`) shall become; a floor or openings that it leaves open stay
+            those of the room.
         seed: of the new randomness.
         shapes, model, repair, steps, faces, progress: as for `generate`.
 
@@ -59,6 +61,7 @@ def edit(
     source, timer = shape_source(shapes), StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(root)
+    graph = with_plan_of(graph, saved.graph)
     fresh, moving = touched(saved.graph, graph)
     styles = style_groups(graph)
     model_used: RoomModel | None = None

@@ -83,6 +83,15 @@ def room_floor(graph: SceneGraph, layouts: Sequence[Boxes]) -> np.ndarray:
     return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
 
 
+def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Size and position (n, 3), metres, and yaw (n,), radians, of the boxes of all layouts behind one another."""
+    size, position, yaw = (
+        np.concatenate([np.asarray(getattr(boxes, name), float) for boxes in layouts])
+        for name in ("size", "position", "yaw")
+    )
+    return size, position, yaw
+
+
 def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], judged_by: Boxes | None = None) -> Boxes:
     names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
     free = np.array([node.size is None and not node.locked for node in graph.nodes])

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
+from echousd.graph.doors import check_doors
+from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
-from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.layouts import finished_boxes, plan_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.models import check_preset, load_model
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
+from echousd.room.shell import box_corners
 from echousd.room.sources import DEFAULT, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
@@ -38,6 +41,9 @@ def generate(
     progress: Listener | None = None,
 ) -> Room:
     """Make a room from a scene graph.
+
+    A floor that nobody stated is proposed before the layout is drawn, and doors and windows that nobody stated are
+    placed where no furniture stands; both are in the room's graph and stay when it is generated again.
 
     Arguments:
         graph: the graph, or a file that holds one (stage, YAML, JSON).
@@ -74,6 +80,10 @@ def generate(
     with timer.stage("load"):
         echo = load_model(model, preset)
         source.check(echo)
+    check_doors(graph)
+    crowded = check_space(graph)
+    proposed = with_floor(graph, seed)
+    free, graph = proposed is not graph, proposed
     styles = style_groups(graph)
     sampled = sample_boxes(echo, graph, seed=seed, number=0, steps=steps, timer=timer)
     boxes, notes = finished_boxes(graph, sampled, styles, repair, timer)
@@ -83,6 +93,10 @@ def generate(
         found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, timer=timer)
         found = Boxes(boxes.size, found.position, found.yaw)
         layouts.append(finished_boxes(sized, found, styles, repair, timer)[0])
+    plan = plan_boxes(layouts)
+    if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
+        graph = with_wider_floor(graph, box_corners(*plan))
+    graph = with_placed_openings(graph, plan, seed)
     made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
     return Room(
         name=graph.room.type,
@@ -93,7 +107,7 @@ def generate(
         floor=room_floor(graph, layouts),
         verdicts=relation_verdicts(graph, boxes),
         layouts=tuple(layouts),
-        notes=notes,
+        notes=(*crowded, *notes),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=options or RoomOptions(),
         timings=timer.seconds,

@@ -1,0 +1,121 @@
+"""Floors and openings of graphs that state none, and floors that cannot hold their furniture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echousd.graph.consistency import GraphError
+
+if TYPE_CHECKING:
+    from echousd.graph.scene import SceneGraph
+
+HEIGHT = 2.8  # metres, of rooms that state none
+CROWDED = 0.62  # share of the floor, from which on a person is told
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
+    """The graph with the floor that such a room would have, where it states none and fixes no object's place.
+
+    The same seed and graph give the same floor. More objects in a row to the left and right than to the front and
+    behind make the room wider than deep.
+    """
+    from echomodel.plans import floor_extents
+
+    if graph.room.extents is not None or any(node.position is not None for node in graph.nodes):
+        return graph
+    said = [relation.predicate for relation in graph.relations]
+    aside = sum(predicate in ("left", "right") for predicate in said)
+    ahead = sum(predicate in ("front", "behind") for predicate in said)
+    extents = floor_extents(
+        graph.room.type,
+        [node.category for node in graph.nodes],
+        [node.size for node in graph.nodes],
+        _generator(seed, "floor"),
+        along_x=(1 + ahead) / (2 + ahead + aside),
+        openings=graph.room.openings,
+    )
+    return graph.replaced(room=graph.room.replaced(size=extents))
+
+
+def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
+    """The graph with its rectangular floor made large enough for corners (n, 2) of furniture, x and z in metres."""
+    size = graph.room.size
+    if size is None or graph.room.floor_polygon or not len(corners):
+        return graph
+    needed = 2 * np.abs(corners).max(0)
+    if (needed <= np.array(size) + 1e-3).all():
+        return graph
+    x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
+    return graph.replaced(room=graph.room.replaced(size=(x, z)))
+
+
+def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
+    """The graph with a door and windows where it states no opening, placed where none of the furniture stands.
+
+    Arguments:
+        graph: with a floor; without one it comes back as it is.
+        boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all layouts.
+        seed: decides between places that are equally good.
+    """
+    from echomodel.plans import place_openings
+
+    corners = graph.room.corners
+    if graph.room.openings or corners is None:
+        return graph
+    placed = place_openings(corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes)
+    return graph.replaced(room=graph.room.replaced(openings=placed))
+
+
+def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:
+    """The graph with floor and openings of an earlier one where it states none of its own."""
+    room, old = graph.room, before.room
+    if room.extents is None and old.extents is not None:
+        room = room.replaced(floor_polygon=old.floor_polygon, size=old.size)
+    same = room.corners is not None and old.corners is not None and np.array_equal(room.corners, old.corners)
+    if not room.openings and same:
+        room = room.replaced(openings=old.openings)
+    return graph if room is graph.room else graph.replaced(room=room)
+
+
+def check_space(graph: SceneGraph) -> tuple[str, ...]:
+    """A sentence where the furniture leaves hardly a way through the floor that the graph states.
+
+    Raises `GraphError` where the furniture cannot fit: its least footprint covers more than the floor, or one piece of
+    a stated size is longer than the room.
+    """
+    from echomodel.plans import footprint
+
+    corners, extents = graph.room.corners, graph.room.extents
+    if corners is None or extents is None:
+        return ()
+    from echomodel.openings import signed_area
+
+    area = abs(signed_area(corners))
+    said = f"the floor of {extents[0]:.2f} x {extents[1]:.2f} m ({area:.1f} m²)"
+    diagonal = float(np.hypot(*extents))
+    for node in graph.nodes:
+        if node.size and max(node.size[0], node.size[2]) > diagonal:
+            raise GraphError(
+                f"{said} is too small for {node.name!r}, which is {max(node.size[0], node.size[2]):.2f} m long; "
+                f"allowed: up to {diagonal:.2f} m, corner to corner",
+                ("room",),
+            )
+    categories, sizes = [n.category for n in graph.nodes], [n.size for n in graph.nodes]
+    least = footprint(categories, sizes, least=True)
+    if least > area:
+        raise GraphError(
+            f"{said} is too small for its furniture, which covers at least {least:.1f} m²; allowed: a larger floor, "
+            "fewer or smaller objects",
+            ("room",),
+        )
+    usual = footprint(categories, sizes)
+    if usual > CROWDED * area:
+        return (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways",)
+    return ()
+
+
+def _generator(seed: int, what: str) -> np.random.Generator:
+    return np.random.default_rng([seed, *what.encode()])

@@ -1,0 +1,57 @@
+"""Floors of graphs: proposed where nobody states one, and errors for those that cannot hold their furniture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_plan_of
+
+GRAPH = SceneGraph(
+    "bedroom",
+    (Node("bed", "double_bed"), Node("left", "nightstand"), Node("right", "nightstand"), Node("wardrobe", "wardrobe")),
+    (Relation("left", "left", "bed"), Relation("right", "right", "bed")),
+)
+NOTHING = (np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+def test_a_floor_is_proposed_once_and_follows_the_seed() -> None:
+    made = [with_floor(GRAPH, seed) for seed in range(6)]
+    assert made[2] == with_floor(GRAPH, 2)
+    assert len({graph.room.size for graph in made}) > 3
+    assert with_floor(made[0], 5) is made[0]
+    stated = GRAPH.replaced(room=RoomSpec("bedroom", size=(3, 3)))
+    assert with_floor(stated, 1) is stated
+    placed = GRAPH.update_node("bed", position=(5.0, 0.0, 1.0))
+    assert with_floor(placed, 1) is placed
+
+
+def test_openings_are_placed_where_none_is_stated() -> None:
+    graph = with_placed_openings(with_floor(GRAPH, 1), NOTHING, 1)
+    assert {opening.kind for opening in graph.room.openings} == {"door", "window"}
+    assert with_placed_openings(graph, NOTHING, 2) is graph
+    assert with_placed_openings(GRAPH, NOTHING, 1) is GRAPH
+
+
+def test_the_plan_of_an_earlier_graph_stays() -> None:
+    before = with_placed_openings(with_floor(GRAPH, 1), NOTHING, 1)
+    assert with_plan_of(GRAPH, before) == before
+    other = GRAPH.replaced(room=RoomSpec("bedroom", size=(9, 9)))
+    assert with_plan_of(other, before) == other
+
+
+def test_floors_that_are_too_small() -> None:
+    def sized(x: float, z: float, graph: SceneGraph = GRAPH) -> SceneGraph:
+        return graph.replaced(room=RoomSpec("bedroom", size=(x, z)))
+
+    assert check_space(sized(4, 3.5)) == check_space(GRAPH) == ()
+    (said,) = check_space(sized(2.5, 2.5))
+    assert said.startswith("the floor of 2.50 x 2.50 m (6.2 m²) is small for furniture that covers about ")
+    with pytest.raises(
+        GraphError, match=r"1\.50 x 1\.50 m \(2\.2 m²\) is too small for its furniture, which covers at"
+    ):
+        check_space(sized(1.5, 1.5))
+    long = GRAPH.update_node("wardrobe", size=(6.0, 2.2, 0.6))
+    with pytest.raises(GraphError, match=r"too small for 'wardrobe', which is 6\.00 m long; allowed: up to 5\.32 m"):
+        check_space(sized(4, 3.5, long))
