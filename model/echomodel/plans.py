@@ -37,10 +37,12 @@ def footprint(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]
         row = vocabulary().category(category)
         if row.support != "floor":
             continue
-        if size is None:
+        if size is not None:
+            x, z = float(size[0]), float(size[2])
+        else:
             statistics = size_statistics(row.name)
-            size = statistics.low if least else statistics.median
-        area += float(size[0]) * float(size[2]) * (TUCKED if row.role == "seat" else 1.0)
+            x, _, z = (statistics.low if least else statistics.median).tolist()
+        area += x * z * (TUCKED if row.role == "seat" else 1.0)
     return area
 
 
