@@ -73,7 +73,7 @@ def wait_for(child: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def races(count: int, scratch: Path) -> Counter[str]:
+def races(count: int, scratch: Path, told: Counter[str]) -> None:
     """Two processes save different rooms into one folder at the same time; half the folders hold a room already."""
     rooms = [echousd.generate(GRAPH, seed=seed, shapes="boxes") for seed in (1, 2)]
     expected = set()
@@ -81,7 +81,6 @@ def races(count: int, scratch: Path) -> Counter[str]:
         save_layers(room, scratch / "alone/room")
         expected.add(bytes_of(scratch / "alone/room"))
         shutil.rmtree(scratch / "alone/room")
-    told: Counter[str] = Counter()
     for number in range(count):
         folder = scratch / f"race{number}" / "room"
         if number % 2:
@@ -103,13 +102,12 @@ def races(count: int, scratch: Path) -> Counter[str]:
         told["opens"] += opens(folder / "room.usda")
         told["exactly one writer's room"] += bytes_of(folder) in expected
         shutil.rmtree(folder.parent)
-    return told
+        told["done"] += 1
 
 
-def kills(count: int, scratch: Path) -> Counter[str]:
+def kills(count: int, scratch: Path, told: Counter[str]) -> None:
     """SIGKILL for `generate` over an old room and for `edit`, half of them while files are being written."""
     said = ["--shapes", "boxes"]
-    told: Counter[str] = Counter()
     old = scratch / "old/room"
     run(["generate", str(GRAPH), "-o", str(old), "--seed", "1", *said])
     commands = (
@@ -154,7 +152,7 @@ def kills(count: int, scratch: Path) -> Counter[str]:
         told["same bytes in the end"] += after == undisturbed[kind]
         told["left as before"] += after == before and after != undisturbed[kind]
         shutil.rmtree(folder.parent)
-    return told
+        told["done"] += 1
 
 
 def write_missing_preview(folder: Path) -> None:
@@ -178,7 +176,10 @@ def main() -> None:
         for name, count, measure in (("races", asked.races, races), ("kills", asked.kills, kills)):
             if count:
                 print(f"{count} {name}")
-                for what, often in measure(count, Path(folder)).items():
+                told: Counter[str] = Counter()
+                with contextlib.suppress(KeyboardInterrupt):  # then what was counted so far
+                    measure(count, Path(folder), told)
+                for what, often in told.items():
                     print(f"  {often:4d} {what}")
 
 

@@ -52,6 +52,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
     # A folder that was renamed or copied keeps its root's name: other layers refer to it.
     room = replace(room, name=old.get("name") or identifier(folder.resolve().name))
     room = replace(room, assets=ownership.free_assets(folder, room, recorded))
+    for left in folder.glob(f".{room.name}.png.*.partial"):  # of a run that was killed at its preview
+        left.unlink(missing_ok=True)
     files = room_files(room)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     owned = {path: folders.digest(content) for path, content in files.items()}

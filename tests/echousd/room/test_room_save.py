@@ -240,6 +240,17 @@ def test_disk_that_is_full_at_the_preview_leaves_the_room(tmp_path, monkeypatch)
     assert hashes(folder) == before
 
 
+def test_preview_that_a_killed_run_left_half_written_goes(tmp_path):
+    folder = tmp_path / "bedroom"
+    make(seed=1).save(folder, preview=False)
+    left, mine = folder / ".bedroom.png.123.partial", folder / ".notes.png.partial"
+    for path in (left, mine):
+        path.write_bytes(b"half")
+    make(seed=2).save(folder, preview=False)
+    assert not left.exists()
+    assert mine.exists()
+
+
 def test_z_up_over_an_edited_y_up_root_is_refused(tmp_path):
     folder = tmp_path / "bedroom"
     root = make(seed=1).save(folder, preview=False)
