@@ -24,9 +24,9 @@ from pathlib import Path
 from pxr import Usd
 
 import echousd
+from echomodel.loading import load_model
 from echousd.cli.main import run
 from echousd.graph import load_graph
-from echousd.room.models import load_model
 from echousd.room.save import save_layers
 
 GRAPH = Path(__file__).parents[1] / "samples/bedroom.usda"

@@ -28,10 +28,11 @@ from torch import Tensor, nn
 
 from echomodel.compact.model import load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.echo import EchoModel, pack_linear_maps
+from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.released.config import shape_unet
 from echomodel.released.frozen_shape import FrozenShape
+from echomodel.released.packed import pack_linear_maps
 from echomodel.released.shape import ShapeUNet
 
 Run = Callable[[], Tensor]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -84,9 +84,15 @@ def _model_sampler(
 
     from echomodel.boxes import Boxes
     from echomodel.echo import EchoModel
+    from echomodel.loading import load_model
     from echomodel.protocols import GraphEdit
 
-    model = EchoModel.load(weights)
+    model = load_model(weights)
+    extra: dict[str, Any] = {}
+    if isinstance(model, EchoModel):
+        extra = {"rules": rules, "guidance": guidance, "relation_guidance": relation_guidance}
+    elif guidance != 1.0 or relation_guidance is not None:
+        raise ValueError(f"--guidance and --relation-guidance are for compact weights, found: {model.preset}")
     generator = torch.Generator().manual_seed(seed)
 
     def sample(edited: EditedGraph) -> Boxes:
@@ -95,12 +101,10 @@ def _model_sampler(
             edited.graph,
             generator=generator,
             steps=steps,
-            rules=rules,
-            guidance=guidance,
-            relation_guidance=relation_guidance,
             edit=edit,
             known=edited.known,
             known_mask=edited.known_mask,
+            **extra,
         )
 
     return sample

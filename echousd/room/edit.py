@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.loading import load_model
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
-from echousd.room.models import load_model
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echomodel.boxes import Boxes
+from echomodel.loading import check_preset, load_model
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, plan_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
-from echousd.room.models import check_preset, load_model
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.shell import box_corners
@@ -52,7 +52,7 @@ def generate(
             `boxes`.
         model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
             the package.
-        preset: which kind of model it must be (`echousd.room.models.PRESETS`); None = any.
+        preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
         repair: move and size the sampled boxes as little as possible until the graph is kept.
         samples: number of layouts of the same furniture.
         steps: sampling steps, None for the model's own.

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
@@ -22,7 +22,7 @@ from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener
-from echomodel.released.packed import PackedLinear
+from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample
 from echomodel.vocabulary import vocabulary
 
@@ -418,13 +418,6 @@ def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
         touched[subject] = True
         touched[target] = True
     return touched
-
-
-def pack_linear_maps(net: nn.Module) -> None:
-    """Let every linear map inside multiply with packed weights; its parameters stay, for looking at and saving."""
-    for module in net.modules():
-        if isinstance(module, nn.Linear):
-            module.forward = PackedLinear(module.weight, module.bias)  # type: ignore[method-assign,assignment]
 
 
 def _repeated(values: Tensor | None, count: int) -> Tensor | None:

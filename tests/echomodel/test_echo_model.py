@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import pytest
 import torch
 from torch import Tensor
@@ -236,3 +238,10 @@ def test_a_batch_gives_what_single_runs_give(model: EchoModel) -> None:
         grids = model.sample_shapes(graph, boxes(len(own)), generator=seeded(), noise=own, guidance=1.5)
         torch.testing.assert_close(grids, shapes[part], rtol=1e-3, atol=1e-4)
         start += graph.num_nodes
+
+
+def test_models_pickle_with_their_packed_weights(model: EchoModel) -> None:
+    again = pickle.loads(pickle.dumps(model))
+    grids = [one.sample_shapes(bedroom(), boxes(), generator=seeded()) for one in (model, again)]
+    assert torch.equal(*grids)
+    assert set(again.model.shape.state_dict()) == set(CompactModel(model.config, STATISTICS).shape.state_dict())

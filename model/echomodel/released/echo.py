@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -90,7 +91,7 @@ class ReleasedEcho:
         """Boxes by the published 1,000 ancestral steps.
 
         Arguments:
-            steps: not used, the published schedule has one length.
+            steps: warned of and not used, the published schedule has one length.
             known, known_mask: boxes that are put in afterwards: the published sampler cannot be told of them.
             others: as `EchoModel.sample_layout`.
 
@@ -98,6 +99,8 @@ class ReleasedEcho:
             ValueError: no layout branch, no box statistics, a category without a class, or no text features.
         """
         graph = in_published_words(graph)
+        if steps is not None:
+            warnings.warn("the published layout has steps of its own, those asked for count for shapes", stacklevel=2)
         scenes, objects = self._scenes(graph)
         change = None if edit is None else self._change(graph, scenes, edit)
         whole, _ = pack_scenes(scenes)

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional as F
 
 
@@ -35,6 +35,35 @@ class PackedLinear:
         if self.packed is None:
             return F.linear(x, self.weight, self.bias)
         return torch.ops.mkldnn._linear_pointwise(x, self.packed, self.bias, "none", [], "")
+
+
+class PackedLayer(nn.Linear):
+    """A linear layer whose weights are packed for inference; its parameters stay, for looking at and saving."""
+
+    def __init__(self, layer: nn.Linear) -> None:
+        nn.Module.__init__(self)
+        self.in_features, self.out_features = layer.in_features, layer.out_features
+        self.weight, self.bias = layer.weight, layer.bias
+        self.train(layer.training)
+        self._product = PackedLinear(self.weight, self.bias)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return self._product(x)
+
+    def __getstate__(self) -> dict[str, Any]:  # packed weights are of this process
+        return {key: value for key, value in vars(self).items() if key != "_product"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._product = PackedLinear(self.weight, self.bias)
+
+
+def pack_linear_maps(net: nn.Module) -> None:
+    """Put a `PackedLayer` in the place of every linear layer inside."""
+    for module in list(net.modules()):
+        for name, layer in list(module.named_children()):
+            if type(layer) is nn.Linear:
+                setattr(module, name, PackedLayer(layer))
 
 
 @cache

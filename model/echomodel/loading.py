@@ -1,7 +1,12 @@
-"""The model that makes a room: the one that is given, or the one in a weights file."""
+"""One loader for the weights of every preset: the model that is given, or the one in a weights file.
+
+A loaded model can be pickled, but another process had better call `load_model` with the same path: each process keeps
+the last models that it loaded.
+"""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 from echomodel.protocols import RoomModel
@@ -12,24 +17,40 @@ PRESETS = ("compact", "paper", "released")
 def load_model(model: RoomModel | str | Path | None, preset: str | None = None) -> RoomModel:
     """The model itself, or the one in a weights file (None: shipped), of the kind that the file says it is.
 
+    A file that did not change since is not read again.
+
     Raises ValueError where there is none, or one of another preset than `preset`.
     """
     check_preset(model, preset)
-    from echomodel.checkpoint import is_released
-
     if model is not None and not isinstance(model, str | Path):
         found: RoomModel = model
-    elif model is not None and is_released(model):
-        from echomodel.released.echo import ReleasedEcho
-
-        found = ReleasedEcho.load(model)
     else:
-        from echomodel.echo import EchoModel
-
-        found = EchoModel.load(model)
+        path = None if model is None else Path(model).absolute()
+        found = _loaded(path, _stamp(path))
     if preset not in (None, found.preset):
         raise ValueError(f"{model}: holds a model of the preset {found.preset!r}, asked for: {preset!r}")
     return found
+
+
+@lru_cache(maxsize=2)
+def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...]) -> RoomModel:
+    from echomodel.checkpoint import is_released
+
+    if path is not None and is_released(path):
+        from echomodel.released.echo import ReleasedEcho
+
+        return ReleasedEcho.load(path)
+    from echomodel.echo import EchoModel
+
+    return EchoModel.load(path)
+
+
+def _stamp(path: Path | None) -> tuple[tuple[str, int, int], ...]:
+    """Names, sizes and times of the files, by which a change shows; the weights that ship do not change."""
+    if path is None:
+        return ()
+    files = sorted(path.glob("*.safetensors")) if path.is_dir() else [path]
+    return tuple((f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files if f.is_file())
 
 
 def check_preset(model: RoomModel | str | Path | None, preset: str | None) -> None:

@@ -1,0 +1,35 @@
+import pytest
+
+from echomodel import loading
+from echomodel.loading import load_model
+
+
+@pytest.fixture(autouse=True)
+def fresh():
+    loading._loaded.cache_clear()
+    yield
+    loading._loaded.cache_clear()
+
+
+def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
+    class Model:
+        preset = "compact"
+
+    read = []
+    monkeypatch.setattr("echomodel.echo.EchoModel.load", lambda path: read.append(path) or Model())
+    path = tmp_path / "weights.safetensors"
+    path.write_bytes(b"1")
+    first = load_model(path)
+    assert load_model(str(path)) is first
+    path.write_bytes(b"22")
+    assert load_model(path) is not first
+    assert read == [path, path]
+    assert load_model(first) is first
+
+
+def test_another_preset_is_refused():
+    class Model:
+        preset = "paper"
+
+    with pytest.raises(ValueError, match="holds a model of the preset 'paper', asked for: 'released'"):
+        load_model(Model(), "released")
