@@ -1,6 +1,7 @@
 """One direction of imports: no circle, and every package knows only those below it."""
 
 import ast
+import re
 from pathlib import Path
 
 import networkx
@@ -82,3 +83,10 @@ def test_a_hint_is_no_import_and_a_function_hides_none(tmp_path):
     path = tmp_path / "module.py"
     path.write_text("if TYPE_CHECKING:\n    from a import b\n\ndef f():\n    from c import d\n    import e.f\n")
     assert imported(path) == {"c.d", "e.f"}
+
+
+def test_the_page_on_architecture_names_files_that_there_are():
+    page = (ROOT / "docs" / "ARCHITECTURE.md").read_text("utf-8")
+    named = set(re.findall(r"`((?:echousd|echomodel|model|tests)/[\w/.]+)`", page))
+    assert len(named) > 20
+    assert [name for name in sorted(named) if not any((top / name).exists() for top in (ROOT, ROOT / "model"))] == []
