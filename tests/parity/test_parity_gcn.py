@@ -107,3 +107,26 @@ def test_manipulator_changes_a_relation() -> None:
     close(new, numbers["chg_c_b"], 1e-4)
     close(net.embed(after)[0], numbers["chg_uc_b"], 1e-6)
     assert keep.long().tolist() == numbers["chg_keep"].tolist()
+
+
+@torch.inference_mode()
+def test_change_flags_belong_to_the_nodes_in_ascending_order() -> None:
+    numbers = Numbers("manipulator")
+    net = _encoder()
+    graph = _graph(numbers, "objs", "triples", "clip_obj", "clip_rel")
+    latent, _ = net.encode(graph)
+    touched = numbers["chg_nodes"].tolist()
+    one, _, _ = net.manipulate(latent, graph, touched=touched, noise=numbers["chg_noise"])
+    for order in (sorted(touched), sorted(touched, reverse=True), [*touched, touched[0]]):
+        again, _, _ = net.manipulate(latent, graph, touched=order, noise=numbers["chg_noise"])
+        assert torch.equal(again, one)
+    # An added node behind a touched one gets the second row.
+    last = len(graph.classes) - 1
+    seen, noise = numbers["chg_noise"][:2], latent[:last]
+    late, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], noise=seen)
+    swapped, _, _ = net.manipulate(noise, graph, added=[last], touched=[0], noise=seen.flip(0))
+    assert not torch.equal(late, swapped)
+    flagged, _, _ = net.manipulate(
+        torch.cat([noise, noise.new_zeros(1, noise.shape[1])]), graph, touched=[0, last], noise=seen
+    )
+    assert torch.equal(flagged, late)

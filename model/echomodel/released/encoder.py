@@ -110,7 +110,8 @@ class GraphEncoder(nn.Module):
             added: nodes missing before, each the index that the node has before later ones are inserted; a zero
                 latent is inserted there.
             touched: ends of changed triples, in the numbering after the edit.
-            noise: (added + touched, flag) float32, change flags; drawn with `generator` when None.
+            noise: (added and touched nodes, flag) float32, change flags, a row a node in ascending order of the nodes
+                after the edit; drawn with `generator` when None.
             replace: take the manipulator's output for all nodes (published default), not for the edited ones alone.
 
         Returns:
@@ -126,7 +127,7 @@ class GraphEncoder(nn.Module):
         count = len(graph.classes)
         if len(latent) != count:
             raise ValueError(f"{len(latent)} latents with {len(places)} added nodes for a graph of {count} nodes")
-        edited = [*places, *touched]
+        edited = sorted({*places, *touched})  # the published code draws node by node
         if noise is None:
             noise = torch.randn(len(edited), config.flag, generator=generator)
         if tuple(noise.shape) != (len(edited), config.flag):
