@@ -54,6 +54,15 @@ def test_tables() -> None:
         close(getattr(tables, name), numbers[name], 0.0, relative=3e-7)
 
 
+def _drift(x: torch.Tensor) -> float:
+    """Seeded weights denoise nothing: the state grows to several hundred, and a rounding error grows with it.
+
+    Measured after 1,000 steps: 2.5e-4 of 554, some four units in the last place; allowed is twenty times as much, for
+    processors that round otherwise.
+    """
+    return max(1e-4, 1e-5 * float(x.abs().max()))
+
+
 @torch.inference_mode()
 def test_thousand_step_sampling() -> None:
     numbers = Numbers("layout_sampling")
@@ -64,10 +73,10 @@ def test_thousand_step_sampling() -> None:
     checked = 0
     for step, x in ancestral(bound, numbers["x_T"], tables, noise=lambda step: noise[top - step]):
         if f"x_after_t{step}" in numbers:
-            close(x, numbers[f"x_after_t{step}"], 1e-4 if step >= 900 else 0.02)
+            close(x, numbers[f"x_after_t{step}"], _drift(x))
             checked += 1
     assert checked == sum(name.startswith("x_after_t") for name in numbers.names)
-    close(x, numbers["out"], 0.02)
+    close(x, numbers["out"], _drift(x))
 
 
 @pytest.mark.parametrize("name", ["layout_loss", "layout_loss_notemb"])
@@ -90,3 +99,15 @@ def test_loss_and_gradients(name: str) -> None:
             break
     close(objects.grad, expected, tolerance)
     check_gradients(net, numbers.gradient_norms())
+
+
+@torch.inference_mode()
+def test_the_fast_path_is_as_exact_as_the_literal_one_where_groups_are_narrow() -> None:
+    """Four channels a group, some of them nearly equal: whoever divides by their spread otherwise ends up elsewhere."""
+    numbers = Numbers("layout_step")
+    net = _net(numbers)
+    x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
+    published = numbers["eps"]
+    slow = float((net(x, objects, triples, numbers["t"]) - published).abs().max())
+    fast = FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"])
+    assert float((fast - published).abs().max()) <= 1.5 * slow + 1e-6

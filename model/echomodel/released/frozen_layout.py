@@ -27,9 +27,12 @@ def _tap(conv: Any) -> Tensor:
 
 
 def _normalised(h: Tensor, groups: int, eps: float) -> Tensor:
-    """Group norm of (N, C) without gains: a layer norm of each group."""
-    grouped = h.reshape(len(h), groups, -1)
-    return F.layer_norm(grouped, grouped.shape[2:], eps=eps).reshape(h.shape)
+    """Group norm of (N, C) without gains.
+
+    By the published networks' own kernel: where the channels of a group are few and nearly equal, a layer norm of each
+    group divides by a variance that is rounded otherwise, and ends up to three times as far from the published numbers.
+    """
+    return F.group_norm(h, groups, eps=eps)
 
 
 @dataclass(frozen=True)
