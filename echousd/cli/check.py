@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from echousd.cli.output import plain_json, safe
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -26,7 +28,7 @@ def register(app: typer.Typer) -> None:
         if json:
             import json as text
 
-            typer.echo(text.dumps(report.to_json(), indent=2))
+            typer.echo(text.dumps(plain_json(report.to_json()), indent=2, allow_nan=False))
         else:
             _show(report)
         if not report.ok:
@@ -42,7 +44,7 @@ def _show(report) -> None:  # type: ignore[no-untyped-def]
     table = Table("", "check", "found", box=None, header_style="bold", pad_edge=False)
 
     def row(good: bool, check: str, found: str) -> None:
-        table.add_row("[green]ok[/]" if good else "[red]no[/]", check, escape(found))
+        table.add_row("[green]ok[/]" if good else "[red]no[/]", check, escape(safe(found)))
 
     unmeasured = sum(judged.margin is None for judged in report.relations)
     measured = len(report.relations) - unmeasured
@@ -56,14 +58,19 @@ def _show(report) -> None:  # type: ignore[no-untyped-def]
     row(not report.errors, "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings")
     console.print(table)
     for judged in report.broken:
-        console.print(f"  [red]broken[/]    {judged.relation} (margin {judged.margin:+.3f})", highlight=False)
+        console.print(
+            f"  [red]broken[/]    {escape(safe(str(judged.relation)))} (margin {judged.margin:+.3f})", highlight=False
+        )
     for hit in report.collisions:
-        console.print(f"  [red]collision[/] {hit.first} and {hit.second}, {hit.depth:.3f} m deep", highlight=False)
+        console.print(
+            f"  [red]collision[/] {escape(safe(f'{hit.first} and {hit.second}'))}, {hit.depth:.3f} m deep",
+            highlight=False,
+        )
     for wrong in report.placement:
         far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
-        console.print(f"  [red]placement[/] {wrong.object} is {wrong.problem}{far}", highlight=False)
+        console.print(f"  [red]placement[/] {escape(safe(wrong.object))} is {wrong.problem}{far}", highlight=False)
     for color, name, faults in (("red", "error", report.errors), ("yellow", "warning", report.warnings)):
         for fault in faults:
             console.print(
-                f"  [{color}]{name}[/] {escape(f'{fault.rule} <{fault.prim}>: {fault.message}')}", highlight=False
+                f"  [{color}]{name}[/] {escape(safe(f'{fault.rule} <{fault.prim}>: {fault.message}'))}", highlight=False
             )

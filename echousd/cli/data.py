@@ -100,7 +100,7 @@ def plot(
     rooms: Rooms,
     out: Annotated[Path, typer.Option("--out", "-o", help="Picture file.")],
     limit: Annotated[int, typer.Option(help="Number of rooms.")] = 50,
-    columns: Annotated[int, typer.Option(help="Rooms in a row.")] = 10,
+    columns: Annotated[int, typer.Option(help="Rooms in a row.", min=1, max=1000)] = 10,
     room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
     labels: Annotated[bool, typer.Option(help="Write the categories.")] = True,
 ) -> None:

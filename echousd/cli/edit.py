@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from echousd.cli.output import say
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -66,7 +68,7 @@ def register(app: typer.Typer) -> None:
                 listen("write", 1, 1)
                 preview = write_preview(root)
         for step in steps:
-            typer.echo(step)
+            say(step)
         report(made, root, preview)
 
 

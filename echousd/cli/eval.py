@@ -35,7 +35,7 @@ def layout(
     contradictions: Annotated[
         bool, typer.Option("--contradictions", help="Keep what contradicts a changed relation, as published.")
     ] = False,
-    steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
     guidance: Annotated[float, typer.Option(help="Scale of guidance towards the relations, 1 = off.")] = 1.0,
     relation_guidance: Annotated[
         float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off; default: the model's.")

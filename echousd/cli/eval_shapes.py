@@ -28,7 +28,7 @@ def shapes(
     rooms: Annotated[
         int, typer.Option(min=0, help="Rooms to fill with generated shapes; 0 = reconstruction only.")
     ] = 12,
-    steps: Annotated[int | None, typer.Option(help="Sampling steps; default the model's.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Sampling steps; default the model's.", min=1)] = None,
     seed: Annotated[int, typer.Option(help="Seed of the choice, the rooms and the sampling.")] = 0,
     per_class: Annotated[
         int, typer.Option(min=0, help="Objects to generate of every class, cleaned as in rooms; 0 = none.")

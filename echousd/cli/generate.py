@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from echousd.cli.output import say
+
 if TYPE_CHECKING:
     from echousd.room import Room
 
@@ -148,7 +150,8 @@ def set_crate_version(version: str | None) -> None:
     import os
     import re
 
-    if not re.fullmatch(r"0\.\d{1,2}\.\d", version):
+    found = re.fullmatch(r"0\.(\d{1,2})\.\d", version, re.ASCII)
+    if not found or int(found[1]) < 7:
         raise ValueError(f"crate version is {version!r}, allowed: 0.7.0 and newer, such as 0.8.0")
     os.environ["USD_WRITE_NEW_USDC_FILES_AS_VERSION"] = version
 
@@ -186,11 +189,11 @@ def report(room: Room, root: Path, preview: Path | None) -> None:
     """Say what was made and what the graph asked for in vain."""
     kept = sum(verdict.state == "kept" for verdict in room.verdicts)
     broken = [verdict for verdict in room.verdicts if verdict.state == "broken"]
-    typer.echo(f"room     {root}")
+    say(f"room     {root}")
     if preview is not None:
-        typer.echo(f"preview  {preview}")
-    typer.echo(f"graph    {len(room.names)} objects, {kept} of {kept + len(broken)} measured relations kept")
+        say(f"preview  {preview}")
+    say(f"graph    {len(room.names)} objects, {kept} of {kept + len(broken)} measured relations kept")
     for verdict in broken:
-        typer.echo(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
+        say(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
     for note in room.notes:
-        typer.echo(f"note     {note}")
+        say(f"note     {note}")

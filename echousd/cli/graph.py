@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echousd.cli.output import check_picture, safe
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -135,6 +137,7 @@ def graph(
     as_table: Annotated[bool, typer.Option("--table", help="Print tables instead of a tree.")] = False,
     png: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into a PNG file.")] = None,
     svg: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw a picture into an SVG file.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the canonical form; needs no GRAPH.")
     ] = False,
@@ -164,6 +167,7 @@ def graph(
         if path is not None:
             from echousd.graph.picture import draw_graph
 
+            check_picture(path, force=force)
             draw_graph(only, path)
             typer.echo(f"wrote {path}: {_summary(only)}", err=True)
     if as_json:
@@ -228,7 +232,7 @@ def _facts(node: Node) -> list[str]:
     if node.yaw is not None:
         facts.append(f"yaw {node.yaw:.3g}")
     facts += ["locked"] if node.locked else []
-    return facts + [f"{key}={value}" for key, value in node.attributes.items()]
+    return [safe(fact) for fact in (*facts, *(f"{key}={value}" for key, value in node.attributes.items()))]
 
 
 def _print_tree(console: Console, made: SceneGraph, path: str) -> None:

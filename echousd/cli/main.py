@@ -13,6 +13,9 @@ from typing import Any
 
 import typer
 
+from echousd.cli.numbers import bound_numbers
+from echousd.cli.output import one_line
+
 app = typer.Typer(
     name="echousd",
     help="Author indoor scenes in USD from semantic scene graphs.",
@@ -92,7 +95,9 @@ def command() -> Any:
     """The root command (a click group) with the commands of all topics."""
     for topic in TOPICS:
         importlib.import_module(f"echousd.cli.{topic}").register(app)
-    return typer.main.get_command(app)
+    root = typer.main.get_command(app)
+    bound_numbers(root)
+    return root
 
 
 def _explained(error: Exception) -> tuple[str, int]:
@@ -113,5 +118,5 @@ def _complain(message: str, code: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
     typer.secho("error:", fg="red", bold=True, err=True, nl=False)
-    typer.echo(f" {' '.join(message.split())}", err=True)
+    typer.echo(f" {one_line(message)}", err=True)
     return code

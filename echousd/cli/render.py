@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from echousd.cli.output import check_picture
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -18,16 +20,21 @@ def register(app: typer.Typer) -> None:
         view: Annotated[str, typer.Option(help="top or perspective.")] = "perspective",
         size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
         colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
+        force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     ) -> None:
         """Draw a room from above or from a corner."""
         import io
+
+        from PIL.PngImagePlugin import PngInfo
 
         from echousd.render import render_file
         from echousd.stage.files import write_whole
 
         if output.suffix.lower() != ".png":
             raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")
-        buffer = io.BytesIO()
-        render_file(room, view=view, size=size, colors=colors).save(buffer, "PNG")
+        check_picture(output, force=force)
+        buffer, mark = io.BytesIO(), PngInfo()
+        mark.add_text("Software", "echousd")
+        render_file(room, view=view, size=size, colors=colors).save(buffer, "PNG", pnginfo=mark)
         write_whole(output, buffer.getvalue())
         typer.echo(str(output))

@@ -14,6 +14,8 @@ from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 
 MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
+MAX_NODES = 5000  # of a graph
+MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
 MAX_NAME = 100  # characters: names become file names of assets
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -90,7 +92,10 @@ _corner = _numbers(2, _number, "corners [x, z], metres")
 
 
 def _corners(value: Any) -> tuple[Point, ...]:
-    corners = tuple((x, z) for x, z in (_corner(corner) for corner in _items(value)))
+    entries = tuple(_items(value))
+    if len(entries) > MAX_CORNERS:
+        raise ValueError(f"{len(entries)} corners, allowed: {MAX_CORNERS}")
+    corners = tuple((x, z) for x, z in (_corner(corner) for corner in entries))
     if len(corners) < 3 or abs(polygon_area(corners)) < 1e-6:
         raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
     from shapely import Polygon, is_valid_reason

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 from typing import Literal
 
@@ -13,7 +14,7 @@ from echousd.graph.text import graph_from_text
 
 TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 STAGE_FORMS = (".usda", ".usdc", ".usd", ".usdz")
-MAX_BYTES = 64 * 2**20
+MAX_BYTES = 8 * 2**20
 
 
 def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGraph:
@@ -33,7 +34,10 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     if path.suffix.lower() not in TEXT_FORMS:
         raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join((*TEXT_FORMS, *STAGE_FORMS))}")
     try:
-        size = path.stat().st_size
+        found = path.stat()
+        size = found.st_size
+        if not stat.S_ISREG(found.st_mode):
+            raise GraphError(f"{path}: not a regular file, allowed: a file")
         if size > MAX_BYTES:
             raise GraphError(f"{path}: {size / 2**20:.0f} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
         text = path.read_text("utf-8-sig")

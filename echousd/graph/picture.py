@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import Node
 from echousd.graph.placing import HEIGHT, WIDTH, distinct, places
@@ -82,8 +83,9 @@ def draw_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
     _draw_legend(figure, {arrow.kind for arrow in joined}, tall)
     suffix = Path(path).suffix.lower().lstrip(".")
     metadata: dict[str, Any] = {"Date": None} if suffix == "svg" else {}
-    with rc_context({"svg.hashsalt": "echousd"}):  # the same graph, the same bytes
-        figure.savefig(path, format=suffix, facecolor="white", metadata=metadata)
+    metadata |= {"Creator" if suffix in ("svg", "pdf") else "Software": "echousd"}
+    with rc_context({"svg.hashsalt": "echousd"}), whole_file(path) as beside:  # the same graph, the same bytes
+        figure.savefig(beside, format=suffix, facecolor="white", metadata=metadata)
 
 
 def _draw_node(axes: Axes, node: Node, place: np.ndarray, shrink: float) -> None:

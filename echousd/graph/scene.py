@@ -34,6 +34,8 @@ class SceneGraph(PlainModel):
     def _consistent(self) -> SceneGraph:
         if not self.nodes:
             raise ValueError("the graph is empty, allowed: at least one object")
+        if len(self.nodes) > field.MAX_NODES:
+            raise ValueError(f"the graph has {len(self.nodes)} objects, allowed: {field.MAX_NODES}")
         seen: set[str] = set()
         for position, node in enumerate(self.nodes):
             if node.name in seen:

@@ -17,6 +17,7 @@ from echousd.graph.consistency import GraphError
 from echousd.graph.fields import shown
 
 Path = tuple[str | int, ...]
+DEEPEST = 64  # lists and mappings within each other
 _RESOLVERS = {
     "null": (r"~|null|Null|NULL|", "~nN\0"),
     "bool": (r"true|True|TRUE|false|False|FALSE", "tTfF"),
@@ -28,7 +29,7 @@ _RESOLVERS = {
 }
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]  # libyaml's where it is built in
     """The safe loader with YAML 1.2's core schema."""
 
     yaml_implicit_resolvers: ClassVar[dict] = {}  # type: ignore[misc]
@@ -71,6 +72,7 @@ class Located:
 def parse_yaml(text: str) -> Located:
     """Read one YAML document; raises `GraphError` that starts with the line of the fault."""
     try:
+        _check_depth(text)
         root = yaml.compose(text, Loader=_Loader)
         lines: dict[Path, int] = {}
         return Located(None if root is None else _value(root, (), lines, set()), lines)
@@ -83,6 +85,15 @@ def parse_yaml(text: str) -> Located:
         raise GraphError(f"not YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
         raise GraphError("nested too deeply for a scene graph") from None
+
+
+def _check_depth(text: str) -> None:
+    """Raises `GraphError` for nesting beyond `DEEPEST`, on which libyaml's loader would end the process."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise GraphError("nested too deeply for a scene graph")
 
 
 def parse_json(text: str) -> Located:

@@ -25,6 +25,8 @@ from echousd.room.verdicts import relation_verdicts
 if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
+MAX_OBJECTS = 400  # of one room: repair and the layout's echoes grow faster than their number
+
 
 def generate(
     graph: SceneGraph | str | Path,
@@ -77,6 +79,8 @@ def generate(
         file = Path(graph).name
         with timer.stage("read"):
             graph = load_graph(graph)
+    if len(graph.nodes) > MAX_OBJECTS:
+        raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
     with timer.stage("load"):
         echo = load_model(model, preset)
         source.check(echo)

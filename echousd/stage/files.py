@@ -18,10 +18,18 @@ READABLE = (*WRITABLE, ".usdz")
 def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     """The stage in the file at `path`; raises StageError for a file that is missing, not USD or does not compose."""
     path = Path(path)
-    if not path.exists():
+    try:
+        there = path.exists()
+    except (OSError, ValueError) as error:
+        raise StageError(f"{path}: cannot be opened ({error})") from None
+    if not there:
         raise StageError(f"{path}: no such file")
     if path.is_dir():
         raise StageError(f"{path}: a folder, allowed: a file, {', '.join(READABLE)}")
+    if not path.is_file():
+        raise StageError(f"{path}: not a regular file, allowed: a file, {', '.join(READABLE)}")
+    if ":SDF_FORMAT_ARGS:" in str(path):
+        raise StageError(f"{path}: ':SDF_FORMAT_ARGS:' in a name ends the path for USD, allowed: another name")
     if path.suffix not in READABLE:
         raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(READABLE)}")
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well

@@ -14,7 +14,7 @@ from pxr import Gf, Tf, Usd, UsdGeom
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import UnknownWord, normalised, vocabulary
-from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.values import texts
@@ -121,7 +121,10 @@ def foreign_graph(stage: Usd.Stage | str | os.PathLike[str], room_type: str | No
             "to make one of"
         )
     kind = room_type or _room_type(room_words, [node.category for node in nodes.values()])
-    return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes.values()))
+    try:
+        return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes.values()))
+    except GraphError as error:
+        raise StageError(f"{source(stage)}: {error}") from None
 
 
 def labels(prim: Usd.Prim) -> Iterator[str]:

@@ -242,7 +242,9 @@ def load_released(path: str | os.PathLike[str]) -> nn.Module:
             config = ReleasedConfig.from_json(json.loads(metadata["config"]))
             words, bounds = json.loads(metadata["vocabulary"]), json.loads(metadata["box_statistics"])
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
-    except (SafetensorError, KeyError, json.JSONDecodeError) as error:
+    except CheckpointError:
+        raise
+    except (SafetensorError, KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
         raise CheckpointError(f"{path}: truncated, or not a converted checkpoint ({error})") from None
     model = build(config, tensors, str(path))
     if isinstance(model, ReleasedModel):

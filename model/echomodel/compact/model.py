@@ -115,13 +115,23 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         if header.get("format") != FORMAT:
             raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
         metadata[path] = header
-    first = next(iter(metadata))
-    config = _joined_config(metadata)
-    parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
-    # only a file with the layout branch knows the boxes
-    own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
-    model = CompactModel(config, BoxStatistics.from_json(json.loads(own["statistics"])), parts)
-    _fit(model, tensors, ", ".join(str(path) for path in metadata))
+    first, where = next(iter(metadata)), ", ".join(str(path) for path in metadata)
+    for key, tensor in tensors.items():
+        if not tensor.is_floating_point() or not bool(torch.isfinite(tensor).all()):
+            what = "numbers that are not finite" if tensor.is_floating_point() else f"{tensor.dtype}"
+            raise WeightsError(f"{where}: tensor {key} holds {what}, allowed: finite floating-point numbers")
+    try:
+        config = _joined_config(metadata)
+        parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
+        # only a file with the layout branch knows the boxes
+        own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
+        model = CompactModel(config, BoxStatistics.from_json(json.loads(own["statistics"])), parts)
+    except WeightsError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError, RecursionError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise WeightsError(f"{where}: malformed metadata ({type(error).__name__}: {reason})") from None
+    _fit(model, tensors, where)
     return model.to(device).eval(), digest.hexdigest()[:12]
 
 

@@ -47,6 +47,17 @@ class OptimizerConfig:
         return self.rate * warm * 0.5 * (1 + math.cos(math.pi * min(step / steps, 1.0)))
 
 
+# field, least and most: what is beyond ends the process or never ends
+BOUNDS: tuple[tuple[str, float, float], ...] = (
+    *((name, 1, 10**9) for name in ("steps", "validate_every", "save_every", "log_every")),
+    *((name, 1, 10**6) for name in ("nodes", "shapes_per_batch", "scenes")),
+    ("seed", 0, 2**63 - 1),
+    ("threads", 0, 1024),
+    ("relation_weight", 0, 10**6),
+    ("measure_weight", 0, 10**6),
+)
+
+
 @dataclass(frozen=True)
 class Recipe:
     """One training run.
@@ -95,6 +106,16 @@ class Recipe:
     model: CompactConfig = field(default_factory=CompactConfig)
     paper: PaperSizes = field(default_factory=PaperSizes)
     optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
+
+    def __post_init__(self) -> None:
+        for name, least, most in BOUNDS:
+            found = getattr(self, name)
+            if not least <= found <= most:  # NaN is neither
+                raise ValueError(f"{name} is {found}, allowed: {least} to {most}")
+        for name in ("rate", "decay", "clip", "average"):
+            found = getattr(self.optimizer, name)
+            if not 0 <= found < math.inf:
+                raise ValueError(f"optimizer.{name} is {found}, allowed: a finite number, 0 or more")
 
 
 def read_recipe(path: Path, settings: list[str] | None = None) -> Recipe:

@@ -140,8 +140,8 @@ GOOD = "room: bedroom\nobjects:\n  a: bed\n  b: lamp\n"
         (GOOD + "relations:\n  - a left b\n  - b near a\n  - b left a", "x.yaml:8: 'a left b' contradicts 'b left a'"),
         (GOOD + "relations:\n  - a left a", "x.yaml:6: relation 'a left a': an object cannot relate to itself"),
         (GOOD + "relations:\n  - {subject: a, object: b}", "x.yaml:6: relations.0 'a': predicate is missing"),
-        ("room: bedroom\nobjects: [a\n", "x.yaml:3: not YAML: while parsing a flow sequence expected"),
-        ("room: bedroom\n\tobjects: {}", "x.yaml:2: not YAML: while scanning for the next token"),
+        ("room: bedroom\nobjects: [a\n", "x.yaml:3: not YAML: while parsing a flow sequence"),
+        ("room: bedroom\n\tobjects: {}", "x.yaml:2: not YAML: while scanning"),
         ("room: &r bedroom\nobjects: {a: *r}", "x.yaml:1: YAML aliases (*name) are not read here, write the value out"),
         ("room: !!python/name:os.system", "x.yaml:1: YAML tag 'tag:yaml.org,2002:python/name:os.system' is not read"),
         ("room: bedroom\nobjects: {[1]: bed}", "x.yaml:2: a key that is a list or a mapping, allowed: text"),
@@ -173,7 +173,7 @@ def test_faults_in_yaml_name_file_and_line(tmp_path, monkeypatch, text, message)
             "x.json:3: two objects are called 'a', allowed: a name of its own for each",
         ),
         ('{"room": "study",\n "room": "bedroom"}', "x.json:2: key 'room' stands twice"),
-        ('{\t"room": "study",\t"room": "bedroom"}', "x.json: key 'room' stands twice"),
+        ('{\t"room": "study",\t"room": "bedroom"}', "x.json:1: key 'room' stands twice"),
         (
             '{"room": "study", "nodes": [{"name": "a", "category": "bed", "yaw": NaN}]}',
             "x.json:1: object 'a': yaw: found nan, allowed: a finite number",
@@ -225,7 +225,7 @@ def test_files_that_cannot_be_read(tmp_path):
         "graph.txt": "graph.txt: extension '.txt', allowed: .yaml, .yml, .json, .usda, .usdc, .usd, .usdz",
         "latin.yaml": "latin.yaml: no text in UTF-8 (byte 19)",
         "folder.yaml": "folder.yaml: is a directory, allowed: a .yaml, .yml, .json, .usda, .usdc, .usd, .usdz file",
-        "big.json": "big.json: 65 MiB, allowed: 64 MiB for a scene graph",
+        "big.json": "big.json: 65 MiB, allowed: 8 MiB for a scene graph",
     }.items():
         with pytest.raises(GraphError) as error:
             load_graph(tmp_path / name)

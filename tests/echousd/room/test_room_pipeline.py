@@ -141,3 +141,9 @@ class Empty(StandIn):
 def test_bad_arguments_are_named(arguments, text):
     with pytest.raises(ValueError, match=text):
         echousd.generate(small_graph(), **{"model": StandIn(), **arguments})
+
+
+def test_more_objects_than_a_room_may_hold_are_refused():
+    crowd = SceneGraph("living_room", tuple(Node(f"chair_{i}", "dining_chair") for i in range(401)))
+    with pytest.raises(ValueError, match="the graph: 401 objects, allowed in one room: 400"):
+        echousd.generate(crowd, model=StandIn(), shapes="boxes")
