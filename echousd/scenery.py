@@ -12,7 +12,7 @@ from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
-SHELL = ("floor", "wall", "ceiling")
+SHELL = ("floor", "wall", "ceiling", "door", "window")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,8 @@ class Scenery:
         keep = np.ones(len(self.triangles), bool)
         for number in range(int(self.wall.max(initial=-1)) + 1):
             faces = self.wall == number
-            away = self.triangles[faces].reshape(-1, 3).mean(0) - middle
+            corners = self.triangles[faces].reshape(-1, 3)
+            away = (corners.min(0) + corners.max(0)) / 2 - middle
             if (away * (eye - middle))[[0, 2]].sum() > 0:
                 keep &= ~faces
         if keep.all() or not keep.any():
@@ -101,8 +102,12 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     parts: list[dict[str, np.ndarray]] = []
     images: dict[str, tuple[int, np.ndarray]] = {}
     boxes = []
-    walls = 0
+    walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     for mesh in read_drawables(stage):
+        if mesh.category == "ceiling":  # pictures look in from above
+            continue
+        if mesh.category == "wall":
+            walls.setdefault(mesh.component, len(walls))
         count = len(mesh.triangles)
         turned = mesh.normals @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
         part = {
@@ -113,9 +118,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             "emissive": np.zeros((count, 3), np.float32),
             "gloss": np.zeros(count, np.float32),
             "texture": np.full(count, -1),
-            "wall": np.full(count, walls if mesh.category == "wall" else -1),
+            "wall": np.full(count, walls.get(mesh.component, -1)),
         }
-        walls += mesh.category == "wall"
         plain = Paint(color=class_color(mesh.category), roughness=1.0)
         for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
             part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive

@@ -56,7 +56,10 @@ def register(app: typer.Typer) -> None:
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
         faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
         up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
-        walls: Annotated[bool, typer.Option("--walls", help="Add walls around the floor.")] = False,
+        walls: Annotated[
+            bool, typer.Option("--walls/--no-walls", help="Walls around the floor, with doors and windows.")
+        ] = True,
+        ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
         atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
         repair: Annotated[
             bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
@@ -86,7 +89,7 @@ def register(app: typer.Typer) -> None:
                 from echousd.room.save import save_flat, save_layers, write_preview
             finally:
                 gc.enable()
-            options = RoomOptions(up_axis.upper(), walls, atlas)
+            options = RoomOptions(up_axis.upper(), walls, atlas, ceiling)
             imported = time.perf_counter() - started
             room = make(
                 graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,

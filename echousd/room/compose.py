@@ -10,12 +10,12 @@ import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
-from echousd.room import assets, cameras, looks, materials, physics, shell
+from echousd.room import assets, cameras, looks, materials, physics, shell, structure, walls
 from echousd.room.geometry import LICENCE
-from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name, shell_mesh
+from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name
 from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
-from echousd.room.surface import Surface, surface
+from echousd.room.surface import surface
 from echousd.room.taxonomy import ade20k
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
@@ -40,15 +40,15 @@ def room_files(room: RoomData) -> dict[str, bytes]:
     for name, user in room.asset_users.items():
         made[name] = _asset(room, name, user)
         files.update(made[name].files)
-    shell_surfaces = _shell(room)
+    built = structure.shell_prims(room)
     palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
     files["textures/floor.png"] = materials.planks(looks.floor_color(palette), seed=room.provenance.seed)
     layers = {
-        "geometry": geometry_layer(room, shell_surfaces),
+        "geometry": geometry_layer(room, built),
         "graph": graph_layer(room),
         "layout": layout_layer(room),
-        "physics": physics_layer(room, shell_surfaces),
-        "materials": materials_layer(room, made, shell_surfaces),
+        "physics": physics_layer(room, built),
+        "materials": materials_layer(room, made, built),
     }
     for name, layer in layers.items():
         files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
@@ -67,7 +67,7 @@ def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     }
 
 
-def geometry_layer(room: RoomData, shell_surfaces: Mapping[str, tuple[str, Surface]]) -> Sdf.Layer:
+def geometry_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
     """`layers/geometry.usda`: every object references its asset; the shell's meshes."""
     stage = _room_stage(room, "geometry")
     root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
@@ -77,14 +77,7 @@ def geometry_layer(room: RoomData, shell_surfaces: Mapping[str, tuple[str, Surfa
     for node in room.graph.nodes:
         prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
         _label(prim, "ade20k", ade20k(node.category))
-    for name, (kind, form) in shell_surfaces.items():
-        part = UsdGeom.Xform.Define(stage, f"{SHELL}/{name}").GetPrim()
-        Usd.ModelAPI(part).SetKind(Kind.Tokens.component)
-        low, high = form.extent
-        UsdGeom.ModelAPI.Apply(part).SetExtentsHint([Gf.Vec3f(*map(float, low)), Gf.Vec3f(*map(float, high))])
-        _label(part, "category", kind)
-        _label(part, "ade20k", ade20k(kind))
-        assets.write_mesh(stage, shell_mesh(name), form)
+    structure.write_shell(stage, built)
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
 
 
@@ -124,7 +117,7 @@ def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
     variants.SetVariantSelection("layout_0")
 
 
-def physics_layer(room: RoomData, shell_surfaces: Mapping[str, Any]) -> Sdf.Layer:
+def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
     """`layers/physics.usda`."""
     stage = _room_stage(room, "physics")
     stage.OverridePrim("/Room")
@@ -135,15 +128,13 @@ def physics_layer(room: RoomData, shell_surfaces: Mapping[str, Any]) -> Sdf.Laye
         path = f"{OBJECTS}/{node.name}"
         colliders = {f"{path}/{piece_name(asset, c.name)}": c.approximation for c in room.geometry[node.name].colliders}
         bodies.append(physics.Body(path, colliders, node.category, (x, y, z)))
-    static = [shell_mesh(name) for name in shell_surfaces]
+    static = [mesh.path for part in built for mesh in part.meshes if mesh.solid]
     physics.write_physics(stage, bodies, static)
     physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
 
 
-def materials_layer(
-    room: RoomData, made: Mapping[str, Asset], shell_surfaces: Mapping[str, tuple[str, Surface]]
-) -> Sdf.Layer:
+def materials_layer(room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
     """`layers/materials.usda`."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")
@@ -160,9 +151,8 @@ def materials_layer(
             bindings[path] = name
     boards = looks.floor_color(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"))
     table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
-    table["wall"] = looks.Look(looks.linear("ece8e1"), 0.9)
-    for name, (kind, _) in shell_surfaces.items():
-        bindings[shell_mesh(name)] = kind
+    table |= structure.LOOKS
+    bindings |= {mesh.path: mesh.look for part in built for mesh in part.meshes}
     materials.write_looks(stage, table, bindings)
     return stage.GetRootLayer()
 
@@ -197,7 +187,11 @@ def room_points(room: RoomData) -> np.ndarray:
     points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
     points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]
     if room.options.walls:
-        points.append(np.insert(room.floor, 1, room.height, axis=1))
+        points += [
+            np.insert(walls.outline(room.floor), 1, height, axis=1) for height in (-shell.THICKNESS, room.height)
+        ]
+    if room.options.ceiling:
+        points.append(np.insert(room.floor, 1, room.height + shell.THICKNESS, axis=1))
     return np.concatenate(points)
 
 
@@ -239,24 +233,6 @@ def _asset(room: RoomData, name: str, user: str) -> Asset:
         component_file(name): layer_bytes(component, ".usda"),
     }
     return Asset(name, slots, files)
-
-
-def _shell(room: RoomData) -> dict[str, tuple[str, Surface]]:
-    floor = shell.floor_mesh(room.floor)
-    parts = {"Floor": ("floor", surface(floor, {"floor": np.arange(len(floor.faces))}))}
-    scale = 1 / 1.6  # one picture of boards is 1.6 m
-    kind, form = parts["Floor"]
-    parts["Floor"] = (kind, _scaled_st(form, scale))
-    if room.options.walls:
-        for number, wall in enumerate(shell.wall_meshes(room.floor, room.height)):
-            parts[f"Wall_{number + 1}"] = ("wall", surface(wall, {"wall": np.arange(len(wall.faces))}))
-    return parts
-
-
-def _scaled_st(form: Surface, scale: float) -> Surface:
-    from dataclasses import replace
-
-    return replace(form, st=(form.st * scale).astype(np.float32))
 
 
 def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:

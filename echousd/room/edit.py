@@ -109,7 +109,12 @@ def edit(
         layouts=tuple(layouts),
         notes=notes,
         provenance=_provenance(manifest, model_used),
-        options=RoomOptions(manifest["up_axis"], manifest.get("walls", False), manifest.get("atlas", False)),
+        options=RoomOptions(
+            manifest["up_axis"],
+            manifest.get("walls", False),
+            manifest.get("atlas", False),
+            manifest.get("ceiling", False),
+        ),
         timings=timer.seconds,
         carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},
     )

@@ -36,6 +36,7 @@ class Manifest(BaseModel):
     up_axis: Literal["Y", "Z"] = "Y"
     walls: bool = False
     atlas: bool = False
+    ceiling: bool = False
     meshes: dict[str, dict[str, Any]] = {}
 
 

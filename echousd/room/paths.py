@@ -17,11 +17,6 @@ def piece_of(asset: str, prim: str) -> str | None:
     return None if piece == prim else piece
 
 
-def shell_mesh(part: str) -> str:
-    """Path of the mesh of a part of the shell."""
-    return f"{SHELL}/{part}/{piece_name(part, 'mesh')}"
-
-
 def payload_name(asset: str) -> str:
     """File name of an asset's geometry, beside its component layer."""
     return f"{asset}_geo.usdc"

@@ -25,13 +25,15 @@ class RoomOptions:
 
     Arguments:
         up_axis: `Y`, or `Z` (metadata and one rotation on the root prim; everything below stays as it is).
-        walls: add walls around the floor.
+        walls: add walls around the floor, with doors and windows in their openings.
+        ceiling: add a ceiling.
         atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
     """
 
     up_axis: str = "Y"
     walls: bool = False
     atlas: bool = False
+    ceiling: bool = False
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):

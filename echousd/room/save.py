@@ -162,6 +162,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "up_axis": room.options.up_axis,
         "walls": room.options.walls,
         "atlas": room.options.atlas,
+        "ceiling": room.options.ceiling,
         "layouts": max(len(room.layouts), 1),
         "relations": {"kept": kept, "broken": broken, "unmeasured": len(room.verdicts) - kept - broken},
         "notes": list(room.notes),

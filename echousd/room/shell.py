@@ -1,4 +1,4 @@
-"""The room's shell as meshes: the floor from its polygon, and walls around it."""
+"""The floor of a room: its corners, from the graph or around the furniture, and its slab."""
 
 from __future__ import annotations
 
@@ -48,25 +48,6 @@ def floor_mesh(polygon: np.ndarray) -> trimesh.Trimesh:
     slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
     slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] - THICKNESS, -slab.vertices[:, 1]], 1)
     return slab
-
-
-def wall_meshes(polygon: np.ndarray, height: float) -> list[trimesh.Trimesh]:
-    """One box per edge of the floor, outside the polygon, metres."""
-    walls = []
-    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along = end - start
-        length = float(np.linalg.norm(along))
-        if length < 1e-3:
-            continue
-        along = along / length
-        outward = np.array([-along[1], along[0]])
-        box = trimesh.creation.box((length + 2 * THICKNESS, height + THICKNESS, THICKNESS))
-        middle = (start + end) / 2 + outward * THICKNESS / 2
-        turn = trimesh.transformations.rotation_matrix(np.arctan2(-along[1], along[0]), (0, 1, 0))
-        turn[:3, 3] = (middle[0], (height - THICKNESS) / 2, middle[1])
-        box.apply_transform(turn)
-        walls.append(box)
-    return walls
 
 
 def box_corners(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from echomodel.vocabulary import vocabulary
 
-SHELL = {"floor": "floor", "wall": "wall"}
+SHELL = {"floor": "floor", "wall": "wall", "ceiling": "ceiling", "door": "door", "window": "windowpane"}
 
 
 def ade20k(word: str) -> str:
-    """The ADE20K class of a category of the vocabulary, of `floor` or of `wall`; raises `UnknownWord`."""
+    """The ADE20K class of a category of the vocabulary or of a part of the shell; raises `UnknownWord`."""
     return SHELL[word] if word in SHELL else vocabulary().category(word).ade20k
