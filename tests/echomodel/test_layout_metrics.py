@@ -201,6 +201,11 @@ def test_report_is_near_for_our_rooms_and_far_for_scrambled_ones():
     assert section_means(compare(rooms[:140], rooms[60:]))["all"] < 0.06
 
 
+def test_report_leaves_no_room_type_out():
+    rows = compare(generate_rooms(30, 5, room_type="study"))
+    assert {row.section for row in rows} >= {"room study", "presence study"}
+
+
 def test_a_sampler_that_miscounts_and_empty_files_are_told(rooms):
     with pytest.raises(ValueError, match=r"the sampler gave 1 boxes for \d+ nodes"):
         evaluate_layout(rooms[:3], lambda edited: Boxes(torch.ones(1, 3), torch.ones(1, 3), torch.ones(1)))

@@ -42,7 +42,7 @@ def rows_between(ours: dict, real: dict) -> Iterator[Row]:
     """Rows of two sets of figures (see `room_figures`)."""
     for kind, mine in ours["rooms"].items():
         theirs = real["rooms"].get(kind)
-        if theirs is None or kind == "study" or min(mine["rooms"], theirs["rooms"]) < LEAST:
+        if theirs is None or min(mine["rooms"], theirs["rooms"]) < LEAST:
             continue
         for name in ("area", "short", "long", "objects", "height"):
             yield _range(f"room {kind}", name, mine[name], theirs[name])

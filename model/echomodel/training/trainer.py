@@ -63,7 +63,8 @@ class Trainer:
         report: called with (step, values) whenever something is logged.
 
     Raises:
-        ValueError: `resume` without a checkpoint, or a checkpoint of another recipe or model.
+        ValueError: `resume` without a checkpoint, or a checkpoint of another stage or model; steps, rates and weights
+            of the recipe may change on the way.
     """
 
     def __init__(
