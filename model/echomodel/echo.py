@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
+from echomodel.compact.given import known_values, starting_noise
+from echomodel.compact.joined import equal_furniture, joined
 from echomodel.compact.learned import in_learned_words, unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
@@ -21,10 +22,9 @@ from echomodel.drafts import drafted
 from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
-from echomodel.protocols import GraphEdit, StepListener
+from echomodel.protocols import GraphEdit, StepListener, part_of, touched_nodes
 from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample
-from echomodel.vocabulary import vocabulary
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 
@@ -133,7 +133,7 @@ class EchoModel:
         """
         config = self.config
         graph = self._checked(graph)
-        known, known_mask = self._known(graph, known, known_mask)
+        known, known_mask = known_values(graph, known, known_mask, self.device)
         scale = self.model.statistics.scale(in_learned_words(graph, config).category)
         given = None if known is None else known.encode(scale)
         conditional = self._layout_predictor(graph, self.graph_latent(graph, edit), rules)
@@ -150,7 +150,7 @@ class EchoModel:
         begin, draft = config.layout.start if start is None else start, None
         if begin < 1 and known is None and bool(floors_known(graph.floor).all()):
             draft = drafted(graph, generator, rules=rules)[0].to(self.device).encode(scale)
-        x = self._noise((graph.num_nodes, 8), generator, noise)
+        x = starting_noise((graph.num_nodes, 8), generator, noise, self.device)
         vectors = sample(
             sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,
             known=given, known_mask=known_mask, generator=generator, progress=progress,
@@ -221,7 +221,7 @@ class EchoModel:
             raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
         boxes = boxes.to(self.device)
         boxes.check()
-        known, known_mask = self._known(graph, known, known_mask)
+        known, known_mask = known_values(graph, known, known_mask, self.device)
         given = None if known is None else self.model.shape.codes(coder.encode(known))
         equal, steps = equal_furniture(graph), steps or settings.steps
         tries = 1 if noise is not None else candidates or settings.candidates
@@ -229,14 +229,17 @@ class EchoModel:
         rounds = [min(width, tries - start) for start in range(0, tries, width)]
         grids, best = torch.empty(0), torch.empty(0)
         for number, count in enumerate(rounds):
-            starts = [self._noise((graph.num_nodes, settings.components), generator, noise) for _ in range(count)]
+            starts = [
+                starting_noise((graph.num_nodes, settings.components), generator, noise, self.device)
+                for _ in range(count)
+            ]
             if noise is None:
                 starts = [settings.temperature * x[equal] for x in starts]
             codes = sample(
                 sampler or settings.sampler, self._shape_predictor(graph, boxes.size, equal, edit, guidance, count),
                 torch.cat(starts), steps, settings.objective, known=_repeated(given, count),
                 known_mask=_repeated(known_mask, count), generator=generator,
-                progress=_part_of(progress, number, len(rounds)),
+                progress=part_of(progress, number, len(rounds)),
             )  # fmt: skip
             for draw in codes.chunk(count):
                 drawn = self._decoded(draw)
@@ -289,9 +292,9 @@ class EchoModel:
             raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
         boxes = boxes.to(self.device)
         boxes.check()
-        known, known_mask = self._known(graph, known, known_mask)
+        known, known_mask = known_values(graph, known, known_mask, self.device)
         equal, width = equal_furniture(graph), sum(settings.kinds) + settings.numbers
-        start = self._noise((graph.num_nodes, width), generator, noise)
+        start = starting_noise((graph.num_nodes, width), generator, noise, self.device)
         graph = with_whole_styles(graph, joined(graph, styles))
         bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
@@ -341,92 +344,7 @@ class EchoModel:
         graph.check()
         return graph.to(self.device)
 
-    def _known(
-        self, graph: GraphBatch, known: Any, mask: Tensor | None, check: bool = True
-    ) -> tuple[Any, Tensor | None]:
-        """Known values and their mask on the model's device, with unknown rows replaced by something harmless."""
-        if (known is None) != (mask is None):
-            raise ValueError("known and known_mask belong together, one of them is missing")
-        if known is None or mask is None:
-            return None, None
-        nodes = graph.num_nodes
-        if len(known) != nodes or tuple(mask.shape) != (nodes,) or mask.dtype != torch.bool:
-            found = f"{len(known)} values and a {tuple(mask.shape)} {mask.dtype} mask"
-            raise ValueError(f"known: {found} for a graph of {nodes} nodes, expected one of each per node (bool)")
-        known, mask = known.to(self.device), mask.to(self.device)
-        if isinstance(known, Boxes):
-            one = known.size.new_ones(())
-            filled = Boxes(
-                torch.where(mask[:, None], known.size, one),
-                torch.where(mask[:, None], known.position, 0 * one),
-                torch.where(mask, known.yaw, 0 * one),
-            )
-            filled.check()
-            return filled, mask
-        bad = ~torch.isfinite(known.flatten(1)).all(1) & mask
-        if bool(bad.any()):
-            raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
-        return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
-
-    def _noise(self, shape: tuple[int, ...], generator: torch.Generator, noise: Tensor | None) -> Tensor:
-        if noise is None:
-            return torch.randn(shape, generator=generator, device=generator.device).to(self.device)
-        if tuple(noise.shape) != shape:
-            raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
-        bad = ~torch.isfinite(noise).all(1)
-        if bool(bad.any()):
-            raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
-        return noise.to(self.device)
-
-
-def equal_furniture(graph: GraphBatch) -> Tensor:
-    """(N,) int64: for every node the first node of its class that relations of style or material join it to."""
-    triplets = graph.triplets
-    joins = torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("shape")))
-    joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
-    return _first_joined(graph.num_nodes, triplets[joins][:, [0, 2]])
-
-
-def joined(graph: GraphBatch, styles: Tensor | None = None) -> Tensor:
-    """(N,) int64: for every node the first node of its style, by relations of style and by `styles` (N,), -1 = none."""
-    triplets = graph.triplets
-    ends = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("style")))][:, [0, 2]]
-    if styles is not None:
-        styles = styles.to(triplets.device)
-        same = (styles[:, None] == styles) & (graph.scene[:, None] == graph.scene) & (styles >= 0)
-        ends = torch.cat([ends, same.nonzero()])
-    return _first_joined(graph.num_nodes, ends)
-
-
-def _first_joined(nodes: int, ends: Tensor) -> Tensor:
-    """(N,) int64: for every node the first that a chain of the pairs `ends` (E, 2) joins it to."""
-    first = torch.arange(nodes, device=ends.device)
-    while len(ends):
-        lowest = first[ends].amin(1)
-        lower = first.scatter_reduce(0, ends.flatten(), lowest.repeat_interleave(2), "amin")
-        if torch.equal(lower, first):
-            break
-        first = lower
-    return first
-
-
-def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
-    """(N,) bool: nodes that were added, and both ends of every triplet that came or went."""
-    touched = edit.added.to(graph.category.device).clone()
-    now, before = ({tuple(row) for row in triplets.tolist()} for triplets in (graph.triplets, edit.before))
-    for subject, _, target in now ^ before:
-        touched[subject] = True
-        touched[target] = True
-    return touched
-
 
 def _repeated(values: Tensor | None, count: int) -> Tensor | None:
     """(N, ...) behind itself `count` times."""
     return None if values is None else torch.cat([values] * count)
-
-
-def _part_of(progress: StepListener | None, attempt: int, tries: int) -> StepListener | None:
-    """Progress of one of several draws as progress of all."""
-    if progress is None:
-        return None
-    return lambda done, steps: progress(attempt * steps + done, tries * steps)

@@ -15,6 +15,13 @@ from echomodel.graph import GraphBatch
 StepListener = Callable[[int, int], None]  # (steps done, steps)
 
 
+def part_of(progress: StepListener | None, attempt: int, tries: int) -> StepListener | None:
+    """Progress of one of several draws as progress of all."""
+    if progress is None:
+        return None
+    return lambda done, steps: progress(attempt * steps + done, tries * steps)
+
+
 @dataclass(frozen=True, eq=False)
 class GraphEdit:
     """How a graph came about by editing another one over the same nodes (EchoScene 3.2).
@@ -26,6 +33,16 @@ class GraphEdit:
 
     before: Tensor
     added: Tensor
+
+
+def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
+    """(N,) bool: nodes that were added, and both ends of every triplet that came or went."""
+    touched = edit.added.to(graph.category.device).clone()
+    now, before = ({tuple(row) for row in triplets.tolist()} for triplets in (graph.triplets, edit.before))
+    for subject, _, target in now ^ before:
+        touched[subject] = True
+        touched[target] = True
+    return touched
 
 
 class RoomModel(Protocol):

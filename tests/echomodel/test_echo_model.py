@@ -9,12 +9,13 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.compact.joined import equal_furniture
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
-from echomodel.echo import EchoModel, equal_furniture, touched_nodes
+from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.protocols import GraphEdit
+from echomodel.protocols import GraphEdit, touched_nodes
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {

@@ -12,8 +12,8 @@ import trimesh
 
 from echomodel.boxes import Boxes
 from echomodel.checkpoint import class_names, convert, write_released
-from echomodel.echo import GraphEdit
 from echomodel.graph import GraphBatch
+from echomodel.protocols import GraphEdit
 from echomodel.released.bounds import statistics_from_bounds
 from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echomodel.released.echo import ReleasedEcho, floor_relations

@@ -16,6 +16,7 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.checkpoint import load_released
 from echomodel.graph import GraphBatch
+from echomodel.protocols import touched_nodes
 from echomodel.released.editing import pack_changes, pack_scenes
 from echomodel.released.encoder import SceneGraphTensors
 from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
@@ -191,8 +192,6 @@ class ReleasedEcho:
 
     def _change(self, graph: GraphBatch, scenes: Sequence[SceneGraphTensors], edit: GraphEdit) -> GraphChange:
         """The edit in the model's own form: the graph before without the nodes that were added."""
-        from echomodel.echo import touched_nodes
-
         changes, start = [], 0
         befores = in_published_words(replace(graph, triplets=edit.before)).unpack()
         touched = touched_nodes(graph, edit) & ~edit.added
