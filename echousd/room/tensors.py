@@ -20,6 +20,7 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         room_type=words.room_type_id(graph.room.type),
         floor=graph.room.floor_polygon or graph.room.size,
         names=[node.name for node in graph.nodes],
+        openings=graph.room.openings,
     )
 
 

@@ -12,9 +12,11 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.metrics.layout import relation_scores, size_rows, touched_triplets
+from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures, with_known_words
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
+from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
 # Predicates that an evaluation changes, and into what (SPEC: the four pairs of opposites).
@@ -50,6 +52,8 @@ class LayoutEvaluation:
     Arguments:
         rules: `strict` or `sgfront`, for labels and scores.
         drop: share of the labelled edges that the graph does not tell.
+        told: relations an object that the graph tells, of the nearest pairs first, in place of `drop`; then what a
+            person would point at is counted too.
         seed: of the dropping and the edits.
         change, add: also score after one relation per scene was turned round, after one node per scene was added.
         complete: also score with half of the true boxes given.
@@ -65,6 +69,7 @@ class LayoutEvaluation:
     complete: bool = False
     contradictions: bool = False
     scenes: int = 64
+    told: float | None = None
 
 
 def evaluate_layout(
@@ -86,16 +91,13 @@ def evaluate_layout(
         `rooms` scored, `settings`, `generation` (and `change`, `add`, `complete`): shares of relations kept per
         predicate and group, for edits also of the triplets that touch an edited (or free) node and of the others;
         `sizes`: rows per class and axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the
-        form of `room_statistics.json`.
+        form of `room_statistics.json`; with `told` also `living` and `real_living` (`living_evaluation.living_scores`).
     """
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     if not rooms:
         raise ValueError("no room with two or more known objects to evaluate")
     rng = np.random.default_rng(settings.seed)
-    labels = label_rooms(rooms, rules=settings.rules, drop=settings.drop, rng=rng)
-    graphs = [
-        GraphBatch.from_room(room, triplets=torch.from_numpy(edges)) for room, edges in zip(rooms, labels, strict=True)
-    ]
+    graphs = told_graphs(rooms, settings, rng)
     modes = ["generation"] + ["change"] * settings.change + ["add"] * settings.add + ["complete"] * settings.complete
     done, total = 0, len(rooms) * len(modes)
     out: dict = {"rooms": len(rooms), "settings": asdict(settings)}
@@ -119,7 +121,21 @@ def evaluate_layout(
                 progress(done, total)
         out[mode] = _scores(Boxes.cat(found), torch.cat(scenes), torch.cat(edits), mode, settings.rules)
     out.update(_distributions(drawn, rooms))
+    if settings.told is not None:
+        out["living"] = living_scores(drawn, [graph.triplets for graph in graphs])
+        out["real_living"] = living_scores(rooms, [graph.triplets for graph in graphs])
     return out
+
+
+def told_graphs(rooms: Sequence[RoomBoxes], settings: LayoutEvaluation, rng: np.random.Generator) -> list[GraphBatch]:
+    """The graph of each room with the relations that the settings tell of it."""
+    drop = settings.drop if settings.told is None else 0.0
+    labels = [torch.from_numpy(edges) for edges in label_rooms(rooms, rules=settings.rules, drop=drop, rng=rng)]
+    if settings.told is not None:
+        luck = torch.Generator().manual_seed(settings.seed)
+        pairs = zip(labels, rooms, strict=True)
+        labels = [told_relations(edges, room, settings.told, luck) for edges, room in pairs]
+    return [GraphBatch.from_room(room, triplets=edges) for room, edges in zip(rooms, labels, strict=True)]
 
 
 def _scores(boxes: Boxes, triplets: Tensor, touched: Tensor, mode: str, rules: str) -> dict:

@@ -47,6 +47,7 @@ def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
                 yaw=room.yaw[keep],
                 models=tuple(models[k] for k in keep),
                 styles=tuple(styles[k] for k in keep),
+                openings=room.openings,
             )
         )
     return out

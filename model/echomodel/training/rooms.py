@@ -17,12 +17,12 @@ from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
 from echomodel.openingrows import padded_rows
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rules.telling import near_first
 from echomodel.vocabulary import vocabulary
 
 PREDICATES = CompactConfig.predicates  # that the network is told; rules may measure more
 DENSE = 0.4  # share of the training rooms whose graphs tell 30 to 100 % of all relations
 UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.25, 0.2
-SELDOM = 0.3  # weight of sizes and styles among the relations that a sparse graph tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,38 +220,6 @@ def _thinned(
     chosen = ranked[place - first[of] < told[of]]
     kept[chosen[:, 0], chosen[:, 1]] = True
     return kept
-
-
-def near_first(
-    holds: Tensor, boxes: Boxes, receiver: Tensor, sender: Tensor, counts: Tensor, generator: torch.Generator
-) -> Tensor:
-    """(M, 2) int64, pair and predicate of every relation that holds, scene by scene, the nearest pairs' first.
-
-    All unordered pairs are told one relation before any is told a second; which one is drawn, places before sizes.
-
-    Arguments:
-        holds: (P, 16) bool over the ordered pairs `receiver`, `sender` (P,) of scenes with `counts` (S,) nodes.
-    """
-    found = holds.nonzero()
-    if not len(found):
-        return found
-    pair, predicate = found.unbind(1)
-    one, other = receiver[pair], sender[pair]
-    joined = torch.minimum(one, other) * len(boxes) + torch.maximum(one, other)
-    weight = torch.where((predicate >= 8) & (predicate != 12), SELDOM, 1.0)
-    luck = torch.rand(len(found), generator=generator) ** (1 / weight)
-    order = torch.argsort(luck, descending=True)
-    order = order[torch.argsort(joined[order], stable=True)]
-    new = torch.ones(len(order), dtype=torch.bool)
-    new[1:] = joined[order][1:] != joined[order][:-1]
-    place = torch.arange(len(order))
-    turn = place - torch.where(new, place, torch.zeros_like(place)).cummax(0).values
-    apart = (boxes.position[one] - boxes.position[other])[:, [0, 2]].norm(dim=1)
-    reach = boxes.size[:, [0, 2]].amin(1) / 2
-    gap = (apart - reach[one] - reach[other]).clamp_min(0)[order] * (1 + 0.3 * luck[order])
-    scene = torch.arange(len(counts)).repeat_interleave(counts)[one[order]]
-    key = scene.double() * 1e4 + turn.clamp(max=40) * 1e2 + gap.clamp(max=90)
-    return found[order[torch.argsort(key)]]
 
 
 def _told(predicates: Tensor, receiver: Tensor, sender: Tensor, counts: Tensor) -> Tensor:

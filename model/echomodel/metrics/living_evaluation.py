@@ -1,0 +1,58 @@
+"""What a person would point at in sets of rooms, how well one walks through them, and how different layouts are."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules.living import RULES, faults_of, plan_of, unreached, walk
+
+
+def living_scores(rooms: Sequence[RoomBoxes], relations: Sequence[np.ndarray]) -> dict:
+    """Faults by the living rules.
+
+    Arguments:
+        rooms: in the vocabulary's words. relations: (e, 3) int of each, what its graph tells.
+
+    Returns:
+        `per_object`, faults an object; `free_of_faults`, share of rooms without any; `walkable`, mean share of the free
+        floor that is reached from the door; `rules`, faults an object of every rule that found one.
+    """
+    found: Counter[str] = Counter()
+    free, shares, objects = 0, [], 0
+    for room, edges in zip(rooms, relations, strict=True):
+        plan = plan_of(room, room.categories, room.floor_polygon, room.openings, edges)
+        seen = faults_of(plan) + unreached(plan)
+        found.update(fault.rule for fault in seen)
+        free += not seen
+        objects += len(room)
+        walked = walk(plan)
+        if walked is not None:
+            shares.append(walked.share)
+    return {
+        "per_object": sum(found.values()) / max(objects, 1),
+        "free_of_faults": free / max(len(rooms), 1),
+        "walkable": float(np.mean(shares)) if shares else None,
+        "rules": {name: count / max(objects, 1) for name, count in found.most_common()},
+        "measured": len(RULES) + 1,
+    }
+
+
+def layout_distance(one: RoomBoxes, other: RoomBoxes) -> float:
+    """Mean distance in plan between the pieces of two layouts of the same furniture, metres; equal pieces may swap."""
+    total = 0.0
+    for word in set(one.categories):
+        mine = np.array([category == word for category in one.categories])
+        apart = np.linalg.norm(one.position[mine][:, None, [0, 2]] - other.position[mine][None][:, :, [0, 2]], axis=-1)
+        total += float(apart[linear_sum_assignment(apart)].sum())
+    return total / max(len(one), 1)
+
+
+def diversity(layouts: Sequence[RoomBoxes]) -> float:
+    """Mean distance of all pairs of layouts of one room, metres; see `layout_distance`."""
+    pairs = [(i, k) for i in range(len(layouts)) for k in range(i)]
+    return float(np.mean([layout_distance(layouts[i], layouts[k]) for i, k in pairs])) if pairs else 0.0
