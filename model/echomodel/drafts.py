@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -10,16 +12,28 @@ from echomodel.boxes import Boxes
 from echomodel.data.rooms.arranging import arranged
 from echomodel.data.rooms.floor import Floor
 from echomodel.data.rooms.outline import floor_of
-from echomodel.floors import footprint, known
+from echomodel.floors import known
 from echomodel.graph import GraphBatch
 from echomodel.rules import measured, verdicts
 from echomodel.vocabulary import vocabulary
 
 PLACED = 2.0  # relations that a piece is worth which found a place of its own
-SHUFFLES = 4  # ways in which equal pieces are dealt to the nodes
+DEALS = 4  # ways in which equal pieces are dealt to the nodes
+TOGETHER = 4  # arrangements that are drawn before they are judged
+MIRRORS = ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
 
 
-def drafted(graph: GraphBatch, generator: torch.Generator, *, rules: str, draws: int = 8) -> tuple[Boxes, Tensor]:
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """One arrangement of n pieces: (n, 3), (n, 3), (n,) float, and how many found a place of their own."""
+
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+    placed: int
+
+
+def drafted(graph: GraphBatch, generator: torch.Generator, *, rules: str, draws: int = 16) -> tuple[Boxes, Tensor]:
     """Arrange the furniture of S scenes by the groups of the room generator, on their floors.
 
     Arrangements are drawn, mirrored where they still fit the floor, and equal pieces dealt to their nodes in a few
@@ -47,62 +61,74 @@ def drafted(graph: GraphBatch, generator: torch.Generator, *, rules: str, draws:
 
 def _scene(graph: GraphBatch, rng: np.random.Generator, rules: str, draws: int) -> tuple[Boxes, float]:
     words = vocabulary()
-    categories = [words.categories[k].name for k in graph.category.tolist()]
+    category = graph.category.numpy()
+    categories = [words.categories[k].name for k in category.tolist()]
     room_type = words.room_types[int(graph.room_type[0])].name
     corners = graph.floor[0]
     floor = floor_of(corners[torch.isfinite(corners).all(1)].double().numpy(), graph.openings[0].double().numpy())
     triplets = graph.triplets[torch.isin(graph.triplets[:, 1], torch.tensor(sorted(measured(rules))))]
-    deals = SHUFFLES if len(triplets) and len(set(categories)) < len(categories) else 1
+    deals = DEALS if len(triplets) and len(set(categories)) < len(categories) else 1
+    together = TOGETHER if len(triplets) else 1
     best, most, share = None, -1.0, 1.0
-    for _ in range(draws):
-        size, position, yaw, found = arranged(categories, room_type, floor, rng)
-        drawn = Boxes(*(torch.from_numpy(part).float() for part in (size, position, yaw)))
-        fitting = [(boxes, found & _fitting(boxes, floor)) for boxes in _mirrored(drawn)]
-        fitting = [(boxes, float(fits.sum())) for boxes, fits in fitting if fits.sum() == (found & fitting[0][1]).sum()]
-        candidates = [b[_dealt(graph.category, rng)] if k else b for b, _ in fitting for k in range(deals)]
-        kept = _kept(candidates, triplets, rules)
-        merit = kept + PLACED * torch.tensor([count for _, count in fitting]).repeat_interleave(deals)
+    for start in range(0, draws, together):
+        found = []
+        for _ in range(min(together, draws - start)):
+            size, position, yaw, placed = arranged(categories, room_type, floor, rng)
+            for mirrored in _mirrored(size, position, yaw, placed, floor):
+                found += [_dealt(mirrored, category, rng) if k else mirrored for k in range(deals)]
+        kept = _kept(found, triplets, rules)
+        merit = kept + PLACED * np.array([candidate.placed for candidate in found])
         number = int(merit.argmax())
-        if float(merit[number]) > most:
-            best, most, share = candidates[number], float(merit[number]), float(kept[number]) / max(len(triplets), 1)
+        if merit[number] > most:
+            best, most, share = found[number], merit[number], float(kept[number]) / max(len(triplets), 1)
         if most >= len(triplets) + PLACED * len(categories):
             break
     assert best is not None
-    return best, share if len(triplets) else 1.0
+    return _boxes([best]), share if len(triplets) else 1.0
 
 
-def _kept(candidates: list[Boxes], triplets: Tensor, rules: str) -> Tensor:
-    """(C,) float32, how many relations each of C candidates for the boxes of a scene keeps."""
-    count, nodes = len(candidates), len(candidates[0])
-    shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
-    told = verdicts(Boxes.cat(candidates), (triplets[None] + shift).reshape(-1, 3), rules=rules)
-    return (told == 1).reshape(count, -1).sum(1).float()
-
-
-def _mirrored(boxes: Boxes) -> list[Boxes]:
-    """The boxes, and mirrored along x, along z, and both."""
+def _mirrored(
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, placed: np.ndarray, floor: Floor
+) -> list[_Candidate]:
+    """The arrangement, and its mirror images along x, along z and both that fit the floor as well."""
+    cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
+    half = np.stack([cos * size[:, 0] + sin * size[:, 2], sin * size[:, 0] + cos * size[:, 2]], 1) / 2
+    top = position[:, 1] + size[:, 1]
     out = []
-    for x, z in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
-        front = torch.atan2(x * boxes.yaw.sin(), z * boxes.yaw.cos())
-        out.append(Boxes(boxes.size, boxes.position * torch.tensor([x, 1.0, z]), front))
+    for x, z in MIRRORS:
+        there = position * [x, 1.0, z]
+        if out and not all(_fits(there[k, [0, 2]], half[k], float(top[k]), floor) for k in np.flatnonzero(placed)):
+            continue
+        out.append(_Candidate(size, there, np.arctan2(x * np.sin(yaw), z * np.cos(yaw)), int(placed.sum())))
     return out
 
 
-def _fitting(boxes: Boxes, floor: Floor) -> np.ndarray:
-    """(N,) bool, which boxes stand on the floor, out of the way of doors and windows."""
-    reach = footprint(boxes.size, boxes.position, boxes.yaw).numpy()
-    out = []
-    for (x0, z0), (x1, z1), top in zip(reach.min(1), reach.max(1), (boxes.position + boxes.size)[:, 1], strict=True):
-        before = list(floor.doors) + [w for w, height in floor.windows if top > height]
-        free = not any(x0 < b[2] and x1 > b[0] and z0 < b[3] and z1 > b[1] for b in before)
-        out.append(free and floor.holds(x0, z0, x1, z1))
-    return np.array(out)
+def _fits(middle: np.ndarray, half: np.ndarray, top: float, floor: Floor) -> bool:
+    """Whether a hull stands on the floor, out of the way of doors and windows."""
+    (x0, z0), (x1, z1) = (middle - half).tolist(), (middle + half).tolist()
+    before = [*floor.doors, *(window for window, height in floor.windows if top > height)]
+    return floor.holds(x0, z0, x1, z1) and not any(x0 < b[2] and x1 > b[0] and z0 < b[3] and z1 > b[1] for b in before)
 
 
-def _dealt(category: Tensor, rng: np.random.Generator) -> Tensor:
-    """(N,) int64, a permutation of the nodes among those of their class."""
-    order = torch.arange(len(category))
-    for number in category.unique():
-        own = (category == number).nonzero()[:, 0]
-        order[own] = own[torch.from_numpy(rng.permutation(len(own)))]
-    return order
+def _dealt(one: _Candidate, category: np.ndarray, rng: np.random.Generator) -> _Candidate:
+    """The same arrangement with the pieces of each class dealt to its nodes anew."""
+    order = np.lexsort((rng.random(len(category)), category))
+    places = np.argsort(category, kind="stable")
+    deal = np.empty(len(category), int)
+    deal[places] = order
+    return _Candidate(one.size[deal], one.position[deal], one.yaw[deal], one.placed)
+
+
+def _kept(candidates: list[_Candidate], triplets: Tensor, rules: str) -> np.ndarray:
+    """(C,) float, how many relations each of C candidates for the boxes of a scene keeps."""
+    count, nodes = len(candidates), len(candidates[0].yaw)
+    if not len(triplets):
+        return np.zeros(count)
+    shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
+    told = verdicts(_boxes(candidates), (triplets[None] + shift).reshape(-1, 3), rules=rules)
+    return (told == 1).reshape(count, -1).sum(1).double().numpy()
+
+
+def _boxes(candidates: list[_Candidate]) -> Boxes:
+    parts = ([getattr(candidate, name) for candidate in candidates] for name in ("size", "position", "yaw"))
+    return Boxes(*(torch.from_numpy(np.concatenate(part)).float() for part in parts))

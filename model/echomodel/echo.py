@@ -121,8 +121,8 @@ class EchoModel:
                 None = the config's.
             noise: (N, 8) starting noise in place of the generator's.
             start: level of noise at which sampling begins, on the room generator's arrangement of the same furniture
-                (`echomodel.drafts`), 1 = on noise alone, None = the config's. Where boxes are known or a floor is not,
-                sampling begins on noise.
+                (`echomodel.drafts`), 0 = that arrangement, 1 = on noise alone, None = the config's. Where boxes are
+                known or a floor is not, sampling begins on noise.
             progress: called with (steps done, steps).
 
         Returns:

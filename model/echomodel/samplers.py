@@ -129,13 +129,15 @@ def sample(
         progress: called with (steps done, steps) after every step.
 
     Raises:
-        ValueError: the sampler is not known, steps < 1, or `start` is not in (0, 1].
+        ValueError: the sampler is not known, steps < 1, or `start` is not in [0, 1].
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
-    if not 0 < start <= 1:
-        raise ValueError(f"start is {start}, allowed: above 0, up to 1")
+    if not 0 <= start <= 1:
+        raise ValueError(f"start is {start}, allowed: 0 to 1")
     levels = sampling_levels(steps)
+    if draft is not None and start == 0:
+        return draft
     if draft is not None and start < 1:
         levels = sampling_levels(max(1, round(steps * start))) * start
         x = add_noise(draft, x, torch.full((len(x),), start, dtype=x.dtype, device=x.device), objective)

@@ -65,7 +65,7 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
             torch.tanh(mirrored / ROUND_ABOUT), torch.tanh(mirrored / NEAR),
             larger / 2, torch.tanh(larger / RATIO),
             torch.stack([sin[j] * cos[i] - cos[j] * sin[i], cos[j] * cos[i] + sin[j] * sin[i]], 1),
-            _seen_from(boxes, i, j), _seen_from(boxes, j, i),
+            seen_from(boxes, i, j), seen_from(boxes, j, i),
             torch.tanh(_across(boxes, j, i)),
             torch.stack([(4 * (boxes.yaw[i] - boxes.yaw[j])).sin(), (4 * (boxes.yaw[i] - boxes.yaw[j])).cos()], 1),
         ],
@@ -80,7 +80,7 @@ def _across(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
     return torch.stack([cos * apart[:, 0] - sin * apart[:, 1], sin * apart[:, 0] + cos * apart[:, 1]], 1)
 
 
-def _seen_from(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
+def seen_from(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
     """Where j stands in the frame of i, the gaps between the two there, and the way from i's front to j: (P, 10)."""
     place = _across(boxes, i, j)
     turn = boxes.yaw[j] - boxes.yaw[i]
