@@ -10,8 +10,10 @@ import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from torch import Tensor
 
-    from echomodel.metrics.layout_evaluation import EditedGraph, Sampler
+    from echomodel.metrics.layout_evaluation import EditedGraph, Finish, Sampler
+    from echomodel.roomboxes import RoomBoxes
 
 eval_app = typer.Typer(help="Scores of a model: relations, sizes, collisions, shapes.", no_args_is_help=True)
 
@@ -30,6 +32,9 @@ def layout(
     complete: Annotated[bool, typer.Option("--complete", help="Also with half of the true boxes given.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the dropping, the edits and the sampling.")] = 0,
     drop: Annotated[float, typer.Option(help="Share of the relations that the graph does not tell.")] = 0.5,
+    told: Annotated[
+        float | None, typer.Option(help="Relations an object that are told, near pairs first, in place of --drop.")
+    ] = None,
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
     held_out: Annotated[bool, typer.Option("--held-out", help="Of a room set, what training does not see.")] = False,
     contradictions: Annotated[
@@ -40,6 +45,13 @@ def layout(
     relation_guidance: Annotated[
         float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off; default: the model's.")
     ] = None,
+    start: Annotated[
+        float | None,
+        typer.Option(help="Noise to begin with, on an arrangement by the room generator; 1 = noise alone."),
+    ] = None,
+    repair: Annotated[bool, typer.Option("--repair", help="Repair the layouts, as generate does.")] = False,
+    judge: Annotated[bool, typer.Option("--judge", help="Also: can a classifier tell them from true ones?")] = False,
+    seeds: Annotated[int, typer.Option(help="Also: how different are so many layouts of one graph?")] = 0,
     model: Annotated[
         str | None, typer.Option(help='Weights, or "truth" for the true boxes; default: those that ship.')
     ] = None,
@@ -47,6 +59,8 @@ def layout(
     json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
 ) -> None:
     """Label rooms by rule, have their boxes sampled from the graphs alone, and score them.
+
+    With --told, also what a person would point at (the living rules).
 
     Example: echousd eval layout --rooms rooms.json --rules sgfront --change --add
     """
@@ -57,18 +71,24 @@ def layout(
     from echousd.cli.data import load_rooms
 
     found = load_rooms(rooms, limit, held_out=held_out)
-    settings = LayoutEvaluation(rules, drop, seed, change, add, complete, contradictions)
+    settings = LayoutEvaluation(
+        rules, drop, seed, change, add, complete, contradictions, told=told, judge=judge, seeds=seeds
+    )
     console = Console(stderr=True, highlight=False)
     if model == "truth":
+        if seeds:
+            raise ValueError("--seeds compares several layouts of a room, the true one is one")
         sampler = _truth(found)
     else:
         weights = None if model is None else Path(model)
-        sampler = _model_sampler(weights, seed, rules, steps, guidance, relation_guidance)
+        extra = {"guidance": guidance, "relation_guidance": relation_guidance, "start": start}
+        sampler = _model_sampler(weights, seed, rules, steps, extra)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
-            found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total)
-        )
+            found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total),
+            _repairing(rules) if repair else None,
+        )  # fmt: skip
     if out is not None:
         out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
     if json_out:
@@ -77,9 +97,26 @@ def layout(
         _print(result, Console(highlight=False))
 
 
+def _repairing(rules: str) -> Finish:
+    """The repair of `generate`, for rooms as boxes."""
+    from dataclasses import replace
+
+    from echousd.repair.repair import repair_boxes
+
+    def finish(room: RoomBoxes, triplets: Tensor) -> RoomBoxes:
+        done = repair_boxes(
+            room.categories, room.size, room.position, room.yaw, triplets.numpy(),
+            floor_polygon=room.floor_polygon if len(room.floor_polygon) else None, height=room.height, rules=rules,
+        )  # fmt: skip
+        return replace(room, size=done.size, position=done.position, yaw=done.yaw)
+
+    return finish
+
+
 def _model_sampler(
-    weights: Path | None, seed: int, rules: str, steps: int | None, guidance: float, relation_guidance: float | None
+    weights: Path | None, seed: int, rules: str, steps: int | None, asked: dict[str, float | None]
 ) -> Sampler:
+    """Samples with the model; `asked` holds what only compact weights understand."""
     import torch
 
     from echomodel.boxes import Boxes
@@ -90,9 +127,9 @@ def _model_sampler(
     model = load_model(weights)
     extra: dict[str, Any] = {}
     if isinstance(model, EchoModel):
-        extra = {"rules": rules, "guidance": guidance, "relation_guidance": relation_guidance}
-    elif guidance != 1.0 or relation_guidance is not None:
-        raise ValueError(f"--guidance and --relation-guidance are for compact weights, found: {model.preset}")
+        extra = {"rules": rules, **asked}
+    elif asked != {"guidance": 1.0, "relation_guidance": None, "start": None}:
+        raise ValueError(f"--guidance, --relation-guidance and --start are for compact weights, found: {model.preset}")
     generator = torch.Generator().manual_seed(seed)
 
     def sample(edited: EditedGraph) -> Boxes:
@@ -152,7 +189,10 @@ def _print(result: dict, console: Console) -> None:
             parts = [cell(result[mode][name]["total"]) if name in result[mode] else "" for mode in modes]
             table.add_row(f"total, {name}", *parts, "")
     settings = result["settings"]
-    console.print(f"{result['rooms']} rooms, rules {settings['rules']}, {settings['drop']:.0%} of relations dropped")
+    told = f"{settings['drop']:.0%} of relations dropped"
+    if settings["told"] is not None:
+        told = f"{settings['told']:g} relations an object told, near pairs first"
+    console.print(f"{result['rooms']} rooms, rules {settings['rules']}, {told}")
     console.print(table)
     sizes = [row for row in result["sizes"] if row["ks"] is not None]
     if sizes:
@@ -173,3 +213,35 @@ def _print(result: dict, console: Console) -> None:
         values = (" ".join(f"{v:.2f}" for v in part) for part in (row.ours, row.real))
         table.add_row(row.section, row.name, *values, f"{row.distance:.2f}")
     console.print(table)
+    _print_rooms(result, console)
+
+
+def _print_rooms(result: dict, console: Console) -> None:
+    """What a person would point at, the judge and how different the layouts are, where they were asked for."""
+    from rich.table import Table
+
+    if "living" in result:
+        ours, real = result["living"], result["real_living"]
+        table = Table("what a person would point at", "here", "true", box=None)
+        rows = [
+            ("faults an object", "per_object"),
+            ("rooms without a fault", "free_of_faults"),
+            ("walkable", "walkable"),
+        ]
+        for text, name in rows:
+            table.add_row(text, *("-" if of[name] is None else f"{of[name]:.3f}" for of in (ours, real)))
+        for name in ours["rules"] | real["rules"]:
+            table.add_row(f"  {name}", *(f"{of['rules'].get(name, 0.0):.4f}" for of in (ours, real)))
+        console.print(table)
+    if "judge" in result:
+        found = result["judge"]
+        console.print(
+            f"\na judge tells them from true rooms: {found['here']:.2f} right (0.5 = it cannot); "
+            f"arrangements of the room generator: {found['generator']:.2f}"
+        )
+    if result.get("variety", {}).get("rooms"):
+        found = result["variety"]
+        console.print(
+            f"\n{found['seeds']} layouts of one graph are {found['here']:.2f} m apart, the room generator's "
+            f"{found['generator']:.2f} m: ratio {found['ratio']:.2f} ({found['rooms']} rooms)"
+        )

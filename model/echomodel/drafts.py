@@ -94,7 +94,7 @@ def _mirrored(
     cos, sin = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
     half = np.stack([cos * size[:, 0] + sin * size[:, 2], sin * size[:, 0] + cos * size[:, 2]], 1) / 2
     top = position[:, 1] + size[:, 1]
-    out = []
+    out: list[_Candidate] = []
     for x, z in MIRRORS:
         there = position * [x, 1.0, z]
         if out and not all(_fits(there[k, [0, 2]], half[k], float(top[k]), floor) for k in np.flatnonzero(placed)):

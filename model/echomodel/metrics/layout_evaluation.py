@@ -10,16 +10,20 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.drafts import drafted
 from echomodel.graph import GraphBatch
+from echomodel.metrics.judge import judged
 from echomodel.metrics.layout import relation_scores, size_rows, touched_triplets
 from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures, with_known_words
+from echomodel.metrics.variety import variety_scores
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
 # Predicates that an evaluation changes, and into what (SPEC: the four pairs of opposites).
+VARIED = 30  # rooms whose layouts are compared with one another
 OPPOSITE = {1: 2, 2: 1, 3: 4, 4: 3, 8: 9, 9: 8, 10: 11, 11: 10}
 
 
@@ -43,6 +47,7 @@ class EditedGraph:
 
 
 Sampler = Callable[[EditedGraph], Boxes]
+Finish = Callable[[RoomBoxes, Tensor], RoomBoxes]
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,8 @@ class LayoutEvaluation:
         complete: also score with half of the true boxes given.
         contradictions: keep what contradicts a changed relation, as the published evaluation does.
         scenes: scenes in a batch.
+        judge: also let a judge tell the layouts, and the room generator's, from the true ones.
+        seeds: of the first `VARIED` rooms, layouts to compare with one another; 0 = none.
     """
 
     rules: str = "strict"
@@ -70,6 +77,8 @@ class LayoutEvaluation:
     contradictions: bool = False
     scenes: int = 64
     told: float | None = None
+    judge: bool = False
+    seeds: int = 0
 
 
 def evaluate_layout(
@@ -77,6 +86,7 @@ def evaluate_layout(
     sample: Sampler,
     settings: LayoutEvaluation = LayoutEvaluation(),
     progress: Callable[[int, int], None] | None = None,
+    finish: Finish | None = None,
 ) -> dict:
     """Score boxes that `sample` makes for the graphs of `rooms`.
 
@@ -86,12 +96,14 @@ def evaluate_layout(
         sample: gives the N boxes of some scenes, in the order of their nodes.
         settings: rules, dropping, edits.
         progress: called with (scenes done, in all).
+        finish: what becomes of each generated room and the (e, 3) relations told of it, a repair for instance.
 
     Returns:
         `rooms` scored, `settings`, `generation` (and `change`, `add`, `complete`): shares of relations kept per
         predicate and group, for edits also of the triplets that touch an edited (or free) node and of the others;
         `sizes`: rows per class and axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the
-        form of `room_statistics.json`; with `told` also `living` and `real_living` (`living_evaluation.living_scores`).
+        form of `room_statistics.json`; with `told` also `living` and `real_living` (`living_evaluation.living_scores`);
+        `judge`: how often it is right about the layouts and about the generator's; `variety`, see `variety_scores`.
     """
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     if not rooms:
@@ -111,7 +123,11 @@ def evaluate_layout(
             if len(boxes) != edited.graph.num_nodes:
                 raise ValueError(f"the sampler gave {len(boxes)} boxes for {edited.graph.num_nodes} nodes")
             if mode == "generation":
-                drawn += _rooms_of(rooms[part], edited.graph, boxes)
+                made = _rooms_of(rooms[part], edited.graph, boxes)
+                if finish is not None:
+                    made = [finish(room, graph.triplets) for room, graph in zip(made, graphs[part], strict=True)]
+                    boxes = Boxes.cat([Boxes.from_room(room) for room in made])
+                drawn += made
             found.append(boxes.to("cpu"))
             scenes.append(edited.graph.triplets + torch.tensor([offset, 0, offset]))
             edits.append(edited.touched)
@@ -122,8 +138,19 @@ def evaluate_layout(
         out[mode] = _scores(Boxes.cat(found), torch.cat(scenes), torch.cat(edits), mode, settings.rules)
     out.update(_distributions(drawn, rooms))
     if settings.told is not None:
-        out["living"] = living_scores(drawn, [graph.triplets for graph in graphs])
-        out["real_living"] = living_scores(rooms, [graph.triplets for graph in graphs])
+        told = [graph.triplets.numpy() for graph in graphs]
+        out["living"], out["real_living"] = living_scores(drawn, told), living_scores(rooms, told)
+    if settings.judge:
+        bare = GraphBatch.pack([graph.with_triplets(graph.triplets[:0]) for graph in graphs])
+        arranged, _ = drafted(bare, torch.Generator().manual_seed(settings.seed), rules=settings.rules)
+        out["judge"] = {"here": judged(rooms, drawn), "generator": judged(rooms, _rooms_of(rooms, bare, arranged))}
+    if settings.seeds:
+
+        def boxes_of(graph: GraphBatch) -> Boxes:
+            none = torch.zeros(graph.num_nodes, dtype=torch.bool)
+            return sample(EditedGraph(graph, None, none, none))
+
+        out["variety"] = variety_scores(graphs[:VARIED], boxes_of, settings.seeds, settings.rules)
     return out
 
 

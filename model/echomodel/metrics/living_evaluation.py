@@ -1,4 +1,4 @@
-"""What a person would point at in sets of rooms, how well one walks through them, and how different layouts are."""
+"""What a person would point at in sets of rooms, and how well one walks through them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.living import RULES, faults_of, plan_of, unreached, walk
@@ -40,19 +39,3 @@ def living_scores(rooms: Sequence[RoomBoxes], relations: Sequence[np.ndarray]) -
         "rules": {name: count / max(objects, 1) for name, count in found.most_common()},
         "measured": len(RULES) + 1,
     }
-
-
-def layout_distance(one: RoomBoxes, other: RoomBoxes) -> float:
-    """Mean distance in plan between the pieces of two layouts of the same furniture, metres; equal pieces may swap."""
-    total = 0.0
-    for word in set(one.categories):
-        mine = np.array([category == word for category in one.categories])
-        apart = np.linalg.norm(one.position[mine][:, None, [0, 2]] - other.position[mine][None][:, :, [0, 2]], axis=-1)
-        total += float(apart[linear_sum_assignment(apart)].sum())
-    return total / max(len(one), 1)
-
-
-def diversity(layouts: Sequence[RoomBoxes]) -> float:
-    """Mean distance of all pairs of layouts of one room, metres; see `layout_distance`."""
-    pairs = [(i, k) for i in range(len(layouts)) for k in range(i)]
-    return float(np.mean([layout_distance(layouts[i], layouts[k]) for i, k in pairs])) if pairs else 0.0

@@ -96,6 +96,23 @@ def test_plot_report_and_evaluation(rooms_file, tmp_path, capsys):
     assert "left/right" in capsys.readouterr().out
 
 
+def test_evaluation_with_few_relations(rooms_file, capsys):
+    arguments = ["eval", "layout", "--rooms", str(rooms_file), "--model", "truth", "--limit", "6", "--told", "1"]
+    assert run([*arguments, "--judge", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["generation"]["total"] == 1.0
+    assert found["living"] == found["real_living"]
+    assert found["living"]["per_object"] < 0.2
+    assert 0 <= found["living"]["free_of_faults"] <= 1
+    assert found["judge"]["here"] == 0.5  # true rooms against themselves
+    assert run([*arguments, "--seeds", "2"]) == 2
+    assert "--seeds compares several layouts of a room, the true one is one" in capsys.readouterr().err
+    assert run(arguments) == 0
+    text = capsys.readouterr().out
+    assert "1 relations an object told, near pairs first" in text
+    assert "what a person would point at" in text
+
+
 def test_a_built_set_serves_as_rooms(tmp_path, capsys):
     from echomodel.data.roomset import build_rooms
 
