@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutations import COMMANDS, SHAPES, VALUES, Mutation, mutate, properties
 from pxr import Usd
@@ -93,7 +93,15 @@ def test_known_faults(room, mutation, command, tmp_path, capsys):
     assert not fault(room, mutation, command, tmp_path / "room", capsys)
 
 
-@settings(max_examples=12, derandomize=True, database=None)
+@settings(
+    max_examples=12,
+    derandomize=True,
+    database=None,
+    suppress_health_check=[
+        HealthCheck.function_scoped_fixture,
+        HealthCheck.too_slow,
+    ],  # `fault` empties what was captured
+)
 @given(data=st.data())
 def test_a_sample_of_all_values_at_all_properties(room, data, tmp_path_factory, capsys):
     chosen = Mutation(
