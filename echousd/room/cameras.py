@@ -1,4 +1,4 @@
-"""Lights and cameras that belong to a room: a soft sky, a ceiling light, a view from above and one from a corner."""
+"""Cameras that belong to a room: a view from above and one from a corner."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Usd, UsdGeom
 
 from echousd.sight import Furniture
 
@@ -120,26 +120,3 @@ def write_cameras(
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
     camera.CreateFocusDistanceAttr(distance)
     camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 4 * distance + 10.0))
-
-
-def write_lights(stage: Usd.Stage, volume: Volume, height: float) -> None:
-    """Author `/Room/Lights`: a dome of radiance 0.5 and a warm ceiling panel.
-
-    Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under both lights
-    comes to about 1, so nothing is blown out. A host that wants nits scales both by one exposure.
-    """
-    UsdGeom.Scope.Define(stage, "/Room/Lights")
-    dome = UsdLux.DomeLight.Define(stage, "/Room/Lights/sky")
-    dome.CreateIntensityAttr(0.5)
-    dome.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
-    panel = UsdLux.RectLight.Define(stage, "/Room/Lights/ceiling")
-    side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
-    width, depth = (max(float(s), 0.5) for s in side)
-    panel.CreateWidthAttr(width)
-    panel.CreateHeightAttr(depth)
-    # A panel of radiance L and area A lights the floor below it with about L A / h².
-    panel.CreateIntensityAttr(round(min(20.0, 1.6 * height**2 / (width * depth)), 4))
-    panel.CreateEnableColorTemperatureAttr(True)
-    panel.CreateColorTemperatureAttr(4300.0)
-    panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
-    panel.AddRotateXOp().Set(-90.0)

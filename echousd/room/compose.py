@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
-from echousd.room import assets, cameras, looks, materials, physics, shell, structure, walls
+from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
 from echousd.room.geometry import LICENCE
 from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name
 from echousd.room.room import RoomData
@@ -173,7 +173,7 @@ def root_layer(room: RoomData) -> Sdf.Layer:
     low, high = (Gf.Vec3f(*map(float, corner)) for corner in (volume.lower, volume.upper))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
     furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
-    cameras.write_lights(stage, volume, room.height)
+    lights.write_lights(stage, room, volume)
     walled = room.floor if room.options.walls else None
     cameras.write_cameras(stage, volume, room_points(room), furniture, walled)
     return assets.without_stage(stage, _add_sublayers)

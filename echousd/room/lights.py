@@ -1,0 +1,116 @@
+"""Lights of a room: a sky, a soft panel below the ceiling, the sun through a window, and every lamp of the graph.
+
+The variant set `light` of `/Room` dims them for `day`, `evening` and `night`; intensities stand in its variants alone,
+as a light's own opinion would be stronger than theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+
+from echomodel.openings import inward_normal, segment
+from echomodel.vocabulary import vocabulary
+from echousd.room.cameras import Volume, view_matrix
+from echousd.room.room import RoomData
+
+LIGHTS = "/Room/Lights"
+NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
+LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
+BULB = 0.04  # metres, radius
+SUN = 1.4  # irradiance of the sun: a white surface that faces it gains 0.45, about what the sky gives
+ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
+# What is left of sky, panel, sun and lamps.
+TIMES: Mapping[str, tuple[float, float, float, float]] = {
+    "day": (1.0, 1.0, 1.0, 0.3),
+    "evening": (0.16, 0.25, 0.0, 1.0),
+    "night": (0.02, 0.0, 0.0, 1.0),
+}
+Intensities = dict[Sdf.Path, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
+
+
+def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
+    """Author `/Room/Lights` and the variant set `light`, with `day` chosen.
+
+    Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under sky and panel
+    comes to about 1, so nothing is blown out. Lamps are in the same scale, `NITS` to 1, from their lumens.
+
+    Arguments:
+        stage: receives the lights.
+        room: whose lamps and windows these are.
+        volume: of the room, metres.
+    """
+    UsdGeom.Scope.Define(stage, LIGHTS)
+    sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
+    sky.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
+    full: Intensities = {sky.GetPath(): (0, 0.5), **_panel(stage, volume, room.height)}
+    if room.options.walls:
+        full |= _sun(stage, room)
+    if len(room.layouts) < 2:  # bulbs stand where the lamps do
+        full |= _lamps(stage, room)
+    times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
+    for name, shares in TIMES.items():
+        times.AddVariant(name)
+        times.SetVariantSelection(name)
+        with times.GetVariantEditContext():
+            for path, (kind, intensity) in full.items():
+                light = UsdLux.LightAPI(stage.OverridePrim(path))
+                light.CreateIntensityAttr(round(intensity * shares[kind], 4))
+    times.SetVariantSelection("day")
+
+
+def _panel(stage: Usd.Stage, volume: Volume, height: float) -> Intensities:
+    """A warm panel below the ceiling; of radiance L and area A it lights the floor with about L A / h²."""
+    panel = UsdLux.RectLight.Define(stage, f"{LIGHTS}/ceiling")
+    side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
+    width, depth = (max(float(s), 0.5) for s in side)
+    panel.CreateWidthAttr(width)
+    panel.CreateHeightAttr(depth)
+    panel.CreateEnableColorTemperatureAttr(True)
+    panel.CreateColorTemperatureAttr(4300.0)
+    panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
+    panel.AddRotateXOp().Set(-90.0)
+    return {panel.GetPath(): (1, min(20.0, 1.6 * height**2 / (width * depth)))}
+
+
+def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
+    """The sun through the widest window, from a little aside."""
+    corners = room.graph.room.corners
+    windows = [opening for opening in room.graph.room.openings if opening.kind == "window"]
+    if corners is None or not windows:
+        return {}
+    window = max(windows, key=lambda opening: opening.width * opening.height)
+    near, far = segment(corners, window)
+    level = inward_normal(corners, window.edge) + ASIDE * (far - near) / window.width
+    level = level / np.linalg.norm(level) * np.cos(ELEVATION)
+    way = np.array([level[0], -np.sin(ELEVATION), level[1]])
+    sun = UsdLux.DistantLight.Define(stage, f"{LIGHTS}/sun")
+    sun.CreateAngleAttr(0.53)
+    sun.CreateNormalizeAttr(True)  # intensity is irradiance, whatever the disc's size
+    sun.CreateEnableColorTemperatureAttr(True)
+    sun.CreateColorTemperatureAttr(5400.0)
+    matrix = view_matrix(-way, np.zeros(3))
+    matrix[:3, 3] = 0.0
+    sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
+    return {sun.GetPath(): (2, SUN)}
+
+
+def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
+    """A bulb for every lamp: below what hangs, over the shade of what stands."""
+    full: Intensities = {}
+    for number, node in enumerate(room.graph.nodes):
+        row = vocabulary().category(node.category)
+        if row.role != "light":
+            continue
+        x, y, z = (float(v) for v in room.boxes.position[number])
+        top = y + float(room.boxes.size[number][1])
+        bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
+        bulb.CreateRadiusAttr(BULB)
+        bulb.CreateEnableColorTemperatureAttr(True)
+        bulb.CreateColorTemperatureAttr(2900.0)
+        bulb.AddTranslateOp().Set(Gf.Vec3d(x, (y - 0.06) if row.support == "ceiling" else top + 0.06, z))
+        candela = LUMENS[row.support] / (4 * np.pi)
+        full[bulb.GetPath()] = (3, candela / (np.pi * BULB**2) / NITS)
+    return full

@@ -1,0 +1,64 @@
+"""Lights of a room: by day, in the evening and at night; the sun through a window, lamps where they hang."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pxr import Gf, Usd, UsdGeom, UsdLux
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.openings import Opening
+from echousd.graph import RoomSpec
+from echousd.room.room import RoomOptions
+
+WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True))
+    return Usd.Stage.Open(str(room.save(tmp_path_factory.mktemp("lights") / "bedroom", preview=False)))
+
+
+def intensity(stage: Usd.Stage, name: str) -> float:
+    return UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/{name}")).GetIntensityAttr().Get()
+
+
+def test_day_evening_and_night(stage) -> None:
+    times = stage.GetPrimAtPath("/Room").GetVariantSets().GetVariantSet("light")
+    assert times.GetVariantNames() == ["day", "evening", "night"]
+    assert times.GetVariantSelection() == "day"
+    seen = {}
+    for name in ("day", "evening", "night"):
+        times.SetVariantSelection(name)
+        seen[name] = [intensity(stage, light) for light in ("sky", "sun", "lamp_pendant")]
+    times.SetVariantSelection("day")
+    assert seen["day"][0] > seen["evening"][0] > seen["night"][0] > 0
+    assert seen["day"][1] > seen["evening"][1] == seen["night"][1] == 0
+    assert seen["day"][2] < seen["evening"][2] == seen["night"][2]
+
+
+def test_the_sun_falls_in_through_the_window(stage) -> None:
+    matrix = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Lights/sun")).ComputeLocalToWorldTransform(0)
+    way = np.array(matrix.TransformDir(Gf.Vec3d(0, 0, -1)))
+    assert np.linalg.norm(way) == pytest.approx(1)
+    assert way[1] < -0.5
+    assert way[2] > 0.5
+
+
+def test_lamps_shine_where_they_are(stage) -> None:
+    cache = UsdGeom.BBoxCache(0, ["default"])
+    for name, below in (("pendant", True), ("lamp", False)):
+        bulb = UsdGeom.Xformable(stage.GetPrimAtPath(f"/Room/Lights/lamp_{name}")).ComputeLocalToWorldTransform(0)
+        box = cache.ComputeWorldBound(stage.GetPrimAtPath(f"/Room/Objects/{name}")).ComputeAlignedRange()
+        place = bulb.ExtractTranslation()
+        assert box.GetMin()[0] < place[0] < box.GetMax()[0]
+        edge = box.GetMin()[1] if below else box.GetMax()[1]
+        assert 0.04 < (edge - place[1] if below else place[1] - edge) < 0.1
+    light = UsdLux.SphereLight(stage.GetPrimAtPath("/Room/Lights/lamp_pendant"))
+    stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "evening")
+    lux = light.GetIntensityAttr().Get() * 30 * np.pi * light.GetRadiusAttr().Get() ** 2 / 1.5**2
+    stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "day")
+    assert lux == pytest.approx(1500 / (4 * np.pi) / 1.5**2, rel=1e-3)  # 1,500 lumens, 1.5 m away
