@@ -38,6 +38,15 @@ def relation_margins(
 
     Returns: margins (e,) float and gradient (e, n, 6) float in the columns of `geometry`.
     """
+    ends = triplets[:, [0, 2]]
+    value, gradient = pair_margins(size, position, yaw, triplets, rules=rules, centre=centre)
+    return value, spread(gradient, ends, len(size))
+
+
+def pair_margins(
+    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *, rules: str, centre: np.ndarray
+) -> Values:
+    """The margins as `relation_margins`, their gradients (e, 2, 6) by the two boxes of each relation alone."""
     from echomodel.rules import sets
 
     told = sets.rule_set(rules)
@@ -54,7 +63,7 @@ def relation_margins(
     chosen = np.flatnonzero(np.isin(predicate, [number for number, row in rows.items() if row.name not in CLOSED]))
     if len(chosen):
         value[chosen], gradient[chosen] = _automatic(size, position, yaw, triplets[chosen], rules, centre)
-    return value, spread(gradient, ends, len(size))
+    return value, gradient
 
 
 def _smaller(one: Values, two: Values) -> Values:

@@ -9,16 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.openings import Opening
+from echomodel.rules.living.sizes import usual_sizes
 from echomodel.vocabulary import vocabulary
-from echousd.repair.problem import pose, settle
+from echousd.repair.arrange import arrange, setting_of
+from echousd.repair.problem import Problem, pose, settle
 from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
-from echousd.repair.solver import RepairConfig, solve
+from echousd.repair.solver import RepairConfig, Solution, solve, violation
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
+UNSETTLED = 0.01  # metres or ratio of hard constraints that are missed in all
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 DEFAULT_HEIGHT = 2.8
 
@@ -107,6 +111,7 @@ def repair(
         triplets,
         floor_polygon=floor_of_room(graph.room),
         height=graph.room.height or DEFAULT_HEIGHT,
+        openings=graph.room.openings,
         fixed=np.array([node.locked or node.position is not None for node in nodes]),
         rigid=np.array([node.locked or node.size is not None for node in nodes]),
         turned=np.array([node.locked or node.yaw is not None for node in nodes]),
@@ -135,6 +140,16 @@ def repair(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A posed problem and the boxes to start from: size, position (n, 3) and yaw (n,)."""
+
+    problem: Problem
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+
 def floor_of_room(room: RoomSpec) -> np.ndarray | None:
     """(k, 2) float, the room's floor polygon, the rectangle around the origin of its size, or None."""
     if room.floor_polygon is not None:
@@ -157,6 +172,7 @@ def repair_boxes(
     fixed: np.ndarray | None = None,
     rigid: np.ndarray | None = None,
     turned: np.ndarray | None = None,
+    openings: Sequence[Opening] = (),
     rules: str = "strict",
     config: RepairConfig | None = None,
 ) -> RepairedBoxes:
@@ -169,6 +185,7 @@ def repair_boxes(
         floor_polygon: (k, 2) float, x and z, metres; None = no walls.
         height: of the ceiling, metres; None = ceiling things keep their height.
         fixed, rigid, turned: (n,) bool, boxes that must keep their position, size, yaw.
+        openings: doors and windows in the edges of the floor polygon.
         rules: `strict` or `sgfront`.
 
     Raises:
@@ -183,30 +200,43 @@ def repair_boxes(
     n = len(categories)
     bad = ~(np.isfinite(size).all(1) & np.isfinite(position).all(1) & np.isfinite(yaw))
     if bad.any():
-        at = int(np.flatnonzero(bad)[0])
+        i = int(np.flatnonzero(bad)[0])
         raise ValueError(
-            f"box {at} ({categories[at]}) is not finite: size {size[at]}, position {position[at]}, yaw {yaw[at]}"
+            f"box {i} ({categories[i]}) is not finite: size {size[i]}, position {position[i]}, yaw {yaw[i]}"
         )
     triplets = np.asarray(triplets, int).reshape(-1, 3)
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
     centre = np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2
     judged = np.isin(triplets[:, 1], sorted(measured(rules)))
-    start_size = np.where(rigid[:, None], size, np.maximum(size, SMALLEST))
-    problem, start, turn = pose(
-        categories,
-        start_size,
-        position,
-        yaw,
-        triplets,
-        floor_polygon=floor_polygon,
-        height=height,
-        fixed=fixed,
-        rigid=rigid,
-        turned=turned,
-    )
-    problem = replace(problem, triplets=triplets[judged])
-    found = solve(problem, start_size, start, turn, rules=rules, centre=centre, config=config or RepairConfig())
+    config = config or RepairConfig()
+
+    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Start:
+        problem, start, turn = pose(
+            categories, size, position, yaw, triplets,
+            floor_polygon=floor_polygon, height=height, fixed=fixed, rigid=rigid, turned=turned,
+        )  # fmt: skip
+        return Start(replace(problem, triplets=triplets[judged]), size, start, turn)
+
+    def solved(at: Start) -> Solution:
+        return solve(at.problem, at.size, at.position, at.yaw, rules=rules, centre=centre, config=config)
+
+    drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw)
+    if drawn.problem.floor is not None and config.arrange:
+        sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
+        told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
+        usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=np.isin(np.arange(n), told))
+        at = posed(np.where(rigid[:, None], size, usual), position, yaw)
+        chosen = arrange(
+            setting_of(at.problem, at.position, at.yaw, at.size, turned, openings=openings, rules=rules, centre=centre)
+        )
+        at = posed(at.size, chosen.position, chosen.yaw)
+    found = solved(at)
+    if at is not drawn and violation(found.at) > UNSETTLED:  # what the graph states comes before all habits
+        plain = solved(drawn)
+        if violation(plain.at) < violation(found.at) - UNSETTLED:
+            found, at = plain, drawn
+    problem, turn = at.problem, at.yaw
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
     end = settle(found.size, found.position, problem.carrier, None, fixed)
     ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)

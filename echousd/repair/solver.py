@@ -36,6 +36,7 @@ class RepairConfig:
         stretch: change of the logarithm of a size that costs as much as `move`.
         limit: largest change of the logarithm of a size.
         slack: metres or ratio by which relations are to hold.
+        arrange: first choose for every piece among the places that a person would try; False = only by millimetres.
         rounds: most linearisations in one attempt; patience: how many of them without progress end it.
         budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
     """
@@ -45,6 +46,7 @@ class RepairConfig:
     limit: float = 0.4
     slack: float = 0.004
     rounds: int = 16
+    arrange: bool = True
     patience: int = 6
     budget: int = 26
 

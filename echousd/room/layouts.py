@@ -57,6 +57,7 @@ def finished_boxes(
     boxes = _alike(graph, boxes, styles)
     if not repair:
         return rounded_boxes(graph, boxes), ()
+    from echousd.repair import RepairConfig
     from echousd.repair import repair as repaired
 
     with timer.stage("repair"):
@@ -64,7 +65,7 @@ def finished_boxes(
         same = _alike(graph, found.boxes, styles, boxes)
         if not torch.equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits
-            second = repaired(with_sizes(graph, same), same)
+            second = repaired(with_sizes(graph, same), same, config=RepairConfig(arrange=False))
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
     collisions = tuple(f"{a} and {b} collide by {depth:.2f} m" for a, b, depth in found.collisions)

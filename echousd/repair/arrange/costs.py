@@ -1,0 +1,165 @@
+"""What a pose costs: running into others, leaving the floor, broken relations, blocked fronts, way from the draft."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.rules.sets import APART
+from echomodel.vocabulary import vocabulary
+from echousd.repair.arrange.outlook import missing, unseen
+from echousd.repair.arrange.setting import Poses, Setting, State, Zones
+from echousd.repair.geometry import axes, inside
+from echousd.repair.relations import pair_margins
+
+HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
+BROKEN, FAR = 12.0, 6.0  # for a broken relation at all, and per metre or ratio that it is missed by
+GRAZE = 0.01  # metres
+PULL, TURN = 0.35, 0.25  # per metre from the draft, and for looking the other way than the draft
+FARTHEST = 4.0  # metres that the pull counts
+UNPLACED = 0.15  # weight of relations to what is not placed yet, whose draft counts
+BLOCKED = 3.0  # for a front that cannot be opened
+ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regretted
+CROWDED = 0.7  # for a chair in the way of a front
+SLACK = 0.01  # metres or ratio by which relations are to hold
+
+
+def depths(size: np.ndarray, poses: Poses, others: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """(K, m) float: how deep a box (3,) at each pose runs into m other boxes (m, 3), negative = the gap, metres."""
+    if not len(others):
+        return np.full((len(poses), 0), -9.0)
+    u, v = axes(poses.yaw), axes(yaw)
+    away = position[None, :, [0, 2]] - poses.position[:, None, [0, 2]]
+    turn = np.abs(u[:, None] @ v.transpose(0, 2, 1)[None])
+    half, reach = size[[0, 2]] / 2, others[:, [0, 2]] / 2
+    own = np.abs((u[:, None] @ away[..., None])[..., 0]) - half - (turn @ reach[None, :, :, None])[..., 0]
+    other = np.abs((v[None] @ away[..., None])[..., 0]) - reach - (half @ turn)
+    bottom = poses.position[:, 1]
+    over, under = position[:, 1] - (bottom + size[1])[:, None], bottom[:, None] - (position[:, 1] + others[:, 1])
+    rise = np.maximum(over, under)
+    return -np.maximum(np.maximum(own.max(2), other.max(2)), rise)
+
+
+def beyond(setting: Setting, size: np.ndarray, poses: Poses) -> np.ndarray:
+    """(K,) float: how far a box at each pose leaves the floor, metres."""
+    u = axes(poses.yaw)
+    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.5
+    corners = poses.position[:, None, [0, 2]] + (signs * size[[0, 2]])[None] @ u
+    out = -inside(setting.floor, corners.reshape(-1, 2))[0].reshape(len(poses), 4).min(1)
+    if len(setting.floor.reflex):
+        offset = setting.floor.reflex[None] - poses.position[:, None, [0, 2]]
+        local = np.abs(np.einsum("kad,kmd->kma", u, offset)) - size[[0, 2]] / 2
+        out = np.maximum(out, -local.max(2).min(1))
+    return out
+
+
+def least(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,) float: what box i pays at each pose at the least, whatever else there is: the pose itself and its way."""
+    off = np.linalg.norm((poses.position - setting.draft[i])[:, [0, 2]], axis=1)
+    turned = 0.5 * (1 - np.cos(poses.yaw - setting.heading[i]))
+    out = poses.price + PULL * np.minimum(off, FARTHEST) + TURN * turned
+    for x, z, yaw, paid in state.regrets.get(i, ()):
+        near = np.hypot(poses.position[:, 0] - x, poses.position[:, 2] - z) < ALIKE
+        out = out + paid * (near & (np.cos(poses.yaw - yaw) > 0.9))
+    return out
+
+
+def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,) float: what it costs to put box i at each pose among what is placed."""
+    total = least(setting, state, i, poses) + missing(setting, state, i, poses) + unseen(setting, state, i, poses)
+    size = setting.size[i]
+    others = np.flatnonzero(state.placed)
+    others = others[others != i]
+    depth = depths(size, poses, setting.size[others], state.position[others], state.yaw[others])
+    depth = np.maximum(depth - setting.shared[i, others], 0.0)
+    total += (HIT * (depth > GRAZE) + DEEP * depth).sum(1)
+    out = np.maximum(beyond(setting, size, poses), 0.0)
+    total += HIT * (out > GRAZE) + DEEP * out
+    if setting.standing(i):
+        total += _in_zones(setting, state, i, poses, others)
+    return total + _relations(setting, state, i, poses)
+
+
+def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
+    doors = setting.doors
+    out = (np.maximum(depths(setting.size[i], poses, doors.size, doors.position, doors.yaw), 0) > 0.04) @ doors.price
+    zones = fronts(setting, state, [j for j in others if setting.anchor[i] != j and setting.anchor[j] != i])
+    deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
+    out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
+    front = own_front(setting, i)
+    if front is None:
+        return out
+    size, forward = front
+    ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
+    solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
+    solid = [j for j in solid if setting.anchor[i] != j and setting.anchor[j] != i]
+    depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])
+    out = out + BLOCKED * (depth > 0.03).sum(1)
+    return out + BLOCKED * (beyond(setting, size, ahead) > 0.05)
+
+
+def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
+    """Size (3,) of the space before a front and how far before the box's centre its own centre is; None = no front."""
+    depth = 0.75 * setting.kinds[i].access
+    if depth <= 0 or not setting.standing(i) or setting.kinds[i].role == "seat":
+        return None
+    size = np.array([0.8 * setting.size[i, 0], min(float(setting.size[i, 1]), 1.8), depth])
+    return size, float(setting.size[i, 2] / 2 + depth / 2 + 0.005)
+
+
+def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
+    """The spaces before the fronts of some boxes and at both sides of beds."""
+    rows = []
+    for j in boxes:
+        front = own_front(setting, j)
+        x, _, z = state.position[j]
+        c, s = np.cos(state.yaw[j]), np.sin(state.yaw[j])
+        if front is not None:
+            size, forward = front
+            rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
+        if setting.kinds[j].role == "bed":
+            for side in (-1, 1):
+                lateral = side * (setting.size[j, 0] / 2 + 0.2)
+                size = np.array([0.38, 1.0, setting.size[j, 2] * 0.6])
+                forward = setting.size[j, 2] * 0.15
+                at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
+                rows.append((*size, *at, state.yaw[j], 0.5 * BLOCKED, j))
+    table = np.array(rows, float).reshape(-1, 9)
+    return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], table[:, 8].astype(int))
+
+
+def _front(yaw: np.ndarray) -> np.ndarray:
+    return np.stack([np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], -1)
+
+
+def _relations(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """Broken relations between box i and others, those that are not placed at a small weight."""
+    told = setting.triplets[(setting.triplets[:, [0, 2]] == i).any(1)]
+    count = len(poses)
+    if not len(told):
+        return np.zeros(count)
+    other = np.where(told[:, 0] == i, told[:, 2], told[:, 0])
+    weight = np.where(state.placed[other], 1.0, UNPLACED)
+    where = np.where(state.placed[:, None], state.position, setting.draft)
+    sides = np.array([any(vocabulary().predicates[p].step) for p in told[:, 1].tolist()])
+    missed = np.zeros((count, len(told)))
+    # sides are a matter of the centres alone here: whatever runs into the other pays for that anyway
+    asked = setting.order[other[sides], i]
+    along = (poses.position[:, None, [0, 2]] - where[other[sides]][:, [0, 2]]) * asked
+    missed[:, sides] = np.where(asked != 0, APART + SLACK - along, 0.0).max(2).clip(min=0)
+    if (~sides).any():
+        missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides], where)
+    return ((BROKEN * (missed > SLACK) + FAR * missed) * weight).sum(1)
+
+
+def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose and the others at `where`."""
+    count, n = len(poses), len(setting.size)
+    size = np.concatenate([setting.size, np.broadcast_to(setting.size[i], (count, 3))])
+    heading = np.where(state.placed, state.yaw, setting.heading)
+    position = np.concatenate([where, poses.position])
+    yaw = np.concatenate([heading, poses.yaw])
+    rows = np.broadcast_to(told, (count, len(told), 3)).copy()
+    own = np.broadcast_to((told == i) & [True, False, True], rows.shape)
+    rows[own] = np.broadcast_to(n + np.arange(count)[:, None, None], rows.shape)[own]
+    margin, _ = pair_margins(size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre)
+    return np.maximum(SLACK - margin.reshape(count, -1), 0.0)

@@ -1,0 +1,94 @@
+"""What a pose leaves to others: places for those who attend the piece, and a view between a screen and its seat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from echousd.repair.arrange.places import slots_at, stance, wrapped
+from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.arrange.slots import Slot
+from echousd.repair.geometry import inside
+
+MISSING = 1.6  # for each place that those who attend a piece would not find
+UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
+ELBOW = 0.2  # metres behind a chair, to pull it out
+VIEW = 1.1  # per metre that a television is beside the line of sight
+
+
+def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): the price of places that those who attend box i, and are not placed, would miss at each pose."""
+    out = np.zeros(len(poses))
+    for slots, asked, members in _waiting(setting, state, i):
+        best = slots if asked.any() else [slot for slot in slots if slot[3] <= 0.11]
+        local = np.array(_distinct(best, 0.3))
+        c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
+        offset = np.stack([c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0]], -1)
+        points = poses.position[:, None, [0, 2]] + offset
+        size = setting.size[members[0]]
+        reach = 0.35 * float(min(size[0], size[2])) + ELBOW * (setting.kinds[members[0]].stands == "at")
+        free = _free(setting, state, i, points, reach)
+        told = (offset * asked > 0.06) | (asked == 0)
+        kept = free & told.all(-1)
+        lost = np.maximum(min(len(members), len(local)) - kept.sum(1), 0)
+        out += (UNTOLD if asked.any() else MISSING) * lost
+    return out
+
+
+def _waiting(setting: Setting, state: State, i: int) -> list[tuple[list[Slot], np.ndarray, list[int]]]:
+    """Those who attend box i and are not placed: their slots, the side that is stated for them (2,), who they are."""
+    groups: dict[tuple[float, ...], tuple[list[Slot], np.ndarray, list[int]]] = {}
+    for j in np.flatnonzero((setting.anchor == i) & ~state.placed).tolist():
+        if setting.carrier[j] == i:
+            continue
+        slots = slots_at(setting, j, i)
+        if slots:
+            asked = setting.order[i, j]
+            key = (*setting.size[j].round(2).tolist(), *asked.tolist(), float(setting.kinds[j].name == ""))
+            groups.setdefault(key, (slots, asked, []))[2].append(j)
+    return list(groups.values())
+
+
+def _free(setting: Setting, state: State, i: int, points: np.ndarray, reach: float) -> np.ndarray:
+    """(K, S) bool: which points (K, S, 2) lie on the floor and in nothing that stands, with `reach` metres to spare."""
+    free = inside(setting.floor, points.reshape(-1, 2))[0].reshape(points.shape[:2]) > reach
+    for j in np.flatnonzero(state.placed).tolist():
+        if j == i or not setting.standing(j) or setting.anchor[j] == i:
+            continue
+        away = points - state.position[j, [0, 2]]
+        c, s = math.cos(state.yaw[j]), math.sin(state.yaw[j])
+        lateral = np.abs(c * away[..., 0] - s * away[..., 1]) - setting.size[j, 0] / 2
+        forward = np.abs(s * away[..., 0] + c * away[..., 1]) - setting.size[j, 2] / 2
+        free &= np.maximum(lateral, forward) > reach
+    return free
+
+
+def _distinct(slots: Sequence[Slot], apart: float) -> list[tuple[float, float]]:
+    out: list[tuple[float, float]] = []
+    for lateral, forward, _, _ in slots:
+        if all(math.hypot(lateral - a, forward - b) > apart for a, b in out):
+            out.append((lateral, forward))
+    return out
+
+
+def unseen(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): what it costs a television not to be opposite a seat or bed, and a viewer not to be opposite it."""
+    out = np.zeros(len(poses))
+    anchor = int(setting.anchor[i])
+    if anchor >= 0 and state.placed[anchor] and stance(setting, i, anchor) == "opposite":
+        out += _view(poses.position, poses.yaw, state.position[anchor], state.yaw[anchor])
+    for j in np.flatnonzero((setting.anchor == i) & state.placed):
+        if stance(setting, int(j), i) == "opposite":
+            out += _view(state.position[j], state.yaw[j], poses.position, poses.yaw)
+    return out
+
+
+def _view(screen: np.ndarray, screen_yaw: np.ndarray, seat: np.ndarray, seat_yaw: np.ndarray) -> np.ndarray:
+    away = (screen - seat)[..., [0, 2]]
+    lateral = np.abs(np.cos(seat_yaw) * away[..., 0] - np.sin(seat_yaw) * away[..., 1])
+    forward = np.sin(seat_yaw) * away[..., 0] + np.cos(seat_yaw) * away[..., 1]
+    facing = np.abs(wrapped(np.asarray(screen_yaw - seat_yaw - math.pi)))
+    far = np.maximum(forward - 4.5, 0) + 2 * np.maximum(1.6 - forward, 0)
+    return VIEW * np.minimum(lateral, 3.0) + np.minimum(1.6 * facing, 3.0) + 0.6 * np.minimum(far, 4.0)

@@ -1,0 +1,199 @@
+"""Poses that a person would try for a piece: along the walls, at what it attends, over what it lights, in the open."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echomodel.vocabulary import vocabulary
+from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.arrange.slots import STANDS, Slot
+from echousd.repair.geometry import inside
+from echousd.repair.problem import ON_CEILING
+
+Row = tuple[float, float, float, float]  # x, z, yaw, price
+HALF_PI = math.pi / 2
+GAP = 0.01  # metres between a back and its wall
+STEP = 0.2  # metres between two places at a wall
+GRID = 0.35  # metres between two places in the open
+LONELY = 2.5  # for a piece that does not stand at what it attends though that is there
+OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
+
+
+def places(setting: Setting, state: State, i: int) -> Poses:
+    """All poses to try for box i, given where others stand; prices say how well such a piece stands there by itself."""
+    kind = setting.kinds[i]
+    height = _height(setting, state, i)
+    draft = (float(setting.draft[i, 0]), float(setting.draft[i, 2]))
+    if setting.fixed[i]:
+        return Poses(setting.draft[i : i + 1], setting.heading[i : i + 1], np.zeros(1))
+    anchor = int(setting.anchor[i])
+    rows: list[Row] = []
+    if anchor >= 0 and state.placed[anchor]:
+        rows = at_anchor(setting, state, i, anchor)
+    lonely = LONELY if anchor >= 0 and rows else 0.0
+    if kind.support == "ceiling":
+        rows += overhead(setting, state, i)
+    elif setting.carrier[i] >= 0:
+        rows += [] if rows else [(*draft, float(setting.heading[i]), 0.0)]
+    elif kind.support == "wall":
+        rows += along_walls(setting, i, 0.0)
+    elif kind.wall or (kind.role == "board" and kind.access > 0):
+        rows += along_walls(setting, i, lonely)
+        if kind.role == "sofa":
+            rows += in_the_open(setting, i, 3.0 + lonely)
+    elif kind.role in ("decor", "light", "storage"):
+        rows += along_walls(setting, i, lonely) + corners(setting, i, lonely)
+    else:
+        rows += in_the_open(setting, i, lonely)
+        rows += along_walls(setting, i, lonely + 0.5)
+    rows = [*rows, *as_drawn(setting, i, draft, OFF_WALL if kind.wall else 1.0 + lonely)]
+    out = Poses.of(rows, height)
+    return _as_told(setting, i, out)
+
+
+def as_drawn(setting: Setting, i: int, draft: tuple[float, float], price: float) -> list[Row]:
+    """Where the box was drawn: parallel to the walls, or turned as it was drawn."""
+    heading = float(setting.heading[i])
+    square = float(HALF_PI * np.round((heading - setting.grain) / HALF_PI) + setting.grain)
+    if setting.kinds[i].support != "floor":
+        return [(*draft, heading, price)]
+    askew = 0.0 if abs(square - heading) < 0.02 else 0.5 if setting.kinds[i].role == "seat" else OFF_WALL
+    return [(*draft, square, price), (*draft, heading, price + askew)]
+
+
+def _height(setting: Setting, state: State, i: int) -> float:
+    carrier = int(setting.carrier[i])
+    if carrier >= 0:
+        at = state.position if state.placed[carrier] else setting.draft
+        return float(at[carrier, 1] + setting.size[carrier, 1])
+    if carrier == ON_CEILING:
+        return setting.height - float(setting.size[i, 1])
+    return float(setting.draft[i, 1]) if not setting.standing(i) else 0.0
+
+
+def _as_told(setting: Setting, i: int, poses: Poses) -> Poses:
+    """The poses that keep a stated heading, or all with it where none does."""
+    if not setting.turned[i]:
+        return poses
+    like = np.abs(wrapped(poses.yaw - setting.heading[i])) < 0.1
+    keep = like if like.any() else np.ones(len(poses), bool)
+    yaw = np.full(int(keep.sum()), setting.heading[i])
+    return Poses(poses.position[keep], yaw, poses.price[keep])
+
+
+def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
+    """Where box i may stand in the frame of its anchor; empty where its row does not say."""
+    stands = stance(setting, i, anchor)
+    if stands not in STANDS:
+        return []
+    count = int(((setting.anchor == anchor) & [k.role == "seat" for k in setting.kinds]).sum())
+    return STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
+
+
+def stance(setting: Setting, i: int, anchor: int) -> str:
+    """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
+    kind, to = setting.kinds[i], setting.kinds[anchor]
+    if setting.carrier[i] == anchor:
+        return "on_top"
+    if kind.support != "floor":
+        return ""
+    if kind.stands in ("at", "foot") and to.role == "board":
+        return "at_front" if to.access else "around"
+    return kind.stands
+
+
+def at_anchor(setting: Setting, state: State, i: int, anchor: int) -> list[Row]:
+    """The slots of box i at its anchor as it stands now."""
+    return [_out_of(state.position[anchor], float(state.yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
+
+
+def _out_of(position: np.ndarray, yaw: float, slot: Slot) -> Row:
+    lateral, forward, turn, price = slot
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, z = position[0] + c * lateral + s * forward, position[2] - s * lateral + c * forward
+    return float(x), float(z), yaw + turn, price
+
+
+def along_walls(setting: Setting, i: int, price: float) -> list[Row]:
+    """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
+    key = ("walls", i, price)
+    if key in setting.rows:
+        return setting.rows[key]
+    width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
+    gap = 0.0 if setting.kinds[i].support == "wall" else GAP
+    rows = []
+    for start, along, length, yaw in setting.walls:
+        free = length - width
+        if free < -0.005:
+            continue
+        low, high = min(0.01, max(free, 0) / 2), max(free - 0.01, max(free, 0) / 2)
+        drawn = float((setting.draft[i, [0, 2]] - start) @ along) - width / 2
+        offsets = np.unique(np.clip([low, high, free / 2, drawn, *np.arange(low, high, STEP)], low, high).round(3))
+        normal = np.array([math.sin(yaw), math.cos(yaw)])
+        for offset in offsets.tolist():
+            x, z = start + along * (offset + width / 2) + normal * (depth / 2 + gap)
+            rows.append((float(x), float(z), yaw, price))
+    setting.rows[key] = rows
+    return rows
+
+
+def corners(setting: Setting, i: int, price: float) -> list[Row]:
+    """In the corners of the room: plants and lamps like them."""
+    half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2 + 0.03
+    rows = []
+    polygon = setting.floor.polygon
+    for k, corner in enumerate(polygon):
+        inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
+        x, z = corner + inward * half
+        rows.append((float(x), float(z), setting.walls[k][3], price - 0.1))
+    return rows
+
+
+def in_the_open(setting: Setting, i: int, price: float) -> list[Row]:
+    """On a grid over the floor and at the draft, parallel to the walls."""
+    key = ("open", i, price)
+    if key in setting.rows:
+        return setting.rows[key]
+    low, high = setting.floor.polygon.min(0), setting.floor.polygon.max(0)
+    xs, zs = (np.arange(a + 0.3, b - 0.2, GRID) for a, b in zip(low, high, strict=True))
+    points = np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2)
+    points = np.concatenate([setting.draft[i : i + 1, [0, 2]], points])
+    points = points[inside(setting.floor, points)[0] > 0.25 * float(setting.size[i, [0, 2]].min())]
+    quarter = HALF_PI * np.round((setting.heading[i] - setting.grain) / HALF_PI) + setting.grain
+    turns = [(float(quarter), 0.0), (float(quarter + HALF_PI), 0.1)]
+    if setting.kinds[i].role in ("seat", "sofa"):
+        turns += [(float(quarter - HALF_PI), 0.1), (float(quarter + math.pi), 0.1)]
+    rows = [(x, z, yaw, price + more) for x, z in points.tolist() for yaw, more in turns]
+    setting.rows[key] = rows
+    return rows
+
+
+def overhead(setting: Setting, state: State, i: int) -> list[Row]:
+    """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
+    above = vocabulary().predicate_id("above")
+    told = setting.triplets[(setting.triplets[:, 0] == i) & (setting.triplets[:, 1] == above)][:, 2].tolist()
+    rows: list[Row] = []
+    for j, kind in enumerate(setting.kinds):
+        lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
+        if not state.placed[j] or not (j in told or (lit and setting.standing(j))):
+            continue
+        price = 0.0 if j in told else 0.8 * _hanging_over(setting, state, i, j) + 0.4 * (kind.stands == "beside")
+        rows.append((float(state.position[j, 0]), float(state.position[j, 2]), float(state.yaw[j]), price))
+    middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
+    low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
+    rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.3 if low else 0.0))
+    return rows
+
+
+def _hanging_over(setting: Setting, state: State, i: int, j: int) -> int:
+    """How many other lamps hang over box j."""
+    lamps = state.placed & np.array([kind.support == "ceiling" for kind in setting.kinds])
+    lamps[i] = False
+    return int((np.hypot(*(state.position[lamps] - state.position[j])[:, [0, 2]].T) < 0.5).sum())
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """Angles in -pi to pi."""
+    return (angle + math.pi) % (2 * math.pi) - math.pi

@@ -1,0 +1,209 @@
+"""A room to be arranged: what stays the same while poses are tried, and where its boxes stand so far."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
+from echomodel.rules.living.access import TALL
+from echomodel.rules.living.plan import kind_of
+from echomodel.vocabulary import Category
+from echousd.repair.belonging import shared_fraction
+from echousd.repair.geometry import Floor
+from echousd.repair.problem import ON_FLOOR, Problem, required_order
+
+
+@dataclass(frozen=True, eq=False)
+class Zones:
+    """Boxes that others should keep out of.
+
+    Arguments:
+        size, position: (z, 3) float, metres; yaw: (z,) float, radians.
+        price: (z,) float, what it costs to stand in one. owner: (z,) int, the box that it belongs to, -1 = an opening.
+    """
+
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+    price: np.ndarray
+    owner: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What stays the same.
+
+    Arguments:
+        categories: n canonical category words.
+        size: (n, 3) float, metres. draft, heading: (n, 3) and (n,) float, where the boxes were drawn: the preference.
+        triplets: (e, 3) int, what must hold; rules: their rule set; centre: (2,) float, x and z of the room's centre.
+        fixed, turned: (n,) bool, boxes that must not move, must not turn.
+        floor: the floor polygon; height: of the ceiling, metres.
+        carrier: (n,) int, as `Problem.carrier`. anchor: (n,) int, whom each attends, -1 = nobody.
+        openings: doors and windows.
+    """
+
+    categories: tuple[str, ...]
+    size: np.ndarray
+    draft: np.ndarray
+    heading: np.ndarray
+    triplets: np.ndarray
+    rules: str
+    centre: np.ndarray
+    fixed: np.ndarray
+    turned: np.ndarray
+    floor: Floor
+    height: float
+    carrier: np.ndarray
+    anchor: np.ndarray
+    openings: Sequence[Opening] = ()
+
+    @cached_property
+    def kinds(self) -> tuple[Category, ...]:
+        """Rows of the vocabulary."""
+        return tuple(kind_of(word) for word in self.categories)
+
+    @cached_property
+    def shared(self) -> np.ndarray:
+        """(n, n) float: depth in metres to which two boxes may overlap; without bound for a carrier and its load."""
+        n = len(self.categories)
+        out = np.zeros((n, n))
+        for i in range(n):
+            for j in range(i):
+                share, owner = shared_fraction(self.kinds[i], self.kinds[j])
+                side = self.size[(i, j)[owner]]
+                out[i, j] = out[j, i] = share * min(side[0], side[2])
+                if self.anchor[i] != j and self.anchor[j] != i:  # chairs are tucked under their own table
+                    out[i, j] = out[j, i] = 0.0
+                if self.carrier[i] == j or self.carrier[j] == i:
+                    out[i, j] = out[j, i] = np.inf
+        return out
+
+    @cached_property
+    def order(self) -> np.ndarray:
+        """(n, n, 2) float: sign that the relations ask of (second - first) in x and z, 0 = none."""
+        return required_order(len(self.categories), self.triplets)
+
+    @cached_property
+    def rows(self) -> dict[tuple[str, int, float], list[tuple[float, float, float, float]]]:
+        """Poses that only the room and the box decide, kept when they are asked for again."""
+        return {}
+
+    @cached_property
+    def movable(self) -> np.ndarray:
+        """(n,) bool, seats that are moved aside to open something."""
+        return np.array([kind.role == "seat" and not kind.access for kind in self.kinds])
+
+    @cached_property
+    def walls(self) -> list[tuple[np.ndarray, np.ndarray, float, float]]:
+        """Start (2,), direction (2,), length and the heading of what stands with its back to it, for each wall."""
+        start = self.floor.polygon
+        edge = np.roll(start, -1, 0) - start
+        length = np.linalg.norm(edge, axis=1)
+        yaw = np.arctan2(self.floor.normal[:, 0], self.floor.normal[:, 1])
+        return [(start[k], edge[k] / length[k], float(length[k]), float(yaw[k])) for k in range(len(start))]
+
+    @cached_property
+    def grain(self) -> float:
+        """Heading of the longest wall, radians: free furniture stands parallel to it."""
+        return max(self.walls, key=lambda wall: wall[2])[3]
+
+    @cached_property
+    def doors(self) -> Zones:
+        """What doors, passages and windows need."""
+        rows = []
+        polygon = self.floor.polygon
+        for opening in self.openings:
+            near, far = segment(polygon, opening)
+            normal = inward_normal(polygon, opening.edge)
+            if opening.kind == "window":
+                depth, low, tall, price = WINDOW_DEPTH, opening.sill + TALL, opening.height, 4.0
+            else:
+                swings = opening.kind == "door" and opening.swing == "in"
+                depth, low, tall, price = (opening.width if swings else STEP), 0.02, opening.height, 6.0
+            middle = (near + far) / 2 + normal * depth / 2
+            rows.append((opening.width, tall, depth, middle[0], low, middle[1], np.arctan2(*normal), price))
+        table = np.array(rows).reshape(-1, 8)
+        return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], np.full(len(table), -1))
+
+    def standing(self, i: int) -> bool:
+        """Whether a box stands on the floor itself."""
+        return bool(self.carrier[i] == ON_FLOOR)
+
+
+def setting_of(
+    problem: Problem,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    size: np.ndarray,
+    turned: np.ndarray,
+    *,
+    openings: Sequence[Opening],
+    rules: str,
+    centre: np.ndarray,
+) -> Setting:
+    """The setting of a posed problem with a floor, whose boxes were drawn at these places.
+
+    Arguments:
+        position: (n, 3) float, metres; yaw: (n,) float, radians; size: (n, 3) float, metres.
+        turned: (n,) bool, headings that are stated. openings, rules, centre: as in `Setting`.
+    """
+    from echomodel.rules.living import plan_of
+
+    assert problem.floor is not None
+    boxes = _Boxes(size, position, yaw)
+    plan = plan_of(boxes, problem.categories, problem.floor.polygon, (), problem.triplets)
+    top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
+    return Setting(
+        problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
+        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), openings,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+
+@dataclass(eq=False)
+class State:
+    """Where the boxes stand so far.
+
+    Arguments:
+        position: (n, 3) float, yaw: (n,) float, placed: (n,) bool.
+        regrets: box -> poses that led to a bad end in earlier rounds: x, z, yaw and what that cost.
+    """
+
+    position: np.ndarray
+    yaw: np.ndarray
+    placed: np.ndarray
+    regrets: dict[int, list[tuple[float, float, float, float]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """K poses of one box: position (K, 3) float, yaw (K,) float, and what each costs by itself (K,) float."""
+
+    position: np.ndarray
+    yaw: np.ndarray
+    price: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.yaw)
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[float, float, float, float]], height: float) -> Poses:
+        """Poses from (x, z, yaw, price) with their bottom at `height`."""
+        table = np.asarray(rows, float).reshape(-1, 4)
+        position = np.stack([table[:, 0], np.full(len(table), height), table[:, 1]], -1)
+        return cls(position, table[:, 2], table[:, 3])
+
+    def take(self, rows: np.ndarray) -> Poses:
+        """The poses of these numbers."""
+        return Poses(self.position[rows], self.yaw[rows], self.price[rows])

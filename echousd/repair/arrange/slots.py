@@ -1,0 +1,152 @@
+"""Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, price)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from echomodel.vocabulary import Category
+
+Size = np.ndarray
+Slot = tuple[float, float, float, float]
+Slots = Callable[[Size, Size, Category, int], list[Slot]]
+HALF_PI = math.pi / 2
+TUCK = 0.12  # metres that a chair is pushed under its table
+REACH = 0.38  # metres between a sofa and its coffee table
+
+
+def head(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Nightstands: at both sides of the bed, their backs level with its head."""
+    out = []
+    for side in (-1.0, 1.0):
+        for gap, more in ((0.03, 0.0), (0.12, 0.2), (0.25, 0.5)):
+            lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
+            out.append((lateral, -anchor[2] / 2 + own[2] / 2, 0.0, more))
+    return out
+
+
+def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Coffee tables: before the sofa, in reach, the long side along it."""
+    inner = kind.name == "l_shaped_sofa"
+    out = []
+    for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.4)):
+        depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])
+        if width < depth * 0.95:
+            more += 0.3
+        for gap, away in ((REACH, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
+            gap = gap - 0.25 if inner else gap
+            for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
+                if abs(lateral) < anchor[0] / 2:
+                    out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.2 * abs(lateral)))
+    return out
+
+
+def around(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Chairs: along both long sides of a table and at its ends, looking at it."""
+    length, depth = float(anchor[0]), float(anchor[2])
+    if length >= depth:
+        return _around(own, length, depth, count)
+    # the long sides are the left and the right one: the same, turned by a quarter
+    return [(ahead, -aside, turn + HALF_PI, price) for aside, ahead, turn, price in _around(own, depth, length, count)]
+
+
+def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
+    out = []
+    fits = max(int((length + 0.1) // (own[0] + 0.06)), 1)
+    wanted = max(1, min(fits, math.ceil(count / 2)))
+    tuck = min(TUCK, 0.3 * float(own[2]))
+    for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
+        spacing = max(min(length / per_side, 0.85), float(own[0]) + 0.03)
+        more = 0.0 if per_side == wanted else 0.25
+        for k in range(per_side):
+            lateral = (k - (per_side - 1) / 2) * spacing
+            for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.3), (-0.1, 0.4)):
+                forward = depth / 2 + own[2] / 2 - tucked
+                price = more + push
+                out.append((lateral, -forward, 0.0, price))
+                out.append((lateral, forward, math.pi, price))
+    at_ends = 0.35 if count <= 2 * wanted else 0.1
+    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.3)):
+        out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
+        out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
+    return out
+
+
+def at_front(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Chairs at desks and dressing tables: in the middle of the front, looking at it."""
+    out = []
+    for tucked, push in ((0.1, 0.0), (0.25, 0.1), (0.0, 0.2), (0.4, 0.4)):
+        for lateral in (0.0, -0.12, 0.12, -0.3, 0.3):
+            if abs(lateral) < anchor[0] / 2:
+                out.append((lateral, anchor[2] / 2 + own[2] / 2 - min(tucked, 0.6 * own[2]), math.pi,
+                            push + 0.8 * abs(lateral)))  # fmt: skip
+    return out
+
+
+def company(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Armchairs: beside the coffee table or before the sofa, turned into the group."""
+    out = []
+    if kind.role == "board":  # around the coffee table, but not on its long side towards the sofa
+        for side in (-1.0, 1.0):
+            for gap, more in ((0.45, 0.0), (0.6, 0.05), (0.8, 0.2), (0.35, 0.2)):
+                for forward in (0.0, 0.3, -0.3, 0.6, -0.6):
+                    lateral = side * (anchor[0] / 2 + own[2] / 2 + gap)
+                    out.append((lateral, forward, math.atan2(-lateral, -forward), more + 0.3 * abs(forward)))
+        for side in (-1.0, 1.0):
+            for lateral in (0.0, 0.5, -0.5):
+                forward = side * (anchor[2] / 2 + own[2] / 2 + 0.45)
+                out.append((lateral, forward, math.atan2(-lateral, -forward), 0.25))
+        return out
+    for side in (-1.0, 1.0):
+        for away in (0.3, 0.5, 0.8):
+            for forward in (1.1, 1.4, 0.8):
+                lateral = side * (anchor[0] / 2 + own[2] / 2 + away - 0.4)
+                at = anchor[2] / 2 + forward
+                out.append((lateral, at, math.atan2(-lateral, 0.6 - at), 0.2))
+        out.append((side * (anchor[0] / 2 + own[0] / 2 + 0.5), 0.0, -side * 0.5, 0.5))
+    return out
+
+
+def beside(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Side tables and floor lamps: at the ends of a sofa or bed, or beside an armchair."""
+    out = []
+    for side in (-1.0, 1.0):
+        for gap, more in ((0.04, 0.0), (0.12, 0.1), (0.25, 0.3)):
+            lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
+            back = -anchor[2] / 2 + own[2] / 2
+            out += [(lateral, 0.0, 0.0, more), (lateral, back, 0.0, more + 0.02), (lateral, back / 2, 0.0, more + 0.05)]
+    return out
+
+
+def foot(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Benches and ottomans: at the foot of a bed, before a sofa or armchair."""
+    out = []
+    bed = kind.role == "bed"
+    for gap, more in ((0.04 if bed else 0.3, 0.0), (0.1 if bed else 0.45, 0.1), (0.2 if bed else 0.6, 0.3)):
+        for lateral in (0.0, -0.15, 0.15) if bed else (0.0, -0.5, 0.5, -0.9, 0.9, -1.3, 1.3):
+            for turn in (0.0, HALF_PI):
+                depth = own[2] if turn == 0.0 else own[0]
+                wide = 0.0 if (own[0] >= own[2]) == (turn == 0.0) else 0.3
+                out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + wide + 0.2 * abs(lateral)))
+    if not bed:  # at the sides of the group
+        for side in (-1.0, 1.0):
+            out.append((side * (anchor[0] / 2 + own[2] / 2 + 0.3), anchor[2] / 2 + 0.6, -side * HALF_PI, 0.4))
+    return out
+
+
+def on_top(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """Lamps and televisions: on the top of what carries them, towards its back."""
+    room_x, room_z = max(anchor[0] - own[0], 0.0) / 2, max(anchor[2] - own[2], 0.0) / 2
+    out = []
+    for share, more in ((0.0, 0.0), (0.5, 0.05), (-0.5, 0.05), (0.85, 0.15), (-0.85, 0.15)):
+        for deep, away in ((0.0, 0.0), (-0.6, 0.02)):
+            out.append((share * room_x, deep * room_z, 0.0, more + away))
+    return out
+
+
+STANDS: dict[str, Slots] = {
+    "head": head, "before": before, "around": around, "at_front": at_front, "company": company, "beside": beside,
+    "foot": foot, "on_top": on_top,
+}  # fmt: skip
