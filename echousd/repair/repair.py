@@ -222,14 +222,16 @@ def repair_boxes(
         return solve(at.problem, at.size, at.position, at.yaw, rules=rules, centre=centre, config=config)
 
     drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw)
-    if drawn.problem.floor is not None and config.arrange:
+    if floor_polygon is not None and config.arrange:
         sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
         told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
         usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=np.isin(np.arange(n), told))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
-        chosen = arrange(
-            setting_of(at.problem, at.position, at.yaw, at.size, turned, openings=openings, rules=rules, centre=centre)
-        )
+        setting = setting_of(
+            at.problem, at.position, at.yaw, at.size, turned,
+            openings=openings, outline=floor_polygon, rules=rules, centre=centre,
+        )  # fmt: skip
+        chosen = arrange(setting)
         at = posed(at.size, chosen.position, chosen.yaw)
     found = solved(at)
     if at is not drawn and violation(found.at) > UNSETTLED:  # what the graph states comes before all habits

@@ -20,8 +20,8 @@ def living_faults(graph: SceneGraph, boxes: Boxes, floor: np.ndarray) -> list[Fa
     return faults(
         boxes,
         [node.category for node in graph.nodes],
-        floor,
-        getattr(graph.room, "openings", ()),
+        floor if graph.room.corners is None else np.asarray(graph.room.corners),  # openings count its edges
+        graph.room.openings,
         graph_batch(graph).triplets,
         given=np.array([node.position is not None for node in graph.nodes]),
     )

@@ -44,7 +44,7 @@ class Setting:
         fixed, turned: (n,) bool, boxes that must not move, must not turn.
         floor: the floor polygon; height: of the ceiling, metres.
         carrier: (n,) int, as `Problem.carrier`. anchor: (n,) int, whom each attends, -1 = nobody.
-        openings: doors and windows.
+        openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
     """
 
     categories: tuple[str, ...]
@@ -60,7 +60,8 @@ class Setting:
     height: float
     carrier: np.ndarray
     anchor: np.ndarray
-    openings: Sequence[Opening] = ()
+    openings: Sequence[Opening]
+    outline: np.ndarray
 
     @cached_property
     def kinds(self) -> tuple[Category, ...]:
@@ -116,7 +117,7 @@ class Setting:
     def doors(self) -> Zones:
         """What doors, passages and windows need."""
         rows = []
-        polygon = self.floor.polygon
+        polygon = self.outline
         for opening in self.openings:
             near, far = segment(polygon, opening)
             normal = inward_normal(polygon, opening.edge)
@@ -143,6 +144,7 @@ def setting_of(
     turned: np.ndarray,
     *,
     openings: Sequence[Opening],
+    outline: np.ndarray,
     rules: str,
     centre: np.ndarray,
 ) -> Setting:
@@ -150,7 +152,7 @@ def setting_of(
 
     Arguments:
         position: (n, 3) float, metres; yaw: (n,) float, radians; size: (n, 3) float, metres.
-        turned: (n,) bool, headings that are stated. openings, rules, centre: as in `Setting`.
+        turned: (n,) bool, headings that are stated. openings, outline, rules, centre: as in `Setting`.
     """
     from echomodel.rules.living import plan_of
 
@@ -160,7 +162,7 @@ def setting_of(
     top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
     return Setting(
         problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
-        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), openings,
+        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), openings, outline,
     )  # fmt: skip
 
 
