@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
 from echomodel.data.furniture.sizes import size_statistics
 from echomodel.data.rooms.statistics import quantile, room_type_statistics
-from echomodel.openings import USUAL, Opening, edge_lengths, free_area, inward_normal, numbered, overlap, signed_area
+from echomodel.openings import (
+    SWINGS,
+    USUAL,
+    Opening,
+    edge_lengths,
+    free_area,
+    inward_normal,
+    numbered,
+    overlap,
+    signed_area,
+)
 from echomodel.vocabulary import vocabulary
 
 # Share of the floor that furniture covers in real rooms: median of each type (300 rooms), the rest like the last.
@@ -20,6 +31,7 @@ WAY = 0.9  # metres beside the longest piece
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 GRID = 0.1  # metres between the places that are tried for an opening
 CORNER = 0.1  # metres from a corner to a door
+OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
 PIER = 0.3  # metres of wall between a window and a corner or another opening
 SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
 
@@ -146,13 +158,15 @@ def _best(
         taste += 0.8 * len([o for o in shared if o.kind == kind]) - 0.05 * min(float(length), 6.0)
         places = np.arange(margin, length - width - margin + 1e-9, GRID)
         places = np.unique(np.round([*places, length - width - margin, (length - width) / 2], 3))
-        for offset in places:
+        for offset, swing in product(places, SWINGS if kind == "door" else ("in",)):
             near, far = float(offset), float(length - width - offset)
             hinge = "left" if (near <= far) == (signed_area(polygon) > 0) else "right"
-            one = Opening(name, kind, edge, near, width, tall, usual["sill"], hinge if kind == "door" else "left")
+            hinge = hinge if kind == "door" else "left"
+            one = Opening(name, kind, edge, near, width, tall, usual["sill"], hinge, swing)
             if any(overlap(one, other) > -PIER for other in shared):
                 continue
             cost = taste + (0.25 * min(near, far) if kind == "door" else 0.3 * abs(near - far) / length)
+            cost += OUTWARDS * (swing == "out")
             free = shapely.Polygon(free_area(polygon, one))
             cost += 3.0 * float(free.difference(outline).area)  # into the next wall of a niche
             cost += 12.0 * sum(

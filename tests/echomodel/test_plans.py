@@ -68,3 +68,15 @@ def test_halls_get_more_openings_and_cupboards_none() -> None:
     rng = np.random.default_rng(0)
     assert [o.kind for o in place_openings(rectangle(8, 6), 2.6, rng)] == ["door", "door", "window", "window"]
     assert place_openings(rectangle(0.8, 0.8), 2.6, rng) == ()
+
+
+def test_a_door_swings_out_of_a_room_that_leaves_its_leaf_no_place() -> None:
+    floor = rectangle(3.0, 3.0)
+    block = (np.array([[1.4, 1.0, 1.4]]), np.zeros((1, 3)), np.zeros(1))  # 0.8 m all around
+    door = place_openings(floor, 2.6, np.random.default_rng(0), boxes=block)[0]
+    assert door.swing == "in"  # in a corner
+    corners = [(x, 0.0, z) for x in (-1.25, 1.25) for z in (-1.25, 1.25)]  # and something in every corner
+    size = np.array([[1.75, 1.0, 1.75]] + [[0.5, 1.0, 0.5]] * 4)
+    boxes = (size, np.array([(0.0, 0.0, 0.0), *corners]), np.zeros(5))
+    door = place_openings(floor, 2.6, np.random.default_rng(0), boxes=boxes)[0]
+    assert door.swing == "out"
