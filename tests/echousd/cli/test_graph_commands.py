@@ -41,6 +41,22 @@ def test_new_from_a_room_type(echousd_command, tmp_path):
     assert "desk right double_bed" not in stated  # usual, but it contradicts
 
 
+def test_new_with_doors_and_windows(echousd_command, tmp_path):
+    out = tmp_path / "a.usda"
+    words = ["--room", "bedroom", "--size", "4", "3.5", "--window", "north 1.2 1.6", "--door"]
+    assert echousd_command("new", out, *words, "south 0.3 hinge=right").code == 0
+    door, window = load_graph(out).room.openings
+    assert (door.edge, door.offset, door.hinge) == (3, 0.3, "right")
+    assert (window.edge, window.offset, window.width) == (1, 1.2, 1.6)
+    shown = echousd_command("graph", out).out
+    assert "4 x 3.5 m, 1 door, 1 window" in shown
+    assert "door 'door' in wall 3 at 0.3 m, 0.9 x 2 m, hinge right, swings in" in shown
+    outcome = echousd_command("new", tmp_path / "b.usda", *words, "south 3.3")
+    assert outcome.code == 2
+    assert "reaches from 3.30 to 4.20 m along wall 3, which is 3.50 m long" in outcome.err
+    assert not (tmp_path / "b.usda").exists()
+
+
 def test_new_does_not_overwrite_unless_told(echousd_command, tmp_path):
     out = tmp_path / "a.usda"
     out.write_text("mine")
