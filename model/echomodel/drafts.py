@@ -19,6 +19,7 @@ from echomodel.vocabulary import vocabulary
 
 PLACED = 2.0  # relations that a piece is worth which found a place of its own
 DEALS = 4  # ways in which equal pieces are dealt to the nodes
+EXCHANGES = 3  # rounds in which two equal pieces may change places
 TOGETHER = 4  # arrangements that are drawn before they are judged
 MIRRORS = ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
 
@@ -79,8 +80,9 @@ def _scene(graph: GraphBatch, rng: np.random.Generator, rules: str, draws: int) 
         kept = _kept(found, triplets, rules)
         merit = kept + PLACED * np.array([candidate.placed for candidate in found])
         number = int(merit.argmax())
-        if merit[number] > most:
-            best, most, share = found[number], merit[number], float(kept[number]) / max(len(triplets), 1)
+        chosen, count = _exchanged(found[number], float(kept[number]), category, triplets, rules)
+        if count + PLACED * chosen.placed > most:
+            best, most, share = chosen, count + PLACED * chosen.placed, count / max(len(triplets), 1)
         if most >= len(triplets) + PLACED * len(categories):
             break
     assert best is not None
@@ -117,6 +119,26 @@ def _dealt(one: _Candidate, category: np.ndarray, rng: np.random.Generator) -> _
     deal = np.empty(len(category), int)
     deal[places] = order
     return _Candidate(one.size[deal], one.position[deal], one.yaw[deal], one.placed)
+
+
+def _exchanged(
+    one: _Candidate, kept: float, category: np.ndarray, triplets: Tensor, rules: str
+) -> tuple[_Candidate, float]:
+    """The arrangement after equal pieces changed places as long as that keeps more relations, and how many it keeps."""
+    pairs = [(i, k) for i in range(len(category)) for k in range(i) if category[i] == category[k]]
+    for _ in range(EXCHANGES):
+        if kept >= len(triplets) or not pairs:
+            break
+        order = np.tile(np.arange(len(category)), (len(pairs), 1))
+        for row, (i, k) in enumerate(pairs):
+            order[row, [i, k]] = k, i
+        others = [_Candidate(one.size[o], one.position[o], one.yaw[o], one.placed) for o in order]
+        counts = _kept(others, triplets, rules)
+        number = int(counts.argmax())
+        if counts[number] <= kept:
+            break
+        one, kept = others[number], float(counts[number])
+    return one, kept
 
 
 def _kept(candidates: list[_Candidate], triplets: Tensor, rules: str) -> np.ndarray:
