@@ -12,16 +12,14 @@ from echomodel.boxes import Boxes
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
 from echomodel.compact.given import known_values, starting_noise
 from echomodel.compact.joined import equal_furniture, joined
+from echomodel.compact.layouts import LayoutSampling, sample_boxes
 from echomodel.compact.learned import in_learned_words, unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.predictors import agreeing, layout_predictor, shape_predictor
+from echomodel.compact.predictors import agreeing, shape_predictor
 from echomodel.compact.wholeness import bearing, group_means, wholeness
 from echomodel.config import CompactConfig, Sampler
-from echomodel.drafts import drafted
-from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
-from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener, part_of, touched_nodes
 from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample
@@ -121,8 +119,9 @@ class EchoModel:
                 None = the config's.
             noise: (N, 8) starting noise in place of the generator's.
             start: level of noise at which sampling begins, on the room generator's arrangement of the same furniture
-                (`echomodel.drafts`), 0 = that arrangement, 1 = on noise alone, None = the config's. Where boxes are
-                known or a floor is not, sampling begins on noise.
+                (`echomodel.drafts`), 0 = that arrangement, 1 = on noise alone, None = the config's. Sampling begins on
+                noise where the arrangement keeps little of what is told, many relations are, boxes are known, or the
+                floor is not.
             progress: called with (steps done, steps).
 
         Returns:
@@ -131,36 +130,23 @@ class EchoModel:
         Raises:
             ValueError: a graph, box or argument that the model cannot work with; the message names it.
         """
-        config = self.config
         graph = self._checked(graph)
         known, known_mask = known_values(graph, known, known_mask, self.device)
-        scale = self.model.statistics.scale(in_learned_words(graph, config).category)
-        given = None if known is None else known.encode(scale)
-        conditional = self._layout_predictor(graph, self.graph_latent(graph, edit), rules)
-        if guidance != 1.0:
-            bare = graph.with_triplets(graph.triplets[:0])
-            free = self._layout_predictor(bare, self.graph_latent(bare), rules)
-            conditional = guided(conditional, free, guidance)
-        strength = config.layout.guidance if relation_guidance is None else relation_guidance
-        if strength:
-            conditional = relation_guided(
-                conditional, graph.triplets, scale,
-                rules=rules, strength=strength, rounds=config.layout.guidance_rounds, floor=graph.floor[graph.scene],
-            )  # fmt: skip
-        begin, draft = config.layout.start if start is None else start, None
-        if begin < 1 and known is None and bool(floors_known(graph.floor).all()):
-            draft = drafted(graph, generator, rules=rules)[0].to(self.device).encode(scale)
-        x = starting_noise((graph.num_nodes, 8), generator, noise, self.device)
-        vectors = sample(
-            sampler or config.layout.sampler, conditional, x, steps or config.layout.steps, config.layout.objective,
-            known=given, known_mask=known_mask, generator=generator, progress=progress,
-            draft=draft, start=1.0 if draft is None else begin,
-        )  # fmt: skip
-        boxes = Boxes.decode(vectors, scale)
-        boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
-        if known is None or known_mask is None:
-            return boxes
-        return boxes.replaced(known_mask, known)
+        how = LayoutSampling(
+            generator,
+            rules,
+            steps,
+            sampler,
+            known,
+            known_mask,
+            edit,
+            guidance,
+            relation_guidance,
+            noise,
+            start,
+            progress,
+        )
+        return sample_boxes(self.model, self.graph_latent, graph, how)
 
     @torch.no_grad()
     def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
@@ -303,14 +289,6 @@ class EchoModel:
             generator=generator, steps=steps, sampler=sampler, known=known, known_mask=known_mask,
             guidance=guidance, bare_latent=None if guidance == 1.0 else self.graph_latent(bare), progress=progress,
         )  # fmt: skip
-
-    def _layout_predictor(self, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
-        config = self.config
-        if rules not in config.rules:
-            raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
-        graph = in_learned_words(graph, config)
-        chosen = torch.full_like(graph.room_type, config.rules.index(rules))
-        return layout_predictor(self.model, graph, pairs_of(graph, config.predicates), latent, chosen)
 
     def _shape_predictor(
         self, graph: GraphBatch, size: Tensor, equal: Tensor, edit: GraphEdit | None, guidance: float, count: int

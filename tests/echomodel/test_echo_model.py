@@ -10,6 +10,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.joined import equal_furniture
+from echomodel.compact import layouts
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
