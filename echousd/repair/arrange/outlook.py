@@ -23,6 +23,8 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     out = np.zeros(len(poses))
     for slots, asked, members in _waiting(setting, state, i):
         best = slots if asked.any() else [slot for slot in slots if slot[3] <= 0.11]
+        if not best:  # all of its places are far-fetched
+            continue
         local = np.array(_distinct(best, 0.3))
         c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
         offset = np.stack([c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0]], -1)

@@ -82,3 +82,29 @@ def test_sizes_that_no_such_furniture_has_are_mended():
     assert done.size[4].max() < 1.3
     rigid = repair_boxes(BEDROOM, huge, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7, rigid=np.ones(6, bool))
     assert np.array_equal(rigid.size, huge)
+
+
+def test_a_piece_whose_places_are_all_far_fetched() -> None:
+    """An L-shaped sofa with its pendant told, from a room that once stopped the repair."""
+    words = [
+        "l_shaped_sofa",
+        "coffee_table",
+        "pendant_lamp",
+        "dining_chair",
+        "dining_chair",
+        "dining_table",
+        "lounge_chair",
+    ]
+    size = [
+        [2.91, 0.66, 1.54], [0.8, 0.35, 0.57], [0.98, 0.92, 0.63], [0.46, 0.81, 0.55], [0.46, 0.81, 0.55],
+        [2.53, 0.74, 0.97], [0.85, 0.8, 0.58],
+    ]  # fmt: skip
+    position = [
+        [-1.24, 0.0, -1.16], [-0.91, 0.0, 0.15], [-1.4, 1.78, -0.21], [1.52, 0.0, -0.06], [2.77, 0.0, -1.25],
+        [2.14, 0.0, -0.65], [0.85, 0.0, -0.02],
+    ]  # fmt: skip
+    yaw = [0.0, 0.0, 0.0, 1.57, -1.57, 1.57, -1.57]
+    floor = np.array([[-3.25, 1.95], [3.25, 1.95], [3.25, -1.95], [-3.25, -1.95]])
+    told = np.array([[4, 3, 5], [2, 6, 0], [1, 9, 0], [5, 8, 3]])
+    done = repair_boxes(words, np.array(size), np.array(position), np.array(yaw), told, floor_polygon=floor, height=2.7)
+    assert (done.verdict != 0).all()
