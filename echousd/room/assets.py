@@ -9,9 +9,10 @@ import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
 from echousd.room.geometry import Geometry
+from echousd.room.joints import write_joints
 from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks
-from echousd.room.paths import payload_name, piece_name
+from echousd.room.paths import payload_name, piece_name, piece_path
 from echousd.room.surface import Surface, surface
 
 
@@ -70,18 +71,20 @@ def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, 
 
     Arguments:
         name: of the asset.
-        forms: name of a part -> its surface.
+        forms: path of a part below the root -> its surface.
         geometry: whose parts these are, and whose colliders are written.
         data: customLayerData.
     """
     stage = new_stage(name, ".usdc", data)
     UsdGeom.Xform.Define(stage, f"/{name}")
-    for part, form in forms.items():
-        write_mesh(stage, f"/{name}/{piece_name(name, part)}", form)
+    for body in sorted({part.body for part in geometry.parts if part.body}):
+        UsdGeom.Xform.Define(stage, f"/{name}/{piece_name(name, body)}")
+    for path, form in forms.items():
+        write_mesh(stage, f"/{name}{path}", form)
     for collider in geometry.colliders:
         every = np.arange(len(collider.mesh.faces))
         form = surface(collider.mesh, {"collider": every})
-        guide = write_mesh(stage, f"/{name}/{piece_name(name, collider.name)}", form)
+        guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
         guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
     return stage.GetRootLayer()
 
@@ -92,6 +95,7 @@ def component_layer(
     style: str,
     extent: np.ndarray,
     slots: Mapping[str, Sequence[str]],
+    geometry: Geometry,
     data: Mapping[str, Any],
 ) -> Sdf.Layer:
     """`<name>.usda`: kind, extentsHint, asset info, looks of its own and the payload `./<name>_geo.usdc`.
@@ -99,7 +103,8 @@ def component_layer(
     Arguments:
         name, category, style: words; the style chooses the looks, which a room's materials layer overrides.
         extent: (2, 3) float, metres.
-        slots: name of a part -> its material slots.
+        slots: path of a part below the root -> its material slots.
+        geometry: whose joints are written.
         data: customLayerData.
     """
     stage = new_stage(name, ".usda", data)
@@ -110,22 +115,23 @@ def component_layer(
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
-    palette, bindings = palette_for(style), slot_paths(f"/{name}", name, slots)
+    if geometry.joints:
+        write_joints(stage, name, geometry)
+    palette, bindings = palette_for(style), slot_paths(f"/{name}", slots)
     write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
     return without_stage(stage, lambda layer: _add_payload(layer, name))
 
 
-def slot_paths(root: str, asset: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
+def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
     """Prim path -> material slot: the part's mesh where it has one slot, a subset of it for each of several.
 
     Arguments:
         root: path of the asset's root prim, or of an object that references it.
-        asset: its name.
-        slots: name of a part -> its material slots.
+        slots: path of a part below that -> its material slots.
     """
     out: dict[str, str] = {}
     for part, names in slots.items():
-        mesh = f"{root}/{piece_name(asset, part)}"
+        mesh = f"{root}{part}"
         out |= {f"{mesh}/{slot}" if len(names) > 1 else mesh: slot for slot in names}
     return out
 

@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 import echousd
 from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
 from echousd.room.geometry import LICENCE
-from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_name
+from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface
@@ -26,7 +26,7 @@ LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest fi
 
 @dataclass(frozen=True)
 class Asset:
-    """One piece of furniture, ready to be written: part -> its material slots, and the files."""
+    """One piece of furniture, ready to be written: path of a part below its root -> material slots, and the files."""
 
     name: str
     slots: Mapping[str, Sequence[str]]
@@ -126,8 +126,10 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
         asset = room.assets[node.name]
         x, y, z = (float(v) for v in room.boxes.size[number])
         path = f"{OBJECTS}/{node.name}"
-        colliders = {f"{path}/{piece_name(asset, c.name)}": c.approximation for c in room.geometry[node.name].colliders}
-        bodies.append(physics.Body(path, colliders, node.category, (x, y, z)))
+        geometry = room.geometry[node.name]
+        colliders = {piece_path(path, asset, c.name, c.body): c.approximation for c in geometry.colliders}
+        articulated = bool(geometry.joints)
+        bodies.append(physics.Body(path, colliders, node.category, (x, y, z), geometry.mass, articulated))
     static = [mesh.path for part in built for mesh in part.meshes if mesh.solid]
     physics.write_physics(stage, bodies, static)
     physics.set_gravity(stage, room.options.up_axis)
@@ -145,7 +147,7 @@ def materials_layer(room: RoomData, made: Mapping[str, Asset], built: Sequence[s
         asset, style = room.assets[node.name], room.styles[node.name]
         slug = "".join(c if c.isalnum() else "_" for c in style)
         palette = looks.palette_for(f"{style} {room.provenance.seed}")
-        for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", asset, made[asset].slots).items():
+        for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", made[asset].slots).items():
             name = f"{slug}_{slot}" if slug[0].isalpha() else f"style_{slug}_{slot}"
             table[name] = looks.look(palette, slot)
             bindings[path] = name
@@ -214,9 +216,12 @@ def _add_sublayers(layer: Sdf.Layer) -> None:
 def _asset(room: RoomData, name: str, user: str) -> Asset:
     geometry, category = room.geometry[user], room.graph.node(user).category
     if name in room.carried:
-        return Asset(name, {part.name: tuple(part.slots) for part in geometry.parts}, room.carried[name])
+        carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
+        return Asset(name, carried, room.carried[name])
     forms = {
-        part.name: surface(part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease)
+        piece_path("", name, part.name, part.body): surface(
+            part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease
+        )
         for part in geometry.parts
     }
     slots = {part: tuple(form.groups) for part, form in forms.items()}
@@ -227,7 +232,7 @@ def _asset(room: RoomData, name: str, user: str) -> Asset:
     if geometry.origin.credit:
         data["asset_credit"] = geometry.origin.credit
     payload = assets.geometry_layer(name, forms, geometry, data)
-    component = assets.component_layer(name, category, room.styles[user], extent, slots, data)
+    component = assets.component_layer(name, category, room.styles[user], extent, slots, geometry, data)
     files = {
         payload_file(name): layer_bytes(payload, ".usdc"),
         component_file(name): layer_bytes(component, ".usda"),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import trimesh
 
+from echomodel.data.furniture.solids import Joint
 from echousd.room.surface import CREASE
 
+FRAME = "frame"  # the body that holds the joints
 LICENCE = "Apache-2.0"  # of everything that EchoUSD itself makes
 
 
@@ -38,17 +40,19 @@ class Part:
         mesh: in the object's frame, metres.
         slots: material slot (a group of `echousd.room.looks`) -> (m,) int face numbers; together every face once.
         crease: neighbours that fold more sharply than this keep a hard edge, radians.
+        body: what it moves with, see `Geometry.joints`; empty where the whole piece is one body.
     """
 
     name: str
     mesh: trimesh.Trimesh
     slots: Mapping[str, np.ndarray]
     crease: float = CREASE
+    body: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Mass:
-    """What a piece of furniture weighs.
+    """What a piece of furniture, or one body of it, weighs.
 
     Arguments:
         mass: kilograms. centre: (3,) float, metres, in the object's frame.
@@ -69,11 +73,13 @@ class Collider:
         name: unique in its geometry; the prim is called `<asset>_<name>`.
         mesh: in the object's frame, metres.
         approximation: UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`.
+        body: as for `Part`.
     """
 
     name: str
     mesh: trimesh.Trimesh
     approximation: str
+    body: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +91,16 @@ class Geometry:
         colliders: at least one; together they cover all parts.
         origin: provenance and licence.
         mass: what it weighs, None = nobody knows, it is estimated from the category and the box.
+        joints: of the bodies that move (drawers, doors); what is fixed then belongs to the body `FRAME`.
+        masses: body -> what it weighs, for every body of a piece with joints.
     """
 
     parts: tuple[Part, ...]
     colliders: tuple[Collider, ...]
     origin: Origin
     mass: Mass | None = None
+    joints: tuple[Joint, ...] = ()
+    masses: Mapping[str, Mass] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]

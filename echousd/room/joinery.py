@@ -10,7 +10,7 @@ import trimesh
 
 from echomodel.data.furniture.assembly import Piece, pieces_of
 from echomodel.data.furniture.solids import FINEST, Solid
-from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
+from echousd.room.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
 # kg/m³ of what a solid stands for: tubes and shades are hollow, upholstery is foam on a light frame.
@@ -20,7 +20,7 @@ DENSITY = {
     "book": 650.0, "stem": 500.0,
 }  # fmt: skip
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
-COLLIDERS = 16  # convex pieces of one body at most
+COLLIDERS = 24  # convex pieces of one body at most
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
@@ -34,20 +34,32 @@ def assembled(solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: 
         origin: provenance.
     """
     pieces = within_budget(solids, size, faces)
-    bodies: dict[str, list[Piece]] = {"mesh": []}
-    for piece in pieces:
-        bodies.setdefault(piece.joint.body if piece.joint else "mesh", []).append(piece)
-    bodies = {name: members for name, members in bodies.items() if members}
-    parts = tuple(_part(name, members) for name, members in bodies.items())
     plain = pieces_of([piece.solid for piece in pieces], size, 1)
+    fixed = FRAME if any(piece.joint for piece in pieces) else ""
+    parts: list[Part] = []
     colliders: list[Collider] = []
-    for name in bodies:
-        own = [p for p in plain if (p.joint.body if p.joint else "mesh") == name]
-        hulls = convex_pieces([p.vertices for p in own], float(np.prod(size)))
-        prefix = "collider" if name == "mesh" else f"{name}_collider"
-        names = [prefix] + [f"{prefix}_{n}" for n in range(2, len(hulls) + 1)]
-        colliders += [Collider(word, hull, "convexHull") for word, hull in zip(names, hulls, strict=True)]
-    return Geometry(parts, tuple(colliders), origin, mass=mass_of(plain))
+    masses: dict[str, Mass] = {}
+    for body, members in _bodies(pieces, fixed).items():
+        prefix = f"{body}_" if body != fixed else ""
+        parts.append(_part(f"{prefix}mesh", members, body))
+        own = _bodies(plain, fixed)[body]
+        hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
+        words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
+        colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
+        masses[body] = mass_of(own)
+    joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
+    return Geometry(
+        tuple(parts), tuple(colliders), origin,
+        mass=mass_of(plain), joints=tuple(joints.values()), masses=masses if fixed else {},
+    )  # fmt: skip
+
+
+def _bodies(pieces: Sequence[Piece], fixed: str) -> dict[str, list[Piece]]:
+    """Body -> its solids, what is fixed first."""
+    out: dict[str, list[Piece]] = {fixed: []}
+    for piece in pieces:
+        out.setdefault(piece.joint.body if piece.joint else fixed, []).append(piece)
+    return {body: members for body, members in out.items() if members}
 
 
 def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list[Piece]:
@@ -65,13 +77,13 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list
     return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0)
 
 
-def _part(name: str, pieces: Sequence[Piece]) -> Part:
+def _part(name: str, pieces: Sequence[Piece], body: str) -> Part:
     offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     faces = np.concatenate([piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)])
     mesh = trimesh.Trimesh(np.concatenate([piece.vertices for piece in pieces]), faces, process=False)
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
-    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE)
+    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
 
 
 @dataclass(frozen=True, eq=False)

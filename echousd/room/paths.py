@@ -11,6 +11,13 @@ def piece_name(asset: str, piece: str) -> str:
     return f"{asset}_{piece}"
 
 
+def piece_path(root: str, asset: str, piece: str, body: str = "") -> str:
+    """Path of the prim of a part or collider below the root of its asset, or below the body that it moves with."""
+    return (
+        f"{root}/{piece_name(asset, body)}/{piece_name(asset, piece)}" if body else f"{root}/{piece_name(asset, piece)}"
+    )
+
+
 def piece_of(asset: str, prim: str) -> str | None:
     """The part or collider that a prim's name says, None if it is not named for this asset."""
     piece = prim.removeprefix(f"{asset}_")

@@ -9,18 +9,28 @@ import numpy as np
 from pxr import Gf, Usd, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
+from echousd.room.geometry import Mass
+from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC, write_mass
 
 GRAVITY = 9.81  # m/s²
 
 
 @dataclass(frozen=True)
 class Body:
-    """One object for the physics layer: its root, path -> approximation of its colliders, category, size in metres."""
+    """One object for the physics layer.
+
+    Arguments:
+        root: path of the object. colliders: path -> approximation. category: its word. size: (x, y, z), metres.
+        mass: what it weighs, None = estimated from category and size.
+        articulated: whether its asset has joints; then it is one body only in its variant `static`.
+    """
 
     root: str
     colliders: Mapping[str, str]
     category: str
     size: tuple[float, float, float]
+    mass: Mass | None = None
+    articulated: bool = False
 
 
 def movable(category: str) -> bool:
@@ -50,12 +60,32 @@ def write_physics(stage: Usd.Stage, bodies: Iterable[Body], static_meshes: Itera
             UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(approximation)
         if movable(body.category):
             root = stage.OverridePrim(body.root)
-            UsdPhysics.RigidBodyAPI.Apply(root)
-            UsdPhysics.MassAPI.Apply(root).CreateMassAttr(mass(body.category, body.size))
+            if not body.articulated:
+                rigid(root, body)
+                continue
+            variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
+            for name in (STATIC, ARTICULATED):
+                variants.AddVariant(name)
+                variants.SetVariantSelection(name)
+                with variants.GetVariantEditContext():
+                    if name == STATIC:
+                        rigid(root, body)
+                    else:
+                        UsdPhysics.ArticulationRootAPI.Apply(root)
+            variants.ClearVariantSelection()
     for path in static_meshes:
         prim = stage.OverridePrim(path)
         UsdPhysics.CollisionAPI.Apply(prim)
         UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(UsdPhysics.Tokens.none)
+
+
+def rigid(prim: Usd.Prim, body: Body) -> None:
+    """Make a prim one rigid body."""
+    UsdPhysics.RigidBodyAPI.Apply(prim)
+    if body.mass is None:
+        UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(mass(body.category, body.size))
+    else:
+        write_mass(prim, body.mass)
 
 
 def set_gravity(stage: Usd.Stage, up_axis: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from echousd.graph import SceneGraph
 from echousd.room.colliders import approximation
 from echousd.room.folder import recover
 from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
+from echousd.room.joints import read_joints, read_mass
 from echousd.room.manifest import find_manifest
 from echousd.room.paths import OBJECTS, component_file, payload_file, piece_of
 from echousd.room.within import inside
@@ -109,21 +110,33 @@ def _layouts(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> tuple[B
 def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:
     """Parts and colliders below an object's root; None where there is no mesh of ours."""
     parts, colliders = [], []
-    for prim in root.GetChildren() if root and asset else ():
-        name = piece_of(asset or "", prim.GetName())
-        if name is None or not prim.IsA(UsdGeom.Mesh):
-            continue
+    for prim, name, body in _pieces(root, asset) if root and asset else ():
         form, mesh = _mesh(UsdGeom.Mesh(prim)), UsdGeom.Mesh(prim)
         if mesh.GetPurposeAttr().Get() == UsdGeom.Tokens.guide:
             kind = prim.GetAttribute("physics:approximation").Get() or approximation(category)
-            colliders.append(Collider(name, form, kind))
+            colliders.append(Collider(name, form, kind, body))
         else:
-            parts.append(Part(name, form, _slots(mesh, len(form.faces))))
+            parts.append(Part(name, form, _slots(mesh, len(form.faces)), body=body))
     if not parts or not colliders:
         return None
     told = manifest.get("meshes", {}).get(asset, {})
     origin = Origin(told.get("source", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
-    return Geometry(tuple(parts), tuple(colliders), origin)
+    return Geometry(tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""))
+
+
+def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:
+    """Meshes of ours below an object's root, their names, and the body that they stand below, empty = the root."""
+    for prim in root.GetChildren():
+        name = piece_of(asset, prim.GetName())
+        if name is None:
+            continue
+        if prim.IsA(UsdGeom.Mesh):
+            yield prim, name, ""
+        elif prim.IsA(UsdGeom.Xform):
+            for child in prim.GetChildren():
+                own = piece_of(asset, child.GetName())
+                if own is not None and child.IsA(UsdGeom.Mesh):
+                    yield child, own, name
 
 
 def _mesh(mesh: UsdGeom.Mesh) -> trimesh.Trimesh:
