@@ -53,8 +53,8 @@ def test_a_piece_is_watertight_fills_its_size_and_survives_the_grid(category):
         assert set(mesh.face_attributes["material"]) <= set(range(len(MATERIALS)))
     back = mesh_from_tsdf(tsdf_of(solids(category, style, Choices.draw(np.random.default_rng(0)), size)))
     assert back.is_watertight
-    # A voxel more for parts thickened at the edge of the box, two less for tips of thin parts.
-    assert (back.extents < 1.045).all()
+    # Up to two voxels more for parts thickened at the edge of the box, two less for tips of thin parts.
+    assert (back.extents < 1.06).all()
     assert (back.extents > 0.9).all()
 
 

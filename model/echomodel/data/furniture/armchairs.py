@@ -138,7 +138,14 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             material="fabric",
             radius=0.045,
         )
-        return [*parts, pad, back, *(slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else [])]
+        x, y, t = w * 0.48, seat * 0.8, 0.04 * style.bulk
+        rails: list[Solid] = [
+            box((s * x - t * (s > 0), y - t, -d * 0.43), (s * x + t * (s < 0), y, d * 0.43), role="rail")
+            for s in (-1, 1)
+        ]
+        rails += [box((-x, y - t, z - t / 2), (x, y, z + t / 2), role="rail") for z in (-d * 0.3, d * 0.36)]
+        arms = slim_arms(w, d, seat, h, style, 0.035) if style.arms != "none" else []
+        return [*parts, *rails, pad, back, *arms]
     wall = 0.05 + 0.05 * style.softness
     foot = seat * 0.5
     arms = foot + (h - foot) * (0.3 + 0.25 * style.arm_height)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, cushion
+from echomodel.data.furniture.carpentry import Size, base, box, core, cushion
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.fronts import front
 from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
@@ -83,7 +83,7 @@ def _headboard(style: Style, w: float, h: float, z: float, choices: Choices) -> 
 def _bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int) -> list[Solid]:
     """Mattress, pillows and a cover from z0 (head) to z1."""
     thick = 0.2
-    parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "fabric", 0.05)]
+    parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
     each = w / pillows
     for i in range(pillows):
         x = -w / 2 + each * (i + 0.5)
@@ -93,7 +93,8 @@ def _bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style
                 half=np.array([min(each * 0.44, 0.38), 0.09, 0.22]),
                 power=2.8,
                 turn=rotation(x=-0.25),
-                material="shade",
+                material="linen",
+                role="pillow",
             )
         )
     if choices.chance("cover", 0.75):
@@ -103,8 +104,19 @@ def _bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style
             box(
                 (-w / 2 - over, low + thick * 0.35, start),
                 (w / 2 + over, low + thick + 0.045, z1 + over * 0.5),
-                "accent",
+                "blanket",
                 0.035,
+                "cover",
+            )
+        )
+        fold = 0.1 + 0.08 * style.softness  # the sheet turned back over it
+        parts.append(
+            box(
+                (-w / 2 - over - 0.004, low + thick * 0.4, start - 0.01),
+                (w / 2 + over + 0.004, low + thick + 0.056, start + fold),
+                "linen",
+                0.03,
+                "cover",
             )
         )
     return parts
@@ -123,14 +135,25 @@ def _bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "splayed") else "straight"
     parts: list[Solid] = base(style, frame * 0.96, (d - head) * 0.96, foot, 0.07 * style.bulk, kind)
     upholstered = style.softness > 0.5
-    parts.append(
+    stuff, radius = ("fabric", 0.025) if upholstered else ("wood", 0.004 + 0.008 * style.edge)
+    t = 0.07 if upholstered else 0.04
+    parts += [
         box(
-            (-frame / 2, foot, z0 + head * 0.5),
-            (frame / 2, deck, z1),
-            "fabric" if upholstered else "wood",
-            0.03 if upholstered else 0.0,
+            (s * frame / 2 - t * (s > 0), foot, z0 + head * 0.5),
+            (s * frame / 2 + t * (s < 0), deck, z1),
+            stuff,
+            radius,
+            "rail",
         )
+        for s in (-1, 1)
+    ]
+    parts += [
+        box((-frame / 2, foot, z), (frame / 2, deck, z + t), stuff, radius, "rail") for z in (z0 + head * 0.5, z1 - t)
+    ]
+    parts.append(
+        box((-frame / 2 + t / 2, deck - 0.09, z0 + head), (frame / 2 - t / 2, deck - 0.06, z1 - t / 2), "wood")
     )
+    parts.append(core((-frame / 2, foot, z0 + head * 0.5), (frame / 2, deck, z1), stuff))
     parts += _headboard(style, w, h, z0, choices)
     parts += _bedding(frame * 0.95, z0 + head, z1 - 0.04, deck - 0.06, choices, style, pillows)
     if style.headboard in ("slats", "posts", "arched") and choices.chance("second", 0.6):
@@ -157,7 +180,7 @@ def kids_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return _bunk(size, style, choices)
     if h > 1.2 and choices.chance("kind", 0.45):
         return _loft(size)
-    house = h > 1.1 and choices.chance("extra", 0.7)
+    house = h > 1.25 and choices.chance("extra", 0.7)
     parts = _bed(np.array([w, min(h, 1.0) if house else h, d]), style, choices, 1)
     if house:
         return parts + _house(w, h, d)
@@ -199,7 +222,13 @@ def _loft(size: Size) -> list[Solid]:
     parts: list[Solid] = [box((x - t, 0, z - t), (x + t, h - 0.05, z + t)) for x, z in posts]
     parts.append(box((-w / 2, deck, -d / 2), (w / 2, deck + 0.1, d / 2)))
     parts.append(
-        box((-w / 2 + 0.05, deck + 0.08, -d / 2 + 0.05), (w / 2 - 0.05, deck + 0.22, d / 2 - 0.05), "fabric", 0.04)
+        box(
+            (-w / 2 + 0.05, deck + 0.08, -d / 2 + 0.05),
+            (w / 2 - 0.05, deck + 0.22, d / 2 - 0.05),
+            "linen",
+            0.04,
+            "mattress",
+        )
     )
     for y in (deck + 0.26, h - 0.09):
         parts += [box((s * w / 2 - 0.018, y, -d / 2), (s * w / 2 + 0.018, y + 0.07, d / 2)) for s in (-1, 1)]
@@ -234,7 +263,9 @@ def _cot(size: Size, style: Style) -> list[Solid]:
         parts += [box((s * (w / 2 - t) - r, y0, z - r), (s * (w / 2 - t) + r, h - 0.03, z + r)) for s in (-1, 1)]
     for x in np.linspace(-w / 2, w / 2, max(4, int(w / 0.13)))[1:-1]:
         parts += [box((x - r, y0, s * (d / 2 - t) - r), (x + r, h - 0.03, s * (d / 2 - t) + r)) for s in (-1, 1)]
-    parts.append(box((-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04), "fabric", 0.03))
+    parts.append(
+        box((-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04), "linen", 0.03, "mattress")
+    )
     return parts
 
 
@@ -252,14 +283,21 @@ def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     for y in (0.22, upper):
         parts.append(box((x0, y, -d / 2), (x0 + bed, y + 0.12, d / 2)))
         parts.append(
-            box((x0 + 0.05, y + 0.1, -d / 2 + 0.06), (x0 + bed - 0.05, y + 0.24, d / 2 - 0.06), "fabric", 0.04)
+            box(
+                (x0 + 0.05, y + 0.1, -d / 2 + 0.06),
+                (x0 + bed - 0.05, y + 0.24, d / 2 - 0.06),
+                "linen",
+                0.04,
+                "mattress",
+            )
         )
         parts.append(
             Ball(
                 centre=np.array([x0 + bed / 2, y + 0.28, -d / 2 + 0.28]),
                 half=np.array([0.3, 0.07, 0.18]),
                 power=2.8,
-                material="shade",
+                material="linen",
+                role="pillow",
             )
         )
     for x in (x0 + 0.015, x0 + bed - 0.015):

@@ -6,6 +6,7 @@ import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.lathe import Blade
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
@@ -52,70 +53,77 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """A trunk and a crown of leaf clumps."""
+    """A trunk that forks, clumps of foliage at its ends, and leaves that stand out of them."""
     rng = choices.stream("detail")
     crown = (h - y0) * choices.between("split", 0.45, 0.65)
-    top = h - crown / 2
-    parts: list[Solid] = [Tube(points=np.array([[0, y0, 0], [0.02, (y0 + top) / 2, 0.01], [0, top, 0]]), radius=0.02)]
-    for _ in range(choices.whole("count", 6, 11)):
-        direction = rng.normal(size=3)
-        direction /= np.linalg.norm(direction)
-        share = rng.uniform(0.45, 0.6)
-        half = np.array([a, crown / 2, b]) * share
-        centre = np.array([0, top, 0]) + direction * (np.array([a, crown / 2, b]) - half)
-        parts.append(Ball(centre=centre, half=half, material="leaf"))
+    middle, fork = h - crown / 2, max(y0 + 0.05, h - crown * 1.05)
+    parts: list[Solid] = [
+        Tube(points=np.array([[0, y0, 0], [0.015, (y0 + fork) / 2, 0.01], [0, fork, 0]]), radius=0.016, material="stem")
+    ]
+    count = choices.whole("count", 6, 10)
+    for i in range(count):
+        around, level = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05)), 2 * (i + 0.5) / count - 1
+        flat = np.sqrt(1 - level**2)
+        direction = np.array([np.sin(around) * flat, level, np.cos(around) * flat])
+        half = np.array([a, crown / 2, b]) * rng.uniform(0.36, 0.48)
+        centre = np.array([0, middle, 0]) + direction * (np.array([a, crown / 2, b]) - half) * rng.uniform(0.82, 1.0)
+        parts.append(Ball(centre=centre, half=half * 0.82, material="leaf", role="leaf"))
+        parts.append(Tube(points=np.array([[0, fork - 0.02, 0], centre]), radius=0.008, material="stem"))
+        for _ in range(7):
+            out = direction + 0.9 * rng.normal(size=3)
+            out /= np.linalg.norm(out)
+            yaw, lift = np.arctan2(out[0], out[2]), np.arcsin(out[1])
+            length = float(half.min()) * rng.uniform(0.65, 0.95)
+            parts.append(_leaf(centre + out * half * 0.6, yaw, lift + 0.2, length, 0.45 * length, bend=0.5))
     return parts
 
 
-def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float) -> Ball:
-    """A flat leaf that starts at `base`, points to `yaw` and rises by the angle `lift`."""
-    turn = rotation(y=yaw) @ rotation(x=-lift)
-    return Ball(
-        centre=base + turn @ np.array([0, 0, length / 2]),
-        half=np.array([wide / 2, max(0.008, 0.05 * length), length / 2]),
-        turn=turn,
+def _leaf(base: np.ndarray, yaw: float, lift: float, length: float, wide: float, bend: float = 0.6) -> Blade:
+    """A leaf that starts at `base`, points to `yaw` and rises by the angle `lift`, its tip bent down by `bend`."""
+    return Blade(
+        centre=base,
+        turn=rotation(y=yaw) @ rotation(x=-lift),
+        length=length,
+        width=wide,
+        thick=max(0.003, 0.012 * length),
+        bend=bend,
         material="leaf",
+        role="leaf",
     )
 
 
 def _blades(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """Long blades that rise from the pot and arch outward."""
-    rng = choices.stream("detail")
     parts: list[Solid] = []
-    count = choices.whole("count", 7, 10)
+    rng = choices.stream("detail")
+    count = 2 * choices.whole("count", 7, 11)
     for i in range(count):
-        yaw = 2 * np.pi * (i + rng.uniform(-0.1, 0.1)) / count
-        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.8, 1.0)
-        tall = (h - y0) * (1.0 if i % 2 else 0.75)
-        knee = np.array([0, y0 + tall * 0.8, 0]) + spread * 0.4
-        tip = np.array([0, y0 + tall * rng.uniform(0.8, 0.95), 0]) + spread
-        root = np.array([0, y0, 0]) + spread * 0.06
-        for start, end, wide in ((root, knee, 0.1), (knee, tip, 0.085)):
-            step = end - start
-            lift = np.arctan2(step[1], np.hypot(step[0], step[2]))
-            parts.append(_leaf(start, np.arctan2(step[0], step[2]), lift, float(np.linalg.norm(step)) * 1.08, wide))
+        yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.04, 0.04))
+        inner = i / count  # the last ones stand in the middle, upright
+        spread = float(np.hypot(np.sin(yaw) * a, np.cos(yaw) * b)) * (1.0 - 0.75 * inner)
+        tall = (h - y0) * (0.72 + 0.28 * inner) * rng.uniform(0.85, 1.0)
+        lift, length = np.pi / 2 - 0.35 * (1 - inner), float(np.hypot(spread, tall)) * 1.08
+        start = np.array([np.sin(yaw), 0, np.cos(yaw)]) * 0.03 * (1 - inner) + [0, y0 - 0.02, 0]
+        bend = 2.0 * float(np.arctan2(spread, tall)) * (1.2 - 0.4 * inner)
+        wide = max(0.03, 0.085 * length)
+        parts.append(_leaf(start, yaw, lift, length, wide, bend=bend))
     return parts
 
 
 def _leaves(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
     """Broad leaves at the ends of stems."""
-    rng = choices.stream("detail")
     parts: list[Solid] = []
-    count = choices.whole("count", 6, 9)
+    rng = choices.stream("detail")
+    count = choices.whole("count", 8, 13)
     for i in range(count):
         yaw = 2 * np.pi * (i * 0.382 + rng.uniform(-0.03, 0.03))
-        tall = (h - y0) * (0.35 + 0.6 * i / count)
-        spread = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.4, 0.5)
-        end = np.array([0, y0 + tall, 0]) + spread
-        parts.append(
-            Tube(
-                points=np.array([[0, y0 - 0.02, 0], [spread[0] * 0.4, y0 + tall * 0.65, spread[2] * 0.4], end]),
-                radius=0.014,
-                material="leaf",
-            )
-        )
-        length = min(a, b) * rng.uniform(0.85, 1.0)
-        parts.append(_leaf(end - np.array([0, 0.02, 0]), yaw, rng.uniform(-0.3, 0.2), length, length * 0.75))
+        tall = (h - y0) * (0.3 + 0.65 * i / count)
+        out = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.4, 0.5) * (1 - 0.35 * i / count)
+        end = np.array([0, y0 + tall, 0]) + out
+        stem = np.array([[0, y0 - 0.02, 0], [out[0] * 0.4, y0 + tall * 0.65, out[2] * 0.4], end])
+        parts.append(Tube(points=stem, radius=0.007, material="leaf", role="stem"))
+        length = min(a, b) * rng.uniform(0.75, 0.95)
+        parts.append(_leaf(end, yaw, rng.uniform(-0.1, 0.45), length, length * 0.68, bend=0.9))
     return parts
 
 

@@ -20,13 +20,15 @@ SHELVES, HANGING = 0.38, 1.35  # metres between shelves behind doors; doors from
 
 
 def front(
-    low: Point, high: Point, z: float, rows: int, columns: int, kind: str, style: Style, depth: float = 0.0
-) -> list[Solid]:
+    low: Point, high: Point, z: float, rows: int, columns: int, kind: str, style: Style, depth: float = 0.0,
+    *, glazed: bool = False,
+) -> list[Solid]:  # fmt: skip
     """Drawer fronts or doors that fill the rectangle `low` to `high` (x, y) on the plane z, gaps between, with handles.
 
     Arguments:
         kind: `drawer` or `door`; thickness and frames follow the style.
         depth: metres behind the plane that are free; drawers get boxes there, doors hide shelves or a rail.
+        glazed: a pane in a frame instead of a panel.
     """
     parts: list[Solid] = []
     xs = np.linspace(low[0], high[0], columns + 1).tolist()
@@ -38,7 +40,9 @@ def front(
             left = i % 2 == 0 if columns > 1 else style.contrast < 0.7
             joint = _slide(z, depth) if kind == "drawer" else _hinge(x0 if left else x1, y0, z, left=left)
             made: list[Solid] = [box((x0, y0, z - 0.004), (x1, y1, z + PANEL), "accent", 0.002 * style.edge, kind)]
-            if style.fronts == "framed":
+            if glazed:
+                made = _pane(x0, x1, y0, y1, z, kind)
+            elif style.fronts == "framed":
                 made += _frame(x0, x1, y0, y1, z + PANEL, 0.15 * min(x1 - x0, y1 - y0), kind)
             made += _handle(x0, x1, y0, y1, z + PANEL, kind, hinge_left=left, style=style)
             if kind == "drawer" and depth > ENOUGH:
@@ -121,6 +125,14 @@ def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float, 
     b, t = max(border, 0.02), 0.012
     bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
     return [box((*lo, z - 0.004), (*hi, z + t), "accent", 0.002, role) for lo, hi in bars]
+
+
+def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> list[Solid]:
+    """Glass in a frame of four bars."""
+    b = min(0.045, 0.2 * (x1 - x0))
+    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
+    pane = box((x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01), "glass", 0.0, role)
+    return [pane, *(box((*lo, z), (*hi, z + PANEL), "accent", 0.002, role) for lo, hi in bars)]
 
 
 def _handle(

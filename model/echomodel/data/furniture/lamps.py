@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.lathe import Lathe, wall
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
@@ -20,24 +23,35 @@ def _disc(
 
 
 def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float, style: Style) -> list[Solid]:
-    """A shade between y and y + h, half widths a (x) and b (z): cone, drum, cylinder, dome, sphere."""
+    """A shade between y and y + h, half widths a (x) and b (z), with what glows in it.
+
+    Cones, drums and cylinders are open above and below, domes below; a sphere glows itself.
+    """
+    place = np.array([x, y, z])
     if kind == "sphere":
-        return [Ball(centre=np.array([x, y + h / 2, z]), half=np.array([a, h / 2, b]), material="shade")]
+        globe = Ball(centre=np.array([x, y + h / 2, z]), half=np.array([a, h / 2, b]), material="shade", role="shade")
+        return [globe]
+    thick, squash = min(0.006, 0.1 * a), b / a
     if kind == "dome":
         turn = np.linspace(0, np.pi / 2, 8)
-        steps, width = np.sin(turn), np.maximum(np.cos(turn), 0.04)
-        return [
-            Turned(
-                centre=np.array([x, y + h * s0, z]),
-                low=(a * w0, b * w0),
-                high=(a * w1, b * w1),
-                height=h * (s1 - s0),
-                material="shade",
-            )
-            for s0, s1, w0, w1 in zip(steps[:-1], steps[1:], width[:-1], width[1:], strict=True)
+        outline = [(a * max(float(np.cos(t)), 0.05), h * float(np.sin(t))) for t in turn]
+    else:
+        narrow = {"cone": 0.35 + 0.25 * style.taper, "drum": 0.85, "cylinder": 1.0}.get(kind, 0.9)
+        outline = [(a, 0.0), (a * narrow, h)]
+    neck = outline[-1][0]
+    inner = max(thick, neck - thick)
+    bulb = min(0.045, 0.4 * inner, 0.3 * h)
+    skin = Lathe(centre=place, profile=wall(outline, thick), squash=squash, hollow=True, material="shade", role="shade")
+    body = replace(skin, profile=np.array(outline), hollow=False, core=True)  # a coarse grid sees a full shade
+    light = Ball(centre=np.array([x, y + 0.45 * h, z]), half=np.full(3, bulb), material="shade", role="bulb")
+    socket = _disc(x, y + 0.45 * h + 0.7 * bulb, z, 0.45 * bulb, 0.45 * bulb, 0.93 * h - 0.45 * h - 0.7 * bulb)
+    arms: list[Solid] = []
+    if kind != "dome":
+        arms = [
+            box((x - i, y + 0.9 * h, z - k), (x + i, y + 0.9 * h + 0.005, z + k), "metal", 0.0, "shade")
+            for i, k in ((inner, 0.003), (0.003, inner * squash))
         ]
-    narrow = {"cone": 0.35 + 0.25 * style.taper, "drum": 0.85, "cylinder": 1.0}.get(kind, 0.9)
-    return [_disc(x, y, z, a, b, h, "shade", narrow)]
+    return [skin, body, light, socket, *arms]
 
 
 def _kind(style: Style, *without: str) -> str:

@@ -10,8 +10,11 @@ from echomodel.data.furniture.carpentry import Size, base, box, core
 from echomodel.data.furniture.cases import BOARD, carcass, depth_of, foot_height, shelves
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.fronts import front
+from echomodel.data.furniture.lathe import Lathe
 from echomodel.data.furniture.solids import Solid, rotation
 from echomodel.data.furniture.style import Style
+
+BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books take their colours from
 
 
 def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -36,7 +39,7 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     rng = choices.stream("pattern")
     for i in range(columns):
         for j in range(1, rows):
-            if rng.random() < 0.4:
+            if rng.random() < 0.62:
                 parts += _books(
                     float(xs[i]) + 0.02, float(xs[i + 1]) - 0.02, float(ys[j]) + 0.01, float(ys[j + 1]), d, rng
                 )
@@ -44,18 +47,20 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def _books(x0: float, x1: float, y0: float, y1: float, d: float, rng: np.random.Generator) -> list[Solid]:
-    room = x1 - x0
-    count = int(np.clip(room / 0.12, 1, 4))
-    x = x0
-    parts: list[Solid] = []
-    for _ in range(count):
-        wide = room / count * rng.uniform(0.55, 0.95)
-        tall = (y1 - y0) * rng.uniform(0.55, 0.85)
-        parts.append(box((x, y0, -d / 2 + 0.02), (x + wide, y0 + tall, d / 2 * rng.uniform(0.2, 0.7)), "fabric"))
+    """A row of books of different heights and colours, some leaning, that ends somewhere along the shelf."""
+    x, end = x0, x0 + (x1 - x0) * rng.uniform(0.35, 0.95)
+    deep, parts = min(0.2, d * 0.75), []
+    colours = rng.choice(BOOKS, size=3)
+    while True:
+        wide, tall = rng.uniform(0.022, 0.05), min((y1 - y0) * 0.88, rng.uniform(0.18, 0.28))
+        if x + wide > end:
+            return parts
+        z = -d / 2 + 0.02
+        book = box(
+            (x, y0, z), (x + wide - 0.002, y0 + tall, z + deep * rng.uniform(0.75, 1.0)), str(rng.choice(colours))
+        )
+        parts.append(replace(book, role="book"))
         x += wide
-        if rng.random() < 0.3:
-            break
-    return parts
 
 
 def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
@@ -119,6 +124,7 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot_height(style, h, 0.12), solid=False)
     split = y0 + (y1 - y0) * choices.between("split", 0.3, 0.45)
     columns = max(1, round((x1 - x0) / 0.45))
+    glazed = choices.chance("second", 0.45)
     parts.append(core((x0, y0, -d / 2), (x1, split, z)))
     parts.append(box((x0, split - 0.01, -d / 2), (x1, split + 0.01, z), role="shelf"))
     parts += front((x0, y0), (x1, split), z, 1, columns, "door", style, depth_of(d, z))
@@ -137,8 +143,34 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts += [replace(bar, centre=np.array([cx, cy, -0.015]), turn=rotation(z=s * tilt)) for s in (-1, 1)]
             parts.append(box((a, top_y - 0.01, -d / 2), (b, top_y + 0.01, z - 0.01)))
             rest = top_y
+            parts += _bottles(cx, cy, (b - a) / 2, d, rng)
         else:
             rest = split
         cells = max(1, round((y1 - rest) / 0.34))
         parts += [box((a, y - 0.01, -d / 2), (b, y + 0.01, z - 0.01)) for y in np.linspace(rest, y1, cells + 1)[1:-1]]
+    if glazed:
+        parts += front((x0, split), (x1, y1), z, 1, columns, "door", style, glazed=True)
     return parts
+
+
+def _bottles(x: float, y: float, half: float, d: float, rng: np.random.Generator) -> list[Solid]:
+    """Bottles that lie in the four quarters of a lattice, their necks to the front."""
+    r = 0.038
+    outline = np.array([(r, 0.0), (r, 0.18), (r * 0.8, 0.2), (r * 0.38, 0.225), (r * 0.34, 0.29)])
+    outline[:, 1] *= min(1.0, (d - 0.05) / 0.3)
+    places = [
+        (0.0, -half * 0.98 + r),
+        (0.0, half * 0.22 + r),
+        (-half * 0.6, r - half * 0.38),
+        (half * 0.6, r - half * 0.38),
+    ]
+    low = [(-r, 2.9 * r), (r, 2.9 * r), (0.0, 1.2 * r)]
+    found: list[Solid] = []
+    for px, py in places:
+        for dx, dy in low:
+            if rng.random() < 0.6 and half > 0.15:
+                place = np.array([x + px + dx, y + py + dy - 1.2 * r, -d / 2 + 0.02])
+                colour = str(rng.choice(["leaf", "book"]))
+                lying = rotation(x=np.pi / 2)
+                found.append(Lathe(centre=place, turn=lying, profile=outline, material=colour, role="bottle"))
+    return found

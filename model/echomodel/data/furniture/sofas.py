@@ -10,7 +10,8 @@ import numpy as np
 from echomodel.data.furniture.armchairs import upholstered_arms
 from echomodel.data.furniture.carpentry import Size, base, box, cushion
 from echomodel.data.furniture.choices import Choices
-from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Turned, rotation
+from echomodel.data.furniture.lathe import Lathe
+from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
 
@@ -31,7 +32,32 @@ def _cushions(
     """A row of cushions from x0 to x1."""
     edges = np.linspace(x0, x1, count + 1)
     gap = 0.004
-    return [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
+    pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
+    if style.piping > 0.55:
+        pads += [part for pad in pads for part in _piping(pad)]
+    return pads
+
+
+def _piping(pad: Solid) -> list[Solid]:
+    """Cords along the seams of a cushion, above and below its side."""
+    if not isinstance(pad, Block):
+        return []
+    r = min(pad.radius, *pad.half)
+    sunk = r * (1 - 2**-0.5)
+    a, b = pad.half[0] - sunk, pad.half[2] - sunk
+    c = min(r * 0.8 + 0.01, a, b)
+    turn = np.linspace(0, np.pi / 2, 4)
+    corners = [(a - c, b - c, 0.0), (-a + c, b - c, 0.5), (-a + c, -b + c, 1.0), (a - c, -b + c, 1.5)]
+    loop = [
+        (x + c * np.cos(t + start * np.pi), z + c * np.sin(t + start * np.pi)) for x, z, start in corners for t in turn
+    ]
+    loop.append(loop[0])
+    plan = np.array(loop)
+    cords: list[Solid] = []
+    for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
+        points = np.insert(plan, 1, y, axis=1) @ pad.turn.T + pad.centre
+        cords.append(Tube(points=points, radius=0.005, material=pad.material, role="seam"))
+    return cords
 
 
 def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, style: Style) -> list[Solid]:
@@ -110,7 +136,8 @@ def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) 
             half=np.array([a, a, 0.07]),
             power=2.8,
             turn=turn,
-            material="accent",
+            material="cushion",
+            role="cushion",
         )
         for s in sides
     ]
@@ -235,19 +262,23 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     kind = choices.pick("kind", ["pear", "lounger", "folded"])
     if kind == "pear":
-        return [
-            Ball(
-                centre=np.array([0, h * 0.3, 0.02]),
-                half=np.array([w / 2, h * 0.3, d / 2]),
-                power=2.5,
-                material="fabric",
-            ),
-            Ball(
-                centre=np.array([0, h * 0.58, -d * 0.1]),
-                half=np.array([w * 0.36, h * 0.4, d * 0.33]),
-                material="fabric",
-            ),
+        outline = [
+            (0.3, 0.0),
+            (0.44, 0.05),
+            (0.5, 0.2),
+            (0.47, 0.38),
+            (0.38, 0.58),
+            (0.28, 0.76),
+            (0.18, 0.9),
+            (0.07, 1.0),
         ]
+        profile = np.array(outline) * [w, h]
+        bag = Lathe(profile=profile, squash=d / w, material="fabric", role="seat")
+        hollow = Ball(
+            centre=np.array([0, h * 0.42, d * 0.16]), half=np.array([w * 0.4, h * 0.2, d * 0.3]), material="fabric",
+            power=2.5, turn=rotation(x=0.25), role="seat",
+        )  # fmt: skip
+        return [bag, hollow]
     if kind == "lounger":
         return [
             Ball(
