@@ -12,8 +12,10 @@ from echousd.room.geometry import Geometry
 from echousd.room.joints import write_joints
 from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks
-from echousd.room.paths import payload_name, piece_name, piece_path
+from echousd.room.paths import DESCRIPTION, coarse_name, payload_name, piece_name, piece_path
 from echousd.room.surface import Surface, surface
+
+LOD, LEVELS = "LOD", ("high", "low")  # a variant set and its variants, the default first
 
 
 def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
@@ -89,6 +91,15 @@ def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, 
     return stage.GetRootLayer()
 
 
+def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any]) -> Sdf.Layer:
+    """`<name>_low`: the meshes once more with few faces; arguments as for `geometry_layer`."""
+    stage = new_stage(name, ".usdc", data)
+    UsdGeom.Xform.Define(stage, f"/{name}")
+    for path, form in forms.items():
+        write_mesh(stage, f"/{name}{path}", form)
+    return stage.GetRootLayer()
+
+
 def component_layer(
     name: str,
     category: str,
@@ -115,11 +126,18 @@ def component_layer(
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
+    if geometry.description:
+        prim.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
     if geometry.joints:
         write_joints(stage, name, geometry)
+    if geometry.coarse:
+        variants = prim.GetVariantSets().AddVariantSet(LOD)
+        for level in LEVELS:
+            variants.AddVariant(level)
+        variants.SetVariantSelection(LEVELS[0])
     palette, bindings = palette_for(style), slot_paths(f"/{name}", slots)
     write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
-    return without_stage(stage, lambda layer: _add_payload(layer, name))
+    return without_stage(stage, lambda layer: _add_payload(layer, name, coarse=bool(geometry.coarse)))
 
 
 def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
@@ -136,6 +154,10 @@ def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
     return out
 
 
-def _add_payload(layer: Sdf.Layer, name: str) -> None:
+def _add_payload(layer: Sdf.Layer, name: str, *, coarse: bool) -> None:
+    if coarse:
+        # a payload inside a variant is stronger than the one beside it, so that its meshes win
+        variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LEVELS[1]].primSpec
+        variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))
     payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
     layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)

@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 import echousd
 from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
 from echousd.room.geometry import LICENCE
-from echousd.room.paths import OBJECTS, SHELL, component_file, payload_file, piece_path
+from echousd.room.paths import OBJECTS, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface
@@ -233,7 +233,13 @@ def _asset(room: RoomData, name: str, user: str) -> Asset:
         data["asset_credit"] = geometry.origin.credit
     payload = assets.geometry_layer(name, forms, geometry, data)
     component = assets.component_layer(name, category, room.styles[user], extent, slots, geometry, data)
+    coarse = {
+        piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
+        for part in geometry.coarse
+    }
+    low = {coarse_file(name): layer_bytes(assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
+        **low,
         payload_file(name): layer_bytes(payload, ".usdc"),
         component_file(name): layer_bytes(component, ".usda"),
     }

@@ -93,6 +93,8 @@ class Geometry:
         mass: what it weighs, None = nobody knows, it is estimated from the category and the box.
         joints: of the bodies that move (drawers, doors); what is fixed then belongs to the body `FRAME`.
         masses: body -> what it weighs, for every body of a piece with joints.
+        coarse: the parts once more with few faces, of the same names, bodies and slots; empty = there are none.
+        description: numbers from which a furniture program makes the piece again, empty = there are none.
     """
 
     parts: tuple[Part, ...]
@@ -101,6 +103,8 @@ class Geometry:
     mass: Mass | None = None
     joints: tuple[Joint, ...] = ()
     masses: Mapping[str, Mass] = field(default_factory=dict)
+    coarse: tuple[Part, ...] = ()
+    description: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]

@@ -20,21 +20,25 @@ DENSITY = {
     "book": 650.0, "stem": 500.0,
 }  # fmt: skip
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
+COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
 COLLIDERS = 24  # convex pieces of one body at most
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
-def assembled(solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin) -> Geometry:
+def assembled(
+    solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin, description: tuple[float, ...] = ()
+) -> Geometry:
     """The geometry of one piece of furniture: what is fixed in one part, every drawer and door in a part of its own.
 
     Arguments:
         solids: of a furniture program.
         size: (3,) float, metres; the geometry fills it.
         faces: most triangles of all parts together; the finest detail that stays below is taken.
-        origin: provenance.
+        origin: provenance. description: what the solids were made from.
     """
     pieces = within_budget(solids, size, faces)
-    plain = pieces_of([piece.solid for piece in pieces], size, 1)
+    used = [piece.solid for piece in pieces]
+    plain, low = pieces_of(used, size, 1), pieces_of(used, size, 0)
     fixed = FRAME if any(piece.joint for piece in pieces) else ""
     parts: list[Part] = []
     colliders: list[Collider] = []
@@ -48,9 +52,12 @@ def assembled(solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: 
         colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
         masses[body] = mass_of(own)
     joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
+    fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
+    names = {part.body: part.name for part in parts}
+    coarse = [_part(names[body], members, body) for body, members in _bodies(low, fixed).items()] if fewer else []
     return Geometry(
-        tuple(parts), tuple(colliders), origin,
-        mass=mass_of(plain), joints=tuple(joints.values()), masses=masses if fixed else {},
+        tuple(parts), tuple(colliders), origin, mass=mass_of(plain), joints=tuple(joints.values()),
+        masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from echousd.room.folder import backup_name
 from echousd.room.journal import STAGING, digest, digest_of
-from echousd.room.paths import component_file, payload_file
+from echousd.room.paths import coarse_file, component_file, payload_file
 from echousd.room.room import RoomData
 from echousd.room.styles import free_name
 from echousd.room.within import inside
@@ -22,7 +22,7 @@ def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> di
     renamed: dict[str, str] = {}
     present = {path.name for path in (folder / "assets").glob("*")} | set(room.assets.values())
     for asset in dict.fromkeys(room.assets.values()):
-        files = (component_file(asset), payload_file(asset))
+        files = (component_file(asset), payload_file(asset), coarse_file(asset))
         foreign = any(path not in recorded and inside(folder, path, "an asset").exists() for path in files)
         if foreign and asset not in room.carried:
             renamed[asset] = free_name(asset, present)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
+DESCRIPTION = "echo:description"  # attribute of an asset's root: what the furniture branch said of it
 
 
 def piece_name(asset: str, piece: str) -> str:
@@ -34,6 +35,21 @@ def payload_file(asset: str) -> str:
     return f"assets/{asset}/{payload_name(asset)}"
 
 
+def coarse_name(asset: str) -> str:
+    """File name of an asset's geometry with few faces, beside its component layer."""
+    return f"{asset}_low.usdc"
+
+
+def coarse_file(asset: str) -> str:
+    """Path of an asset's geometry with few faces in the room's folder; not every asset has one."""
+    return f"assets/{asset}/{coarse_name(asset)}"
+
+
 def component_file(asset: str) -> str:
     """Path of an asset's component layer in the room's folder."""
     return f"assets/{asset}/{asset}.usda"
+
+
+def asset_files(asset: str) -> tuple[str, ...]:
+    """Paths of all files of an asset in the room's folder; the coarse geometry may be missing."""
+    return payload_file(asset), component_file(asset), coarse_file(asset)

@@ -19,7 +19,7 @@ from echousd.room.folder import recover
 from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
 from echousd.room.joints import read_joints, read_mass
 from echousd.room.manifest import find_manifest
-from echousd.room.paths import OBJECTS, component_file, payload_file, piece_of
+from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, coarse_file, piece_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
 
@@ -72,9 +72,9 @@ def read_room(root: str | Path) -> SavedRoom:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:
             made[asset] = found
+            files = {path: inside(root.parent, path, f"asset {asset!r}") for path in asset_files(asset)}
             carried[asset] = {
-                path: inside(root.parent, path, f"asset {asset!r}").read_bytes()
-                for path in (payload_file(asset), component_file(asset))
+                path: file.read_bytes() for path, file in files.items() if path != coarse_file(asset) or file.exists()
             }
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
@@ -121,7 +121,19 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
         return None
     told = manifest.get("meshes", {}).get(asset, {})
     origin = Origin(told.get("source", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
-    return Geometry(tuple(parts), tuple(colliders), origin, read_mass(root), read_joints(root, asset or ""))
+    return Geometry(
+        tuple(parts),
+        tuple(colliders),
+        origin,
+        read_mass(root),
+        read_joints(root, asset or ""),
+        description=_description(root),
+    )
+
+
+def _description(root: Usd.Prim) -> tuple[float, ...]:
+    """What the furniture branch said of a piece, empty where it was not asked."""
+    return tuple(root.GetAttribute(DESCRIPTION).Get() or ())
 
 
 def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:

@@ -45,9 +45,10 @@ class AssembledParts:
         size = np.asarray(request.boxes.size, float)
 
         def make(row: int) -> Geometry:
-            style, choices = piece_of(described[row])
+            told = tuple(round(float(v), 4) for v in described[row])
+            style, choices = piece_of(np.array(told))
             parts = solids(request.graph.nodes[row].category, style, choices, size[row])
-            return assembled(parts, size[row], faces=request.faces, origin=ORIGIN)
+            return assembled(parts, size[row], faces=request.faces, origin=ORIGIN, description=told)
 
         return per_asset(request, make)
 
@@ -60,6 +61,10 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
     words = sorted(set(request.styles.values()))
     styles = torch.tensor([words.index(request.styles[name]) for name in graph.names])
     extra: dict[str, Any] = {} if request.change is None else {"edit": request.change}
+    kept = {name: form.description for name, form in request.kept.items() if len(form.description) == WIDTH}
+    if kept:
+        extra["known"] = torch.tensor([kept.get(name, (0.0,) * WIDTH) for name in graph.names])
+        extra["known_mask"] = torch.tensor([name in kept for name in graph.names])
     with request.timer.stage("shapes") as tell:
         found = model.sample_furniture(  # type: ignore[union-attr]
             graph_batch(graph), centred, generator=seeded(request.seed, "parts"), steps=request.steps,

@@ -26,7 +26,8 @@ class Lathe(Solid):
     def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
         radius = np.sqrt(x * x + (z / self.squash) ** 2) + 0 * y
         outline = self._outline()
-        nearest, nx, ny = np.full(np.broadcast(radius, y).shape, np.inf), 0.0, 0.0
+        nearest = np.full(np.broadcast(radius, y).shape, np.inf)
+        nx, ny = np.zeros(nearest.shape), np.zeros(nearest.shape)
         inside = np.zeros(nearest.shape, bool)
         for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
             d = b - a

@@ -49,7 +49,8 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def _books(x0: float, x1: float, y0: float, y1: float, d: float, rng: np.random.Generator) -> list[Solid]:
     """A row of books of different heights and colours, some leaning, that ends somewhere along the shelf."""
     x, end = x0, x0 + (x1 - x0) * rng.uniform(0.35, 0.95)
-    deep, parts = min(0.2, d * 0.75), []
+    deep = min(0.2, d * 0.75)
+    parts: list[Solid] = []
     colours = rng.choice(BOOKS, size=3)
     while True:
         wide, tall = rng.uniform(0.022, 0.05), min((y1 - y0) * 0.88, rng.uniform(0.18, 0.28))
