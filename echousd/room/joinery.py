@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import trimesh
@@ -93,48 +92,37 @@ def _part(name: str, pieces: Sequence[Piece], body: str) -> Part:
     return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
 
 
-@dataclass(frozen=True, eq=False)
-class _Cluster:
-    points: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    volume: float
-
-
 def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
-    """Convex hulls (each a closed mesh) around solids; those that waste the least room together share one.
+    """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
 
     Arguments:
         points: vertices (n, 3) of each solid, metres.
-        box: volume of the whole piece's box, m³; what is far smaller joins a neighbour.
+        box: volume of the whole piece's box, m³; what is far smaller is no obstacle of its own.
         most: number of hulls.
     """
-    clusters = [_cluster(p) for p in points]
-    while len(clusters) > 1:
-        small = min(range(len(clusters)), key=lambda k: clusters[k].volume)
-        if len(clusters) <= most and clusters[small].volume >= SMALL * box:
+    groups: list[list[np.ndarray]] = [[p] for p in points]
+    low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
+    volume = _volume(low, high)
+    left = len(groups)
+    while left > 1:
+        small = int(np.argmin(volume))
+        if left <= most and volume[small] >= SMALL * box:
             break
-        one = clusters.pop(small) if clusters[small].volume < SMALL * box or len(clusters) > 3 * most else None
-        low, high = np.array([c.low for c in clusters]), np.array([c.high for c in clusters])
-        own = np.array([c.volume for c in clusters])
-        if one is not None:
-            joint = np.prod(np.maximum(high, one.high) - np.minimum(low, one.low), axis=1)
-            other = int(np.argmin(joint - own))
-        else:
-            joint = np.prod(
-                np.maximum(high[:, None], high[None]) - np.minimum(low[:, None], low[None]), axis=2
-            ) - own[:, None] - own[None]  # fmt: skip
-            np.fill_diagonal(joint, np.inf)
-            first, other = sorted(int(v) for v in np.unravel_index(np.argmin(joint), joint.shape))
-            one = clusters.pop(other)
-            other = first
-        clusters[other] = _cluster(np.concatenate([clusters[other].points, one.points]))
-    return [_hull(cluster.points) for cluster in clusters]
+        wasted = _volume(np.minimum(low, low[small]), np.maximum(high, high[small])) - volume
+        wasted[small] = np.inf
+        other = int(np.argmin(wasted))  # what is gone has an infinite volume and never wins
+        groups[other] += groups[small]
+        groups[small] = []
+        low[other], high[other] = np.minimum(low[other], low[small]), np.maximum(high[other], high[small])
+        volume[other] = _volume(low[other], high[other])
+        low[small], high[small], volume[small] = 1e9, 2e9, np.inf
+        left -= 1
+    return [_hull(np.concatenate(group)) for group in groups if group]
 
 
-def _cluster(points: np.ndarray) -> _Cluster:
-    low, high = points.min(0), points.max(0)
-    return _Cluster(points, low, high, float(np.prod(np.maximum(high - low, 1e-3))))
+def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Volumes of boxes, none thinner than a millimetre."""
+    return np.prod(np.maximum(high - low, 1e-3), axis=-1)
 
 
 def _hull(points: np.ndarray) -> trimesh.Trimesh:

@@ -259,9 +259,9 @@ def _cot(size: Size, style: Style) -> list[Solid]:
             box((-w / 2, y, s * (d / 2 - t) - t * 0.7), (w / 2, y + 0.045, s * (d / 2 - t) + t * 0.7)) for s in (-1, 1)
         ]
     r = 0.011
-    for z in np.linspace(-d / 2, d / 2, max(5, int(d / 0.13)))[1:-1]:
+    for z in np.linspace(-d / 2, d / 2, int(np.clip(d / 0.13, 5, 24)))[1:-1]:
         parts += [box((s * (w / 2 - t) - r, y0, z - r), (s * (w / 2 - t) + r, h - 0.03, z + r)) for s in (-1, 1)]
-    for x in np.linspace(-w / 2, w / 2, max(4, int(w / 0.13)))[1:-1]:
+    for x in np.linspace(-w / 2, w / 2, int(np.clip(w / 0.13, 4, 16)))[1:-1]:
         parts += [box((x - r, y0, s * (d / 2 - t) - r), (x + r, h - 0.03, s * (d / 2 - t) + r)) for s in (-1, 1)]
     parts.append(
         box((-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04), "linen", 0.03, "mattress")

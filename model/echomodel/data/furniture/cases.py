@@ -100,13 +100,13 @@ def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width:
         if i:
             parts.append(box((xs[i] - t / 2, y0, -d / 2), (xs[i] + t / 2, y1, z), role="side"))
         if kind == "open":
-            cells = max(1, round((y1 - y0) / 0.32))
+            cells = int(np.clip(round((y1 - y0) / 0.32), 1, 8))
             parts += [
                 box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z), role="shelf")
                 for y in np.linspace(y0, y1, cells + 1)[1:-1]
             ]
             continue
-        rows = 1 if kind == "door" else max(1, round((y1 - y0) / 0.22))
+        rows = 1 if kind == "door" else int(np.clip(round((y1 - y0) / 0.22), 1, 8))
         parts.append(core((low[0], low[1], -d / 2), (high[0], high[1], z)))
         parts += front(low, high, z, rows, 1, kind, style, depth_of(d, z))
     return parts

@@ -117,7 +117,7 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
             points=np.array([[x0, y - 0.07, z], [x1, y - 0.07, z]]), radius=0.012, material="metal", role="rail"
         )
         return [box((x0, y, z0), (x1, y + 0.018, z1), role="shelf"), rail]
-    heights = np.linspace(y0, y1, max(1, round(tall / SHELVES)) + 1)[1:-1]
+    heights = np.linspace(y0, y1, int(np.clip(round(tall / SHELVES), 1, 6)) + 1)[1:-1]
     return [box((x0, y - 0.009, z0), (x1, y + 0.009, z1), role="shelf") for y in heights]
 
 

@@ -17,12 +17,20 @@ from echomodel.data.furniture.style import Style
 BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books take their colours from
 
 
+ROWS, COLUMNS = 9, 14  # at most, however large the box is
+
+
+def _count(wished: float, most: int, least: int = 1) -> int:
+    """A whole number of rows or columns."""
+    return int(np.clip(round(wished), least, most))
+
+
 def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Open rows and columns with a back or without, some cells closed, some books; or a ladder of boards."""
     w, h, d = size
     rows, columns = (
-        max(1, round(h / choices.between("rows", 0.3, 0.42))),
-        max(1, round(w / choices.between("columns", 0.4, 0.8))),
+        _count(h / choices.between("rows", 0.3, 0.42), ROWS, 1 + (h > 0.55)),
+        _count(w / choices.between("columns", 0.4, 0.8), COLUMNS),
     )
     if style.family == "industrial" and choices.chance("form", 0.6):
         return _rack(size, rows, columns)
@@ -79,7 +87,7 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
 def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Lighter than a bookshelf: boards on uprights, a ladder, or boards round one post."""
     w, h, d = size
-    rows = max(1, round(h / choices.between("rows", 0.3, 0.45)))
+    rows = _count(h / choices.between("rows", 0.3, 0.45), ROWS)
     kind = choices.pick("kind", ["rack", "boards", "ladder", "steps"])
     if kind == "rack" or style.family == "industrial":
         return _rack(size, rows, max(1, round(w / 0.9)))
@@ -124,7 +132,7 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     _w, h, d = size
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot_height(style, h, 0.12), solid=False)
     split = y0 + (y1 - y0) * choices.between("split", 0.3, 0.45)
-    columns = max(1, round((x1 - x0) / 0.45))
+    columns = _count((x1 - x0) / 0.45, COLUMNS)
     glazed = choices.chance("second", 0.45)
     parts.append(core((x0, y0, -d / 2), (x1, split, z)))
     parts.append(box((x0, split - 0.01, -d / 2), (x1, split + 0.01, z), role="shelf"))
@@ -147,7 +155,7 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts += _bottles(cx, cy, (b - a) / 2, d, rng)
         else:
             rest = split
-        cells = max(1, round((y1 - rest) / 0.34))
+        cells = _count((y1 - rest) / 0.34, ROWS)
         parts += [box((a, y - 0.01, -d / 2), (b, y + 0.01, z - 0.01)) for y in np.linspace(rest, y1, cells + 1)[1:-1]]
     if glazed:
         parts += front((x0, split), (x1, y1), z, 1, columns, "door", style, glazed=True)

@@ -40,7 +40,7 @@ def _cushions(
 
 def _piping(pad: Solid) -> list[Solid]:
     """Cords along the seams of a cushion, above and below its side."""
-    if not isinstance(pad, Block):
+    if not isinstance(pad, Block) or min(pad.half) < 0.03:
         return []
     r = min(pad.radius, *pad.half)
     sunk = r * (1 - 2**-0.5)

@@ -86,7 +86,7 @@ def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = foot_height(style, h, 0.22)
     if h > 1.5:
         parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
-        columns = max(1, round((x1 - x0) / 0.48))
+        columns = int(np.clip(round((x1 - x0) / 0.48), 1, 8))
         split = y0 + (y1 - y0) * choices.between("split", 0.33, 0.5)
         low_kind, rows = ("door", 1) if choices.chance("front", 0.6) else ("drawer", choices.whole("rows", 2, 4))
         parts.append(core((x0, y0, -d / 2), (x1, split, z)))
@@ -98,7 +98,7 @@ def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(core((x0, split, -d / 2), (x1, y1, z)))
         return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style, depth_of(d, z))
     if choices.chance("kind", 0.4):
-        return fronted(size, style, foot, 1, max(2, round(w / 0.45)), "door")
+        return fronted(size, style, foot, 1, int(np.clip(round(w / 0.45), 2, 8)), "door")
     return mixed(size, style, choices, foot, choices.between("columns", 0.4, 0.6))
 
 
@@ -110,7 +110,7 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts, (x0, y0, x1, y1, z) = carcass(
         np.array([w, body, d]), style, min(0.06, style.leg_height), kind="plinth", solid=False
     )
-    columns, rows = max(1, round((x1 - x0) / 0.36)), max(2, round((y1 - y0) / 0.34))
+    columns, rows = int(np.clip(round((x1 - x0) / 0.36), 1, 8)), int(np.clip(round((y1 - y0) / 0.34), 2, 7))
     parts += shelves((x0, y0, x1, y1, z), d, -d / 2, rows, columns, style)
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
     rng = choices.stream("pattern")
@@ -169,7 +169,7 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0))]
     foot = foot_height(style, h, 0.45)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
-    count = max(2, round(w / choices.between("columns", 0.42, 0.62)))
+    count = int(np.clip(round(w / choices.between("columns", 0.42, 0.62)), 2, 6))
     kinds = [
         str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])
     ]

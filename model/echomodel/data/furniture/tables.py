@@ -253,7 +253,7 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def _hutch(w: float, low: float, high: float, d: float, choices: Choices) -> list[Solid]:
     """Shelves above the rear of a desk."""
     t, z0, z1 = 0.02, -d / 2, -d / 2 + min(0.28, d * 0.45)
-    columns, rows = choices.whole("second", 1, 4), max(1, round((high - low) / 0.38))
+    columns, rows = choices.whole("second", 1, 4), int(np.clip(round((high - low) / 0.38), 1, 6))
     xs, ys = np.linspace(-w / 2 + t, w / 2 - t, columns + 1), np.linspace(low, high - t, rows + 1)
     parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1)) for x in xs]
     parts += [box((-w / 2, y, z0), (w / 2, y + t, z1)) for y in ys[1:]]
