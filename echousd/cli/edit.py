@@ -25,7 +25,9 @@ def register(app: typer.Typer) -> None:
         unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
         output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
         seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-        shapes: Annotated[str, typer.Option(help="Of new objects. sdf: from the model; boxes: plain boxes.")] = "sdf",
+        shapes: Annotated[
+            str | None, typer.Option(help="Of new objects: parts, sdf or boxes; default: what the room is made of.")
+        ] = None,
         weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
         repair: Annotated[
             bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")

@@ -51,7 +51,12 @@ def register(app: typer.Typer) -> None:
             typer.Option(help="Weights file or folder, from convert or train; default: those that ship."),
         ] = None,
         model: Annotated[Path | None, typer.Option(hidden=True, help="The same as --weights.")] = None,
-        shapes: Annotated[str, typer.Option(help="sdf: shapes from the model; boxes: plain boxes.")] = "sdf",
+        shapes: Annotated[
+            str | None,
+            typer.Option(
+                help="parts: built of parts, with doors and drawers; sdf: free shapes; boxes. Default: parts."
+            ),
+        ] = None,
         samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
         faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,

@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 import echousd
 from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
 from echousd.room.geometry import LICENCE
-from echousd.room.paths import OBJECTS, coarse_file, component_file, payload_file, piece_path
+from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface

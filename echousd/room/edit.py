@@ -20,7 +20,7 @@ from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions
-from echousd.room.sources import DEFAULT, shape_source
+from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, free_name, style_groups
 from echousd.room.tensors import graph_batch
@@ -35,7 +35,7 @@ def edit(
     graph: SceneGraph,
     *,
     seed: int = 0,
-    shapes: str = DEFAULT,
+    shapes: str | None = None,
     model: RoomModel | str | Path | None = None,
     repair: bool = True,
     steps: int | None = None,
@@ -52,13 +52,14 @@ def edit(
         graph: what its graph (`read_room(root).graph`) shall become; a floor or openings that it leaves open stay
             those of the room.
         seed: of the new randomness.
-        shapes, model, repair, steps, faces, progress: as for `generate`.
+        shapes: as for `generate`; None = what the room is made of.
+        model, repair, steps, faces, progress: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room.
     """
     check_seed(seed)
-    source, timer = shape_source(shapes), StageTimer(progress)
+    source, timer = None if shapes is None else shape_source(shapes), StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(root)
     graph = with_plan_of(graph, saved.graph)
@@ -73,6 +74,8 @@ def edit(
             model_used = load_model(model)
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
+            made_of = saved.manifest["shapes"]
+            source = source or shape_source(made_of if made_of in ("parts", "sdf") else default_source(model_used))
             source.check(model_used)
         change = graph_edit(saved.graph, graph)
     for number, before in enumerate(saved.layouts):
@@ -88,7 +91,7 @@ def edit(
         notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
     assets = {name: saved.assets[name] for name in geometry}
-    if fresh:
+    if fresh and source is not None:
         wanted = tuple(name for name in graph.names if name in fresh)
         request = ShapeRequest(
             graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer

@@ -16,7 +16,7 @@ from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.shell import box_corners
-from echousd.room.sources import DEFAULT, shape_source
+from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
@@ -32,7 +32,7 @@ def generate(
     graph: SceneGraph | str | Path,
     *,
     seed: int = 0,
-    shapes: str = DEFAULT,
+    shapes: str | None = None,
     model: RoomModel | str | Path | None = None,
     preset: str | None = None,
     repair: bool = True,
@@ -50,8 +50,8 @@ def generate(
     Arguments:
         graph: the graph, or a file that holds one (stage, YAML, JSON).
         seed: of all randomness, 0 to 2^63 - 1; equal arguments give equal rooms.
-        shapes: where geometry comes from, a name of `echousd.room.sources`: `sdf`, the model's shape branch, or plain
-            `boxes`.
+        shapes: where geometry comes from, a name of `echousd.room.sources`: `parts`, furniture built from the model's
+            descriptions, `sdf`, the model's shape branch, or plain `boxes`; None = `parts` where the model can.
         model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
             the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
@@ -66,7 +66,7 @@ def generate(
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
             missing, damaged or have no shape branch.
     """
-    source = shape_source(shapes)
+    source = None if shapes is None else shape_source(shapes)
     if samples < 1 or samples > 1000:
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
     check_seed(seed)
@@ -83,6 +83,8 @@ def generate(
         raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
     with timer.stage("load"):
         echo = load_model(model, preset)
+        shapes = shapes or default_source(echo)
+        source = source or shape_source(shapes)
         source.check(echo)
     check_doors(graph)
     crowded = check_space(graph)

@@ -6,6 +6,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
     from echousd.room.sources.source import ShapeSource
 
 # Imported when asked for: the command line names the sources without loading the model.
@@ -14,7 +15,11 @@ MODULES = {
     "sdf": "echousd.room.sources.sdf",
     "boxes": "echousd.room.sources.boxes",
 }
-DEFAULT = "sdf"
+
+
+def default_source(model: RoomModel | None) -> str:
+    """`parts` where the model can describe furniture, else `sdf`."""
+    return "parts" if model is None or getattr(model, "has_furniture", False) else "sdf"
 
 
 def shape_source(name: str) -> ShapeSource:
