@@ -71,7 +71,8 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             material="fabric",
             radius=0.05,
         )
-        return [*legs, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
+        frame_under = box((-w * 0.47, seat - 0.17, -d * 0.43), (w * 0.47, seat - 0.13, d * 0.45), "wood", 0.006, "rail")
+        return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
     arm = w * (0.13 + 0.06 * style.softness)
     y_arm = seat + (h - seat) * (0.2 + 0.5 * style.arm_height)
     parts.append(box((-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02), "fabric", 0.02))

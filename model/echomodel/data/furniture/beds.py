@@ -55,6 +55,7 @@ def _headboard(style: Style, w: float, h: float, z: float, choices: Choices) -> 
         parts += [
             box((-w / 2, h - 0.1, z), (w / 2, h, z + 0.05)),
             box((-w / 2, h * 0.45, z), (w / 2, h * 0.45 + 0.06, z + 0.05)),
+            box((-w / 2, 0.12, z), (w / 2, 0.3, z + 0.05)),
         ]
         count = int(5 + 9 * style.tufting)
         xs = np.linspace(-w / 2, w / 2, count + 2)[1:-1]
@@ -133,13 +134,18 @@ def _bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid
     deck = min(foot + rail, 0.42)
     head = 0.13
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "splayed") else "straight"
-    parts: list[Solid] = base(style, frame * 0.96, (d - head) * 0.96, foot, 0.07 * style.bulk, kind)
+    near = z0 + 0.03  # the frame reaches into the headboard
+    parts: list[Solid] = [
+        replace(part, centre=part.centre + np.array([0, 0, 0.015]))
+        for part in base(style, frame * 0.98, (d - 0.03) * 0.98, foot, 0.07 * style.bulk, kind)
+    ]
+    parts.append(box((-frame / 2, foot, near), (frame / 2, foot + 0.015, z1)))
     upholstered = style.softness > 0.5
     stuff, radius = ("fabric", 0.025) if upholstered else ("wood", 0.004 + 0.008 * style.edge)
     t = 0.07 if upholstered else 0.04
     parts += [
         box(
-            (s * frame / 2 - t * (s > 0), foot, z0 + head * 0.5),
+            (s * frame / 2 - t * (s > 0), foot, near),
             (s * frame / 2 + t * (s < 0), deck, z1),
             stuff,
             radius,
@@ -147,13 +153,11 @@ def _bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid
         )
         for s in (-1, 1)
     ]
-    parts += [
-        box((-frame / 2, foot, z), (frame / 2, deck, z + t), stuff, radius, "rail") for z in (z0 + head * 0.5, z1 - t)
-    ]
+    parts += [box((-frame / 2, foot, z), (frame / 2, deck, z + t), stuff, radius, "rail") for z in (near, z1 - t)]
     parts.append(
         box((-frame / 2 + t / 2, deck - 0.09, z0 + head), (frame / 2 - t / 2, deck - 0.06, z1 - t / 2), "wood")
     )
-    parts.append(core((-frame / 2, foot, z0 + head * 0.5), (frame / 2, deck, z1), stuff))
+    parts.append(core((-frame / 2, foot, near), (frame / 2, deck, z1), stuff))
     parts += _headboard(style, w, h, z0, choices)
     parts += _bedding(frame * 0.95, z0 + head, z1 - 0.04, deck - 0.06, choices, style, pillows)
     if style.headboard in ("slats", "posts", "arched") and choices.chance("second", 0.6):

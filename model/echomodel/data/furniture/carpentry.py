@@ -114,6 +114,16 @@ def base(
     return of_role("leg", _stand(style, width, depth, height, thick, kind or style.legs, tie=tie))
 
 
+def between_legs(
+    shape: str, width: float, depth: float, height: float, y: float, thick: float, leg: float, style: Style, kind: str
+) -> Solid:
+    """A shelf at `y` that the legs of a `base` of this width, depth, height and kind pass through."""
+    spread = min(np.tan(style.splay) * height, 0.3 * min(width, depth)) if kind == "splayed" else 0.0
+    x, z = width / 2 - leg / 2 - spread * y / height, depth / 2 - leg / 2 - spread * y / height
+    wider = 2**0.5 if shape == "round" else 1.0
+    return top("round" if shape == "round" else "square", 2 * x * wider, 2 * z * wider, y, thick, style, "accent")
+
+
 def _stand(
     style: Style, width: float, depth: float, height: float, thick: float, kind: str, *, tie: bool
 ) -> list[Solid]:
@@ -123,7 +133,11 @@ def _stand(
         return [box((-width / 2 * 0.94, 0, -depth / 2 * 0.94), (width / 2 * 0.94, h, depth / 2 * 0.9), "accent")]
     if kind == "bun":
         return [
-            Ball(centre=np.array([cx, h / 2, cz]), half=np.array([thick * 0.8, h / 2, thick * 0.8]), power=2.5)
+            Ball(
+                centre=np.array([cx, h / 2 + 0.004, cz]),
+                half=np.array([thick * 0.8, h / 2 + 0.004, thick * 0.8]),
+                power=2.5,
+            )
             for cx, cz in corners
         ]
     if kind == "turned":

@@ -24,7 +24,7 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     leg_thick = 0.038 * style.bulk
     sw, sd = w * 0.94, d * 0.86
     parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.05)]
-    parts += chair_legs(style, w * 0.96, d * 0.92, seat - thick * 0.6, leg_thick)
+    parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
     if style.back == "shell":
         arms = seat + (h - seat) * (0.15 + 0.4 * style.arm_height)
         shell = Shell(
@@ -110,7 +110,7 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return stool(size, style, choices)
     seat = min(0.44, h * 0.7)
     thick = 0.06 + 0.04 * style.softness
-    parts: list[Solid] = chair_legs(style, w * 0.9, d * 0.9, seat - thick, 0.034 * style.bulk)
+    parts: list[Solid] = chair_legs(style, w * 0.82, d * 0.8, seat - thick * 0.5, 0.034 * style.bulk)
     parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), w * 0.95, d * 0.92, seat, thick))
     if style.back in ("shell", "cushion", "oval"):
         return [
@@ -153,7 +153,8 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
         upright_legs = legs != "splayed"
         share = (0.7 if style.round_tops > 0.5 else 0.86) if upright_legs else 0.98
         parts += base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs)
-        lean = 0.0 if upright_legs else np.tan(style.splay) * seat * 0.35
+        spread = min(np.tan(style.splay) * (seat - thick * 0.6), 0.3 * min(w, d * 0.96) * share)
+        lean = 0.0 if upright_legs else spread * 0.35
         x, z, y, t = w * share / 2 - 0.02 - lean, d * share * 0.48 - 0.02 - lean, seat * 0.35, 0.011
         parts += [box((-x, y - t, s * z - t), (x, y + t, s * z + t), "metal") for s in (-1, 1)]
         parts += [box((s * x - t, y - t, -z), (s * x + t, y + t, z), "metal") for s in (-1, 1)]
@@ -161,6 +162,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts.append(replace(top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric"), rounding=thick * 0.4))
     if not backed:
         return parts
+    wide = w * (0.5 if shape == "round" else 0.8)
     if style.back in ("shell", "cushion", "oval"):
         return [
             *parts,
@@ -173,7 +175,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 material="fabric",
             ),
         ]
-    return parts + back_rest(style, style.back, w * 0.84, seat, h, -d * 0.38, 0.04, style.rake * 0.5, choices)
+    return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5, choices)
 
 
 def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:

@@ -143,11 +143,13 @@ def _handle(
     w, h, door = x1 - x0, y1 - y0, kind == "door"
     x = (x1 - min(0.12 * w, 0.05) if hinge_left else x0 + min(0.12 * w, 0.05)) if door else (x0 + x1) / 2
     y = (y0 + y1) / 2 if h < 1.5 else y0 + min(1.0, 0.5 * h)
-    z += 0.012 * (style.fronts == "framed")
+    deep = 0.004  # metres that a handle reaches into its front
+    if style.fronts == "framed":  # the frame stands out, the panel does not
+        z, deep = z + 0.012, 0.016
     if style.handles == "knob":
         r = 0.016
         places = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
-        stem = np.array([[0, 0, -0.004], [0, 0, r]])
+        stem = np.array([[0, 0, -deep], [0, 0, r]])
         return [
             part
             for dx in places
@@ -162,10 +164,10 @@ def _handle(
     if style.handles == "edge":
         if door:
             return [
-                box((x - 0.008, y0 + 0.1 * h, z - 0.002), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal", 0.003, "handle")
+                box((x - 0.008, y0 + 0.1 * h, z - deep), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal", 0.003, "handle")
             ]
         return [
-            box((x0 + 0.1 * w, y1 - 0.02, z - 0.002), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal", 0.003, "handle")
+            box((x0 + 0.1 * w, y1 - 0.02, z - deep), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal", 0.003, "handle")
         ]
     length = min(0.3, 0.45 * h) / 2 if door else min(0.25, 0.4 * w) / 2
     along = np.array([0.0, length, 0.0]) if door else np.array([length, 0.0, 0.0])
@@ -173,7 +175,7 @@ def _handle(
     ends = np.array([grip + out - along, grip + out + along])
     bar = Tube(points=ends, radius=0.0055, material="metal", role="handle")
     posts = [
-        Tube(points=np.array([end - 0.15 * out, end + out]), radius=0.005, material="metal", role="handle")
+        Tube(points=np.array([end - np.array([0, 0, deep]), end + out]), radius=0.005, material="metal", role="handle")
         for end in (grip - 0.85 * along, grip + 0.85 * along)
     ]
     return [bar, *posts]

@@ -40,16 +40,18 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
         outline = [(a, 0.0), (a * narrow, h)]
     neck = outline[-1][0]
     inner = max(thick, neck - thick)
+    reach = a + 0.9 * (neck - a)
+    high = 0.985 if kind == "dome" else 0.93
     bulb = min(0.045, 0.4 * inner, 0.3 * h)
     skin = Lathe(centre=place, profile=wall(outline, thick), squash=squash, hollow=True, material="shade", role="shade")
     body = replace(skin, profile=np.array(outline), hollow=False, core=True)  # a coarse grid sees a full shade
     light = Ball(centre=np.array([x, y + 0.45 * h, z]), half=np.full(3, bulb), material="shade", role="bulb")
-    socket = _disc(x, y + 0.45 * h + 0.7 * bulb, z, 0.45 * bulb, 0.45 * bulb, 0.93 * h - 0.45 * h - 0.7 * bulb)
+    socket = _disc(x, y + 0.45 * h + 0.7 * bulb, z, 0.45 * bulb, 0.45 * bulb, high * h - 0.45 * h - 0.7 * bulb)
     arms: list[Solid] = []
     if kind != "dome":
         arms = [
             box((x - i, y + 0.9 * h, z - k), (x + i, y + 0.9 * h + 0.005, z + k), "metal", 0.0, "shade")
-            for i, k in ((inner, 0.003), (0.003, inner * squash))
+            for i, k in ((reach, 0.003), (0.003, reach * squash))
         ]
     return [skin, body, light, socket, *arms]
 
@@ -127,7 +129,7 @@ def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 [0, body * 0.3, 0],
                 [c * 0.45, body * 0.06, s * 0.45],
                 [c * 0.85, body * 0.14, s * 0.85],
-                [c, body * 0.42, s],
+                [c, body * (0.68 if style.taper > 0.55 else 0.42), s],
             ]
         )
         parts.append(Tube(points=curve, radius=r * 0.9, material="metal"))
@@ -234,6 +236,7 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [
             foot,
             Tube(points=sweep, radius=r, material="metal"),
+            Tube(points=np.array([[x1, end, 0], [x1, end - 0.5 * tall, 0]]), radius=r, material="metal"),
             *shade(_kind(style, "cylinder"), x1, end - tall, 0, head, min(head, d / 2), tall, style),
         ]
     tall = h * (0.16 + 0.12 * style.taper)
@@ -293,7 +296,7 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             _disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)),
             _disc(0, 0, 0, a * 0.12, b * 0.12, stem, "metal"),
         ]
-    parts.append(Tube(points=np.array([[0, stem * 0.7, 0], [0, stem + tall * 0.4, 0]]), radius=0.012, material="metal"))
+    parts.append(Tube(points=np.array([[0, stem * 0.7, 0], [0, stem + tall * 0.5, 0]]), radius=0.012, material="metal"))
     return parts
 
 
@@ -327,7 +330,7 @@ def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         )
         return [body, box((-w * 0.2, h * 0.2, -d / 2), (w * 0.2, h * 0.8, d * 0.1), "metal")]
     b = d * 0.36
-    bend = np.array([[0, h * 0.45, -d / 2 + 0.01], [0, h * 0.3, 0], [0, h * 0.4, d / 2 - b], [0, h * 0.6, d / 2 - b]])
+    bend = np.array([[0, h * 0.45, -d / 2 + 0.01], [0, h * 0.3, 0], [0, h * 0.4, d / 2 - b], [0, h * 0.7, d / 2 - b]])
     return [
         plate,
         Tube(points=bend, radius=0.009, material="metal"),

@@ -152,7 +152,7 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts += [replace(bar, centre=np.array([cx, cy, -0.015]), turn=rotation(z=s * tilt)) for s in (-1, 1)]
             parts.append(box((a, top_y - 0.01, -d / 2), (b, top_y + 0.01, z - 0.01)))
             rest = top_y
-            parts += _bottles(cx, cy, (b - a) / 2, d, rng)
+            parts += _bottles(cx, cy, (b - a) / 2, (top_y - split) / 2, d, rng)
         else:
             rest = split
         cells = _count((y1 - rest) / 0.34, ROWS)
@@ -162,24 +162,26 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     return parts
 
 
-def _bottles(x: float, y: float, half: float, d: float, rng: np.random.Generator) -> list[Solid]:
-    """Bottles that lie in the four quarters of a lattice, their necks to the front."""
-    r = 0.038
+def _bottles(x: float, y: float, half: float, tall: float, d: float, rng: np.random.Generator) -> list[Solid]:
+    """Bottles that lie in a lattice, their necks to the front: a row on its floor, three in the crossing above.
+
+    Arguments:
+        x, y: where the two bars cross. half, tall: half its width and its half height, metres.
+    """
+    r, bar = 0.038, 0.012
     outline = np.array([(r, 0.0), (r, 0.18), (r * 0.8, 0.2), (r * 0.38, 0.225), (r * 0.34, 0.29)])
     outline[:, 1] *= min(1.0, (d - 0.05) / 0.3)
-    places = [
-        (0.0, -half * 0.98 + r),
-        (0.0, half * 0.22 + r),
-        (-half * 0.6, r - half * 0.38),
-        (half * 0.6, r - half * 0.38),
-    ]
-    low = [(-r, 2.9 * r), (r, 2.9 * r), (0.0, 1.2 * r)]
-    found: list[Solid] = []
+    slope = np.arctan2(tall, half)
+    first = (r + bar) / np.cos(slope)
+    second = max((r + bar + r * np.sin(slope)) / np.cos(slope), first + 3**0.5 * r)
+    count = int(max(half - r / np.tan(slope / 2) - 0.02, 0) / (2 * r))
+    places = [(2 * r * k, r - tall + 0.012) for k in range(-count, count + 1)] if tall > 3 * r else []
+    if second + r < tall:
+        places += [(0.0, first), (-r, second), (r, second)]
+    lying, found = rotation(x=np.pi / 2), []
     for px, py in places:
-        for dx, dy in low:
-            if rng.random() < 0.6 and half > 0.15:
-                place = np.array([x + px + dx, y + py + dy - 1.2 * r, -d / 2 + 0.02])
-                colour = str(rng.choice(["leaf", "book"]))
-                lying = rotation(x=np.pi / 2)
-                found.append(Lathe(centre=place, turn=lying, profile=outline, material=colour, role="bottle"))
-    return found
+        place, colour = np.array([x + px, y + py, -d / 2 + 0.02]), str(rng.choice(["leaf", "book"]))
+        bottle = Lathe(centre=place, turn=lying, profile=outline, material=colour, role="bottle")
+        if rng.random() < 0.85 or py > 0:
+            found.append(bottle)
+    return list(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, pedestal, top, within
+from echomodel.data.furniture.carpentry import Size, base, between_legs, box, pedestal, top, within
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.fronts import case, front
 from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
@@ -63,8 +63,8 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         foot = max(0.04, h * 0.15)
         body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
         drawers = front(
-            (-w / 2 * 0.9, foot + 0.02),
-            (w / 2 * 0.9, h - thick - 0.02),
+            (-w / 2 * 0.97 + 0.01, foot + 0.01),
+            (w / 2 * 0.97 - 0.01, h - thick - 0.01),
             d / 2 * 0.95,
             1,
             choices.whole("columns", 1, 3),
@@ -99,9 +99,11 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
-    parts += base(style, w * inner, d * inner, h - thick, _leg(style, w * 0.7, h), legs)
+    leg = _leg(style, w * 0.7, h)
+    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
     if kind == "shelf":
-        parts.append(top(shape, w * inner * 0.92, d * inner * 0.92, h * 0.4, thick * 0.7, style, "accent"))
+        under = h - thick
+        parts.append(between_legs(shape, w * inner, d * inner, under, h * 0.4, thick * 0.7, leg, style, legs))
     return parts
 
 
@@ -146,9 +148,10 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*parts, *bars, *posts]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
-    parts += base(style, w * inner, d * inner, h - thick, _leg(style, w * 0.6, h) * 0.8, legs)
+    leg = _leg(style, w * 0.6, h) * 0.8
+    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
     if choices.chance("extra", 0.4):
-        parts.append(top(shape, w * inner * 0.9, d * inner * 0.9, h * 0.35, thick, style, "accent"))
+        parts.append(between_legs(shape, w * inner, d * inner, h - thick, h * 0.35, thick, leg, style, legs))
     return parts
 
 
@@ -168,7 +171,8 @@ def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
     parts += base(style, w * 0.74, d * 0.74, h - thick, 0.035 * style.bulk, legs)
     if choices.chance("extra", 0.5):
-        parts.append(top("round", w * 0.66, d * 0.66, h * 0.4, thick, style, "accent"))
+        leg = 0.035 * style.bulk
+        parts.append(between_legs("round", w * 0.74, d * 0.74, h - thick, h * 0.4, thick, leg, style, legs))
     return parts
 
 
