@@ -56,7 +56,10 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     alike = max(w, d) / min(w, d) < 1.15
     foot = min(style.leg_height, h * 0.4) if choices.chance("raised", 0.65) else 0.0
     kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "plinth") else "tapered"
-    parts: list[Solid] = base(style, w * 0.8, d * 0.8, foot, 0.04 * style.bulk, kind) if foot else []
+    inner = 0.64 if alike and style.round_tops > 0.45 else 0.8
+    parts: list[Solid] = (
+        base(style, w * inner, d * inner, foot + min(0.03, h * 0.1), 0.04 * style.bulk, kind) if foot else []
+    )
     if alike and style.round_tops > 0.45:
         if foot == 0 and style.softness > 0.6:
             return [

@@ -1,0 +1,69 @@
+"""Geometry from solids: closed and in its box, within the budget, with colliders, weight and bodies that move."""
+
+import numpy as np
+import pytest
+
+from echomodel.data.furniture import solids
+from echomodel.data.furniture.description import WIDTH, piece_of
+from echousd.room.geometry import FRAME, Origin
+from echousd.room.joinery import assembled, within_budget
+
+SIZE = np.array([0.9, 1.0, 0.45])
+
+
+def piece(category: str, size: np.ndarray = SIZE, seed: int = 0, faces: int = 5000):
+    parts = solids(category, *piece_of(np.random.default_rng(seed).uniform(-1, 1, WIDTH)), size)
+    return assembled(parts, size, faces=faces, origin=Origin("parts"))
+
+
+@pytest.mark.parametrize("category", ["dresser", "plant", "multi_seat_sofa", "bookshelf", "tv", "pendant_lamp"])
+def test_a_piece_is_closed_fills_its_box_and_keeps_the_budget(category):
+    for faces in (5000, 800, 100):
+        made = piece(category, faces=faces)
+        assert made.watertight
+        assert 0 < made.faces <= faces
+        np.testing.assert_allclose(made.mesh.extents, SIZE, atol=1e-6)
+        assert sorted(np.concatenate(list(made.parts[0].slots.values()))) == list(range(len(made.parts[0].mesh.faces)))
+
+
+def test_more_faces_are_finer_and_the_second_level_is_coarser():
+    parts = solids("armchair", *piece_of(np.zeros(WIDTH)), SIZE)
+    counts = [sum(len(p.faces) for p in within_budget(parts, SIZE, faces)) for faces in (400, 1500, 9000)]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+    made = piece("armchair")
+    assert sum(len(part.mesh.faces) for part in made.coarse) < made.faces
+    assert [part.name for part in made.coarse] == [part.name for part in made.parts]
+    assert all(set(one.slots) == set(two.slots) for one, two in zip(made.coarse, made.parts, strict=True))
+
+
+def test_colliders_are_convex_and_hold_the_geometry():
+    for category in ("dining_table", "bookshelf", "office_chair"):
+        made = piece(category)
+        for collider in made.colliders:
+            assert collider.approximation == "convexHull"
+            hull = collider.mesh.convex_hull
+            assert abs(hull.volume - collider.mesh.volume) <= 1e-6 + 1e-3 * hull.volume
+        low = np.min([c.mesh.bounds[0] for c in made.colliders], axis=0)
+        high = np.max([c.mesh.bounds[1] for c in made.colliders], axis=0)
+        np.testing.assert_allclose(high - low, SIZE, atol=0.03)
+    table = piece("dining_table", np.array([1.6, 0.75, 0.9]))
+    assert len(table.colliders) > 2  # a chair fits below
+
+
+def test_drawers_are_bodies_of_a_dresser():
+    made = next(m for m in (piece("dresser", seed=seed) for seed in range(5)) if m.joints)
+    bodies = {part.body for part in made.parts}
+    assert bodies == {FRAME} | {joint.body for joint in made.joints} == set(made.masses)
+    assert {collider.body for collider in made.colliders} == bodies
+    assert made.mass is not None
+    assert sum(mass.mass for mass in made.masses.values()) == pytest.approx(made.mass.mass, rel=1e-6)
+    assert 5 < made.mass.mass < 150
+    assert (made.mass.inertia > 0).all()
+    assert (np.abs(made.mass.centre[[0, 2]]) < SIZE[[0, 2]] / 2).all()
+
+
+def test_what_needs_more_boxes_than_the_budget_leaves_the_smallest_out():
+    made = piece("bookshelf", np.array([2.0, 2.2, 0.35]), faces=100)
+    assert made.faces <= 100
+    np.testing.assert_allclose(made.mesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
