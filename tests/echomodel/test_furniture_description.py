@@ -109,7 +109,7 @@ def test_styles_drawn_in_one_go_tell_one_word_of_each_kind():
 def test_bad_descriptions_and_choices_are_refused_in_one_line():
     with pytest.raises(ValueError, match=rf"description is \(3,\) float64, expected \({WIDTH},\) finite numbers"):
         piece_of(np.zeros(3))
-    with pytest.raises(ValueError, match="expected .* finite numbers"):
+    with pytest.raises(ValueError, match=r"expected .* finite numbers"):
         piece_of(np.full(WIDTH, np.nan))
     with pytest.raises(ValueError, match=r"open choices are \(2,\), expected \(18,\) finite numbers"):
         Choices(np.zeros(2))
