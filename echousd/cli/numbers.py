@@ -30,7 +30,9 @@ def _checked(callback: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_number(name: str, value: Any) -> None:
-    """Raises ValueError for a NaN, an infinity or an integer beyond `LARGEST`; other values pass."""
+    """Raises ValueError for a NaN, an infinity, a seed below 0 or an integer beyond `LARGEST`; other values pass."""
+    if name == "--seed" and isinstance(value, int) and not 0 <= value <= LARGEST:
+        raise ValueError(f"seed is {value}, allowed: 0 to {LARGEST}")
     if isinstance(value, float) and not math.isfinite(value):
         raise ValueError(f"{name} is {value}, allowed: a finite number")
     if isinstance(value, int) and abs(value) > LARGEST:
