@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from echousd.stage import values
 from echousd.stage.encoding import StageError
+from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, read_image
 
 
@@ -53,8 +54,8 @@ class Drawable:
 
 def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     """Every visible mesh of purpose default or render, instances included; Z-up and other units are converted."""
-    to_world = np.diag([UsdGeom.GetStageMetersPerUnit(stage)] * 3 + [1.0])
-    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+    to_world = np.diag([metres_per_unit(stage)] * 3 + [1.0])
+    if up_axis(stage) == UsdGeom.Tokens.z:
         to_world[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ to_world[:3]
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}

@@ -16,6 +16,7 @@ from echousd.flattening import flat_layer
 from echousd.packing import Package, Reach, without_clock
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.values import reading
 
 if TYPE_CHECKING:
@@ -25,7 +26,13 @@ ENDINGS = (".usdz", ".glb", ".usda", ".usdc")
 
 
 def export(
-    room: str | Path, out: str | Path, *, arkit: bool = False, force: bool = False, search: Sequence[str | Path] = ()
+    room: str | Path,
+    out: str | Path,
+    *,
+    arkit: bool = False,
+    force: bool = False,
+    search: Sequence[str | Path] = (),
+    layout: int | None = None,
 ) -> Path:
     """Write a room (any stage) as one file.
 
@@ -34,6 +41,7 @@ def export(
         out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
         arkit: usdz with one usdc inside, as Apple's viewers want it.
         force: replace a file that is in the way.
+        layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
         search: folders besides the room's own whose layers and images may be taken along.
 
     Raises ValueError for other endings, a file in the way, a stage that does not open, one that names files outside its
@@ -49,13 +57,13 @@ def export(
     stage = open_stage(room)
     reach = Reach.of(stage, search)
     reach.check_layers(stage)
-    with reading(stage):
+    with showing_layout(stage, layout), reading(stage):
         if out.suffix == ".glb":
             content = glb(stage, reach)
         elif out.suffix == ".usdz":
             content = usdz(stage, Package(reach), arkit=arkit)
         else:
-            content = layer_bytes(flat_layer(stage), out.suffix)
+            content = layer_bytes(_marked(flat_layer(stage), stage), out.suffix)
     write_whole(out, content)
     return out
 
@@ -63,7 +71,7 @@ def export(
 def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
     """A usdz package of one flat layer and its images."""
     root = package.reach.room
-    layer = flat_layer(stage, package=package, guides=False)
+    layer = _marked(flat_layer(stage, package=package, guides=False), stage)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         folder = Path(scratch)
         package.write(folder)
@@ -74,6 +82,14 @@ def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
         if not make(Sdf.AssetPath(str(flat)), str(packed)):
             raise ValueError(f"{root}: cannot be packed as usdz")
         return without_clock(packed.read_bytes())
+
+
+def _marked(layer: Sdf.Layer, stage: Usd.Stage) -> Sdf.Layer:
+    """The layer, which says the stage's layout that it holds where there are several."""
+    layout = selected_layout(stage)
+    if layout:
+        layer.customLayerData = {**layer.customLayerData, "layout": layout}
+    return layer
 
 
 def glb(stage: Usd.Stage, reach: Reach) -> bytes:
@@ -94,6 +110,8 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
         scene.graph.update(frame_from="world", frame_to=mesh.component, matrix=mesh.world)
     if not scene.geometry:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to export, found no visible mesh")
+    if selected_layout(stage):
+        scene.metadata["layout"] = selected_layout(stage)
     return bytes(scene.export(file_type="glb"))
 
 

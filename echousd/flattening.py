@@ -7,6 +7,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from echousd.drawables import rgb
 from echousd.packing import Package, take_assets
 from echousd.stage.files import source
+from echousd.stage.units import set_units
 from echousd.stage.values import check_types, given, targets
 
 
@@ -18,6 +19,7 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, guides: bool
         guides: keep prims of purpose guide (colliders) and physics.
     """
     layer = stage.Flatten(False)
+    set_units(layer, stage)
     check_types(layer, source(stage))
     stage = Usd.Stage.Open(layer)
     for prim in list(stage.TraverseAll()):

@@ -35,12 +35,24 @@ class View:
 
 
 def render_file(
-    path: str | Path, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
+    path: str | Path,
+    *,
+    view: str = "perspective",
+    size: int = 512,
+    colors: str = "materials",
+    rays: int = FINE,
+    layout: int | str | None = None,
 ) -> Image.Image:
-    """A picture of the room in a file; see `render_stage`. Raises ValueError where it cannot be opened."""
-    from echousd.stage import open_stage
+    """A picture of the room in a file, in one of its layouts (None: the one that it shows); see `render_stage`.
 
-    return render_stage(open_stage(path), view=view, size=size, colors=colors, rays=rays)
+    Raises ValueError where it cannot be opened, or has no such layout.
+    """
+    from echousd.stage import open_stage
+    from echousd.stage.layouts import showing_layout
+
+    stage = open_stage(path)
+    with showing_layout(stage, layout):
+        return render_stage(stage, view=view, size=size, colors=colors, rays=rays)
 
 
 def render_stage(

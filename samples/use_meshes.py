@@ -20,6 +20,8 @@ mine = folder / "mine.usda"  # stays as it is when the room is generated again
 mine.unlink(missing_ok=True)
 stage = Usd.Stage.CreateNew(str(mine))
 stage.GetRootLayer().subLayerPaths = [f"./{root.name}"]
+UsdGeom.SetStageMetersPerUnit(stage, 1.0)  # USD asks the strongest layer alone
+UsdGeom.SetStageUpAxis(stage, "Y")
 stage.SetDefaultPrim(stage.GetPrimAtPath("/Room"))
 ball = UsdGeom.Sphere.Define(stage, "/Room/Ball")
 ball.CreateRadiusAttr(0.12)

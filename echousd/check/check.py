@@ -15,27 +15,24 @@ from echousd.check.relations import Judged, judge
 from echousd.check.validity import Fault, find_faults
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
+from echousd.stage.layouts import layout_names, showing_layout
 from echousd.stage.read import find_rooms
 
 
 @dataclass(frozen=True)
-class CheckReport:
-    """What a check found.
+class LayoutReport:
+    """What a check found in one layout.
 
     Arguments:
-        source: the file (or layer) that was checked; rooms: prim paths of its rooms.
+        name: of the variant, "" where the room has only one layout.
         relations: every relation between objects with boxes, with its verdict and margin.
         collisions, placement: what stands where it should not.
-        errors, warnings: of the USD validators, ours included.
     """
 
-    source: str
-    rooms: tuple[str, ...]
+    name: str
     relations: tuple[Judged, ...]
     collisions: tuple[Collision, ...]
     placement: tuple[Misplacement, ...]
-    errors: tuple[Fault, ...]
-    warnings: tuple[Fault, ...]
 
     @property
     def broken(self) -> tuple[Judged, ...]:
@@ -49,13 +46,12 @@ class CheckReport:
 
     @property
     def ok(self) -> bool:
-        """Nothing but warnings was found."""
-        return not (self.broken or self.collisions or self.placement or self.errors)
+        """Nothing is broken, collides or stands in the wrong place."""
+        return not (self.broken or self.collisions or self.placement)
 
     def to_json(self) -> dict[str, Any]:
-        """The report as `echousd check --json` prints it."""
+        """The entry of the report."""
         return {
-            "ok": self.ok,
             "relations": {
                 "kept": self.kept,
                 "broken": [judged.to_json() for judged in self.broken],
@@ -63,6 +59,61 @@ class CheckReport:
             },
             "collisions": [hit.to_json() for hit in self.collisions],
             "placement": [wrong.to_json() for wrong in self.placement],
+        }
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What a check found.
+
+    Arguments:
+        source: the file (or layer) that was checked; rooms: prim paths of its rooms.
+        layouts: what was found in each layout, the only one of most rooms called "".
+        errors, warnings: of the USD validators, ours included.
+    """
+
+    source: str
+    rooms: tuple[str, ...]
+    layouts: tuple[LayoutReport, ...]
+    errors: tuple[Fault, ...]
+    warnings: tuple[Fault, ...]
+
+    @property
+    def relations(self) -> tuple[Judged, ...]:
+        """The relations of all layouts."""
+        return tuple(judged for layout in self.layouts for judged in layout.relations)
+
+    @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """The collisions of all layouts."""
+        return tuple(hit for layout in self.layouts for hit in layout.collisions)
+
+    @property
+    def placement(self) -> tuple[Misplacement, ...]:
+        """What is misplaced in any layout."""
+        return tuple(wrong for layout in self.layouts for wrong in layout.placement)
+
+    @property
+    def broken(self) -> tuple[Judged, ...]:
+        """The relations that do not hold, of all layouts."""
+        return tuple(judged for layout in self.layouts for judged in layout.broken)
+
+    @property
+    def ok(self) -> bool:
+        """Nothing but warnings was found."""
+        return not self.errors and all(layout.ok for layout in self.layouts)
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as `echousd check --json` prints it; of several layouts, each has its entry."""
+        several = len(self.layouts) > 1 or any(layout.name for layout in self.layouts)
+        found = (
+            {"layouts": {layout.name: {"ok": layout.ok, **layout.to_json()} for layout in self.layouts}}
+            if several
+            else self.layouts[0].to_json()
+        )
+        return {
+            "ok": self.ok,
+            **found,
             "usd": {
                 "errors": [fault.to_json() for fault in self.errors],
                 "warnings": [fault.to_json() for fault in self.warnings],
@@ -70,36 +121,46 @@ class CheckReport:
         }
 
 
-def check_room(stage: Usd.Stage | str | os.PathLike[str], *, rules: str = "strict") -> CheckReport:
-    """Check every room on a stage.
+def check_room(
+    stage: Usd.Stage | str | os.PathLike[str], *, rules: str = "strict", layout: int | None = None
+) -> CheckReport:
+    """Check every room on a stage, in all of its layouts.
 
     Arguments:
         stage: an open stage or a file.
         rules: `strict` or `sgfront`, for the relations.
+        layout: number of the only layout to check.
 
     Raises:
-        ValueError: the file cannot be opened, holds no room, or the rules are unknown.
+        ValueError: the file cannot be opened, holds no room or no such layout, or the rules are unknown.
     """
     from echomodel.rules import rule_set
 
     rule_set(rules)
     stage = opened(stage)
     errors, warnings = find_faults(stage)
-    try:
-        rooms = [read_contents(prims) for prims in find_rooms(stage)]
-    except StageError:  # echo:EdgeTargets reports it
-        rooms = []
+    names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
+    found = [_check_layout(stage, name, rules) for name in names]
+    rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
-    return CheckReport(
-        source(stage),
-        tuple(room.path for room in rooms),
-        tuple(judged for room in rooms for judged in judge(room, rules)),
-        tuple(hit for room in rooms for hit in find_collisions(room.objects)),
-        tuple(wrong for room in rooms for wrong in _misplaced(room)),
-        errors,
-        warnings,
-    )
+    return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings)
+
+
+def _check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
+    """Prim paths of the rooms, and what is wrong with them in one layout."""
+    with showing_layout(stage, layout) as name:
+        try:
+            rooms = [read_contents(prims) for prims in find_rooms(stage)]
+        except StageError:  # echo:EdgeTargets reports it
+            rooms = []
+        report = LayoutReport(
+            "" if layout is None else name,
+            tuple(judged for room in rooms for judged in judge(room, rules)),
+            tuple(hit for room in rooms for hit in find_collisions(room.objects)),
+            tuple(wrong for room in rooms for wrong in _misplaced(room)),
+        )
+        return tuple(room.path for room in rooms), report
 
 
 def _misplaced(room: RoomContents) -> tuple[Misplacement, ...]:

@@ -11,6 +11,7 @@ from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
 from echousd.check.findings import Finding, Rule, prims
 from echousd.packing import Reach
 from echousd.stage.encoding import StageError
+from echousd.stage.units import unit_faults
 from echousd.stage.values import asset
 from echousd.textures import READABLE, TextureError, read_image
 
@@ -119,7 +120,14 @@ def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
     return Sdf.Path.absoluteRootPath
 
 
+def units(stage: Usd.Stage) -> Iterator[Finding]:
+    """The root layer says the unit and the up axis of the layers that it composes."""
+    for message, wrong in unit_faults(stage):
+        yield Finding(Sdf.Path.absoluteRootPath, message, warning=not wrong)
+
+
 RULES = (
+    Rule("echo:Units", "Unit and up axis of the root layer are those of the layers below.", units),
     Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),
     Rule("echo:Images", "Images can be read.", images),
     Rule("echo:PathsInside", "Files that a room names lie below its folder.", paths_inside),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 
 from pxr import Usd, UsdGeom
@@ -9,7 +10,7 @@ from pxr import Usd, UsdGeom
 from echousd.check.findings import Finding, Rule, applied, is_guide, prims
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
-from echousd.stage.read import find_rooms, node_names, relation_of, room_graph
+from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph
 
 LABELS_PREFIX = "SemanticsLabelsAPI:"
 # Known to this package even in a process that opened a stage before it could register the schema plugin.
@@ -48,10 +49,15 @@ def consistent_graph(stage: Usd.Stage) -> Iterator[Finding]:
     if any(True for _ in edge_targets(stage)):
         return
     for room in find_rooms(stage):
-        try:
-            room_graph(room)
-        except StageError as error:
-            yield Finding(room.graph.GetPath(), _without_place(str(error), room.graph))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", StatedTwice)
+            try:
+                room_graph(room)
+            except StageError as error:
+                yield Finding(room.graph.GetPath(), _without_place(str(error), room.graph))
+        for hint in told:
+            message = str(hint.message)
+            yield Finding(room.graph.GetPath(), message.split(": ", 1)[-1], warning=True)
 
 
 def known_types(stage: Usd.Stage) -> Iterator[Finding]:

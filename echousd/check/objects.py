@@ -11,6 +11,7 @@ from pxr import Tf, Usd, UsdGeom
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import StageError
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
+from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import matrix, mesh_arrays, numbers
 
 Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
@@ -78,6 +79,7 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     relations = tuple(r for r in read if r is not None and r.subject in present and r.object in present)
     spec = _readable(lambda: room_spec(prims))
     assert stage
+    relations = tuple({relation.triple: relation for relation in relations}.values())
     return RoomContents(str(prims.room.GetPath()), spec, tuple(objects), tuple(missing), relations)
 
 
@@ -89,13 +91,13 @@ def room_frame(room: Usd.Prim, cache: UsdGeom.XformCache) -> np.ndarray:
     """
     stage = room.GetStage()
     world = matrix(cache.GetLocalToWorldTransform(room), room)
-    up = np.array([0.0, 0, 1] if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
+    up = np.array([0.0, 0, 1] if up_axis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
     scale = np.linalg.norm(world[:3, :3], axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     local_up = (world[:3, :3] / scale).T @ up
     turn = Z_TO_Y if abs(local_up[2]) > abs(local_up[1]) else np.eye(3)
     out = np.eye(4)
-    out[:3, :3] = turn @ np.diag(scale) * UsdGeom.GetStageMetersPerUnit(stage)
+    out[:3, :3] = turn @ np.diag(scale) * metres_per_unit(stage)
     try:
         return out @ np.linalg.inv(world)
     except np.linalg.LinAlgError:

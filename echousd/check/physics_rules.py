@@ -10,6 +10,7 @@ from pxr import Tf, Usd, UsdGeom, UsdPhysics
 from echousd.check.findings import Finding, Rule, is_guide, prims
 from echousd.check.objects import triangulated
 from echousd.stage.encoding import StageError
+from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import array, matrix
 
 OFF = 0.25  # metres between the boxes of geometry and colliders, which are hulls or a few boxes
@@ -67,7 +68,7 @@ def colliders(stage: Usd.Stage) -> Iterator[Finding]:
             continue
         if boxes[0] is None or boxes[1] is None:
             continue
-        metres = UsdGeom.GetStageMetersPerUnit(stage)
+        metres = metres_per_unit(stage)
         apart = float(np.abs(boxes[0] - boxes[1]).max()) * metres
         if apart > OFF:
             yield Finding(prim.GetPath(), f"its colliders end {apart:.2g} m from its geometry, allowed: {OFF:g} m")
@@ -87,7 +88,7 @@ def _bounds(gprims: list[Usd.Prim], cache: UsdGeom.XformCache) -> np.ndarray | N
 
 def gravity(stage: Usd.Stage) -> Iterator[Finding]:
     """Gravity points down."""
-    up = np.array([0.0, 0, 1] if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
+    up = np.array([0.0, 0, 1] if up_axis(stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
     for prim in prims(stage):
         if prim.GetTypeName() != "PhysicsScene":
             continue
@@ -97,7 +98,7 @@ def gravity(stage: Usd.Stage) -> Iterator[Finding]:
             continue
         if direction.shape == (3,) and direction @ up > 0:
             shown = ", ".join(f"{value:g}" for value in direction)
-            axis = UsdGeom.GetStageUpAxis(stage)
+            axis = up_axis(stage)
             yield Finding(prim.GetPath(), f"gravity points along ({shown}), allowed: downwards on a {axis}-up stage")
 
 

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from echousd.cli.output import plain_json, safe
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from echousd.check import CheckReport
+    from echousd.check.check import LayoutReport
 
 
 def register(app: typer.Typer) -> None:
@@ -20,11 +26,12 @@ def register(app: typer.Typer) -> None:
         room: Annotated[Path, typer.Argument(help="Room to check (.usda, .usdc, .usd, .usdz).", show_default=False)],
         json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
         rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
+        layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
     ) -> None:
-        """Check a room: relations kept, collisions, placement, and whether its USD is sound."""
+        """Check a room: relations kept, collisions, placement in all its layouts, and whether its USD is sound."""
         from echousd.check import check_room
 
-        report = check_room(room, rules=rules)
+        report = check_room(room, rules=rules, layout=layout)
         if json:
             import json as text
 
@@ -35,7 +42,7 @@ def register(app: typer.Typer) -> None:
             raise typer.Exit(1)
 
 
-def _show(report) -> None:  # type: ignore[no-untyped-def]
+def _show(report: CheckReport) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -46,31 +53,37 @@ def _show(report) -> None:  # type: ignore[no-untyped-def]
     def row(good: bool, check: str, found: str) -> None:
         table.add_row("[green]ok[/]" if good else "[red]no[/]", check, escape(safe(found)))
 
-    unmeasured = sum(judged.margin is None for judged in report.relations)
-    measured = len(report.relations) - unmeasured
-    row(
-        not report.broken,
-        "relations",
-        f"{report.kept} of {measured} kept" + (f", {unmeasured} not measured" * bool(unmeasured)),
-    )
-    row(not report.collisions, "collisions", f"{len(report.collisions)} pairs")
-    row(not report.placement, "placement", f"{len(report.placement)} misplaced")
+    for layout in report.layouts:
+        which = f"{layout.name} " if layout.name else ""
+        unmeasured = sum(judged.margin is None for judged in layout.relations)
+        measured = len(layout.relations) - unmeasured
+        silent = f", {unmeasured} not measured" * bool(unmeasured)
+        row(not layout.broken, f"{which}relations", f"{layout.kept} of {measured} kept{silent}")
+        row(not layout.collisions, f"{which}collisions", f"{len(layout.collisions)} pairs")
+        row(not layout.placement, f"{which}placement", f"{len(layout.placement)} misplaced")
     row(not report.errors, "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings")
     console.print(table)
-    for judged in report.broken:
-        console.print(
-            f"  [red]broken[/]    {escape(safe(str(judged.relation)))} (margin {judged.margin:+.3f})", highlight=False
-        )
-    for hit in report.collisions:
-        console.print(
-            f"  [red]collision[/] {escape(safe(f'{hit.first} and {hit.second}'))}, {hit.depth:.3f} m deep",
-            highlight=False,
-        )
-    for wrong in report.placement:
-        far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
-        console.print(f"  [red]placement[/] {escape(safe(wrong.object))} is {wrong.problem}{far}", highlight=False)
+    for layout in report.layouts:
+        _show_faults(console, layout)
     for color, name, faults in (("red", "error", report.errors), ("yellow", "warning", report.warnings)):
         for fault in faults:
             console.print(
                 f"  [{color}]{name}[/] {escape(safe(f'{fault.rule} <{fault.prim}>: {fault.message}'))}", highlight=False
             )
+
+
+def _show_faults(console: Console, layout: LayoutReport) -> None:
+    """What is wrong in one layout, a line each."""
+    from rich.markup import escape
+
+    def line(kind: str, text: str) -> None:
+        which = f"{layout.name}: " if layout.name else ""
+        console.print(f"  [red]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
+
+    for judged in layout.broken:
+        line("broken", f"{judged.relation} (margin {judged.margin:+.3f})")
+    for hit in layout.collisions:
+        line("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep")
+    for wrong in layout.placement:
+        far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
+        line("placement", f"{wrong.object} is {wrong.problem}{far}")

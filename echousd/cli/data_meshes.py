@@ -165,6 +165,8 @@ def _read_usd(path: Path) -> trimesh.Trimesh:
     import trimesh
     from pxr import Usd, UsdGeom
 
+    from echousd.stage.units import metres_per_unit, up_axis
+
     stage = Usd.Stage.Open(str(path))
     cache = UsdGeom.XformCache()
     parts = []
@@ -191,7 +193,7 @@ def _read_usd(path: Path) -> trimesh.Trimesh:
         raise ValueError("the stage holds no visible Mesh prims")
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=False)])
-    vertices = np.concatenate([part.vertices for part in parts]) * UsdGeom.GetStageMetersPerUnit(stage)
-    if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z:
+    vertices = np.concatenate([part.vertices for part in parts]) * metres_per_unit(stage)
+    if up_axis(stage) == UsdGeom.Tokens.z:
         vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
     return trimesh.Trimesh(vertices, faces, process=False)

@@ -36,11 +36,11 @@ def register(app: typer.Typer) -> None:
         wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
         """Change what a room holds; objects that the change does not touch stay byte for byte."""
-        from echousd.cli.generate import check_output, progress_bar, report, writing
+        from echousd.cli.generate import check_output, progress_bar, report, telling_faults, writing
         from echousd.graph.text import relation_from_text
         from echousd.room.edit import edit as change
         from echousd.room.reading import read_room
-        from echousd.room.save import save_layers, write_preview
+        from echousd.room.save import save_layers, write_preview, write_sheet
 
         folder = output or room.parent
         check_output(folder, flat=False, force=force)
@@ -61,7 +61,7 @@ def register(app: typer.Typer) -> None:
             steps = old.diff(graph).lines()
             if not steps:
                 raise ValueError("nothing to change; use --add, --remove, --relabel, --relate or --unrelate")
-            with progress_bar() as listen:
+            with telling_faults(), progress_bar() as listen:
                 made = change(
                     room, graph, seed=seed, shapes=shapes, model=weights, repair=repair, progress=listen,
                 )  # fmt: skip
@@ -69,6 +69,7 @@ def register(app: typer.Typer) -> None:
                 root = save_layers(made, folder, force=force)
                 listen("write", 1, 1)
                 preview = write_preview(root)
+                preview = write_sheet(root) or preview
         for step in steps:
             say(step)
         report(made, root, preview)

@@ -86,12 +86,12 @@ def register(app: typer.Typer) -> None:
         check_seed(seed)
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
-        with writing(output, flat=flat, force=force, wait=wait), progress_bar() as listen:
+        with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
             gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
             try:
                 from echousd.room.pipeline import generate as make
                 from echousd.room.room import RoomOptions
-                from echousd.room.save import save_flat, save_layers, write_preview
+                from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
             finally:
                 gc.enable()
             options = RoomOptions(up_axis.upper(), walls, atlas, ceiling)
@@ -111,13 +111,15 @@ def register(app: typer.Typer) -> None:
                 listen("preview", 0, 1)
                 mark = time.perf_counter()
                 preview = write_preview(root)
+                preview = write_sheet(root) or preview
                 spent["preview"] = time.perf_counter() - mark
                 listen("preview", 1, 1)
-        report(room, root, preview)
         if timings:
-            spent["total"] = time.perf_counter() - started
+            total = time.perf_counter() - started
+            spent |= {"other": total - sum(spent.values()), "total": total}
             for stage, seconds in spent.items():
                 typer.echo(f"{stage:>10} {seconds:7.2f} s")
+        report(room, root, preview)
 
 
 def check_output(output: Path, *, flat: bool, force: bool) -> None:
@@ -148,6 +150,16 @@ def writing(output: Path, *, flat: bool, force: bool, wait: bool) -> Iterator[No
 
     with locked(output, wait=wait):
         claim(output, force=force)
+        yield
+
+
+@contextmanager
+def telling_faults() -> Iterator[None]:
+    """Leave it to `report` to tell what a finished room does not keep."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "the room has faults")
         yield
 
 
@@ -194,14 +206,19 @@ def progress_bar() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def report(room: Room, root: Path, preview: Path | None) -> None:
-    """Say what was made and what the graph asked for in vain."""
-    kept = sum(verdict.state == "kept" for verdict in room.verdicts)
-    broken = [verdict for verdict in room.verdicts if verdict.state == "broken"]
+    """Say what was made and what the graph asked for in vain; ends with exit code 1 where that is anything."""
     say(f"room     {root}")
     if preview is not None:
         say(f"preview  {preview}")
-    say(f"graph    {len(room.names)} objects, {kept} of {kept + len(broken)} measured relations kept")
-    for verdict in broken:
-        say(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
+    for number, found in enumerate(room.judged):
+        counts, several = found.counts(), len(room.judged) > 1
+        kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
+        say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
+        for verdict in found.broken:
+            say(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
+        for hit in found.collisions:
+            say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
     for note in room.notes:
         say(f"note     {note}")
+    if room.faults:
+        raise typer.Exit(1)

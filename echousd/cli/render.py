@@ -20,6 +20,7 @@ def register(app: typer.Typer) -> None:
         view: Annotated[str, typer.Option(help="top or perspective.")] = "perspective",
         size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
         colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
+        layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
         force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     ) -> None:
         """Draw a room from above or from a corner."""
@@ -35,6 +36,6 @@ def register(app: typer.Typer) -> None:
         check_picture(output, force=force)
         buffer, mark = io.BytesIO(), PngInfo()
         mark.add_text("Software", "echousd")
-        render_file(room, view=view, size=size, colors=colors).save(buffer, "PNG", pnginfo=mark)
+        render_file(room, view=view, size=size, colors=colors, layout=layout).save(buffer, "PNG", pnginfo=mark)
         write_whole(output, buffer.getvalue())
         typer.echo(str(output))

@@ -24,7 +24,7 @@ from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, free_name, style_groups
 from echousd.room.tensors import graph_batch
-from echousd.room.verdicts import relation_verdicts
+from echousd.room.verdicts import judgement, warn_of_faults
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
@@ -56,7 +56,8 @@ def edit(
         model, repair, steps, faces, progress: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
-    `model` is None. Warns where the weights are not those that made the room.
+    `model` is None. Warns where the weights are not those that made the room, and of
+    faults as `generate` does.
     """
     check_seed(seed)
     source, timer = None if shapes is None else shape_source(shapes), StageTimer(progress)
@@ -101,15 +102,15 @@ def edit(
         assets |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     assets = _own_names({name: assets[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
-    return Room(
+    room = Room(
         name=manifest["name"],
         graph=graph,
         boxes=layouts[0],
         geometry={name: geometry[name] for name in graph.names},
         assets=assets,
         floor=room_floor(graph, layouts),
-        verdicts=relation_verdicts(graph, layouts[0]),
         layouts=tuple(layouts),
+        judged=tuple(judgement(graph, found) for found in layouts),
         notes=notes,
         provenance=_provenance(manifest, model_used),
         options=RoomOptions(
@@ -121,6 +122,8 @@ def edit(
         timings=timer.seconds,
         carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},
     )
+    warn_of_faults(room)
+    return room
 
 
 def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:

@@ -15,9 +15,12 @@ from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.shell import box_corners, floor_polygon
 from echousd.room.styles import equal_sizes
 from echousd.room.tensors import floor_centre, graph_batch, seeded
+from echousd.room.verdicts import judgement
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
+
+DRAWS = 3  # of one more layout at most: sizes that are given leave less room than the first had
 
 
 def sample_boxes(
@@ -53,7 +56,7 @@ def sample_boxes(
 def finished_boxes(
     graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], repair: bool, timer: StageTimer
 ) -> tuple[Boxes, tuple[str, ...]]:
-    """Sampled boxes after equal sizes within style groups and, if wanted, repair; and what could not be met."""
+    """Sampled boxes after equal sizes within style groups and, if wanted, repair; and demands in conflict."""
     boxes = _alike(graph, boxes, styles)
     if not repair:
         return rounded_boxes(graph, boxes), ()
@@ -68,8 +71,38 @@ def finished_boxes(
             second = repaired(with_sizes(graph, same), same, config=RepairConfig(arrange=False))
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
-    collisions = tuple(f"{a} and {b} collide by {depth:.2f} m" for a, b, depth in found.collisions)
-    return rounded_boxes(graph, found.boxes), found.conflicts + collisions
+    return rounded_boxes(graph, found.boxes), found.conflicts
+
+
+def another_layout(
+    graph: SceneGraph,
+    model: RoomModel,
+    styles: Mapping[str, str],
+    *,
+    seed: int,
+    number: int,
+    repair: bool,
+    steps: int | None = None,
+    timer: StageTimer,
+) -> Boxes:
+    """One more layout of furniture that is there: of up to `DRAWS` drawings the first without faults, or the best.
+
+    Arguments:
+        graph: with the sizes of the furniture, which stay as they are.
+        number: of the layout, from 1 on.
+    """
+    best: tuple[int, Boxes] | None = None
+    for draw in range(DRAWS if repair else 1):
+        found = sample_boxes(model, graph, seed=seed, number=number + 1000 * draw, steps=steps, timer=timer)
+        size = torch.tensor([node.size for node in graph.nodes], dtype=torch.float32)
+        found, _ = finished_boxes(graph, Boxes(size, found.position, found.yaw), styles, repair, timer)
+        faults = len(judgement(graph, found).faults)
+        if best is None or faults < best[0]:
+            best = faults, found
+        if not faults:
+            break
+    assert best is not None
+    return best[1]
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echomodel.boxes import Boxes
 from echomodel.loading import check_preset, load_model
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
-from echousd.room.layouts import finished_boxes, plan_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.layouts import another_layout, finished_boxes, plan_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
@@ -20,7 +19,7 @@ from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
-from echousd.room.verdicts import relation_verdicts
+from echousd.room.verdicts import judgement, warn_of_faults
 
 if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
@@ -56,7 +55,7 @@ def generate(
             the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
         repair: move and size the sampled boxes as little as possible until the graph is kept.
-        samples: number of layouts of the same furniture.
+        samples: number of layouts of the same furniture, each repaired and judged.
         steps: sampling steps, None for the model's own.
         faces: face budget of each mesh.
         options: how the room is written.
@@ -65,6 +64,8 @@ def generate(
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
             missing, damaged or have no shape branch.
+
+    Warns (`RoomWarning`) of relations that are broken and of furniture that collides; `Room.faults` lists them.
     """
     source = None if shapes is None else shape_source(shapes)
     if samples < 1 or samples > 1000:
@@ -96,25 +97,27 @@ def generate(
     notes = (*echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
-        found = sample_boxes(echo, graph, seed=seed, number=number, steps=steps, timer=timer)
-        found = Boxes(boxes.size, found.position, found.yaw)
-        layouts.append(finished_boxes(sized, found, styles, repair, timer)[0])
+        layouts.append(
+            another_layout(sized, echo, styles, seed=seed, number=number, repair=repair, steps=steps, timer=timer)
+        )
     plan = plan_boxes(layouts)
     if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
         graph = with_wider_floor(graph, box_corners(*plan))
     graph = with_placed_openings(graph, plan, seed)
     made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
-    return Room(
+    room = Room(
         name=graph.room.type,
         graph=graph,
         boxes=boxes,
         geometry={name: made.geometry[owner] for name, owner in made.owners.items()},
         assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}),
         floor=room_floor(graph, layouts),
-        verdicts=relation_verdicts(graph, boxes),
         layouts=tuple(layouts),
+        judged=tuple(judgement(graph, found) for found in layouts),
         notes=(*crowded, *notes),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=options or RoomOptions(),
         timings=timer.seconds,
     )
+    warn_of_faults(room)
+    return room

@@ -50,11 +50,63 @@ class Verdict:
     state: str
     margin: float | None = None
 
+    def __str__(self) -> str:
+        margin = "" if self.margin is None else f" (margin {self.margin:+.2f})"
+        return f"{self.subject} {self.predicate} {self.object} is {self.state}{margin}"
+
     def to_json(self) -> dict[str, Any]:
         """The entry of the manifest."""
         margin = None if self.margin is None else round(self.margin, 4)
         triple = {"subject": self.subject, "predicate": self.predicate, "object": self.object}
         return {**triple, "state": self.state, "margin": margin}
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two objects whose boxes run into each other, by `depth` metres."""
+
+    first: str
+    second: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.first} and {self.second} collide by {self.depth:.2f} m"
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the manifest."""
+        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What became of one layout: one verdict per relation of the graph, and the objects that collide."""
+
+    verdicts: tuple[Verdict, ...] = ()
+    collisions: tuple[Collision, ...] = ()
+
+    @property
+    def broken(self) -> tuple[Verdict, ...]:
+        """The relations that do not hold."""
+        return tuple(verdict for verdict in self.verdicts if verdict.state == "broken")
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """A sentence for every broken relation and every collision."""
+        return (*map(str, self.broken), *map(str, self.collisions))
+
+    def counts(self) -> dict[str, int]:
+        """How many relations are kept, broken and unmeasured."""
+        states = [verdict.state for verdict in self.verdicts]
+        return {state: states.count(state) for state in ("kept", "broken", "unmeasured")}
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the manifest."""
+        broken = [verdict.to_json() for verdict in self.broken]
+        return {
+            "relations": self.counts(),
+            "broken": broken,
+            "collisions": [hit.to_json() for hit in self.collisions],
+        }
 
 
 @dataclass(frozen=True)
@@ -82,8 +134,8 @@ class RoomData:
         geometry: object name -> parts and colliders in the object's frame, metres, filling its box.
         assets: object name -> name of the asset that it references; objects with one asset have one geometry.
         floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
-        verdicts: one per relation of the graph.
         layouts: all arrangements of the same furniture; the first is `boxes`.
+        judged: what became of each layout, in their order.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
         carried: asset name -> its files (path -> bytes), which are written again as they are.
@@ -95,8 +147,8 @@ class RoomData:
     geometry: Mapping[str, Geometry]
     assets: Mapping[str, str]
     floor: np.ndarray
-    verdicts: tuple[Verdict, ...] = ()
     layouts: tuple[Boxes, ...] = ()
+    judged: tuple[Judgement, ...] = ()
     notes: tuple[str, ...] = ()
     provenance: Provenance = Provenance()
     options: RoomOptions = RoomOptions()
@@ -107,6 +159,21 @@ class RoomData:
     def names(self) -> tuple[str, ...]:
         """Names of the objects, in the order of the boxes."""
         return tuple(node.name for node in self.graph.nodes)
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """One per relation of the graph, of the first layout."""
+        return self.judged[0].verdicts if self.judged else ()
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Broken relations and collisions of all layouts, one sentence each; says which layout if there are several."""
+        several = len(self.judged) > 1
+        return tuple(
+            f"layout_{number}: {fault}" if several else fault
+            for number, judgement in enumerate(self.judged)
+            for fault in judgement.faults
+        )
 
     @property
     def meshes(self) -> dict[str, trimesh.Trimesh]:

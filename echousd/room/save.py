@@ -21,9 +21,10 @@ from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
-from echousd.room.room import RoomData
+from echousd.room.room import Judgement, RoomData
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.layouts import layout_names
 
 
 def save_room(room: RoomData, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
@@ -32,6 +33,7 @@ def save_room(room: RoomData, folder: Path, *, force: bool = False, preview: boo
         root = save_layers(room, folder, force=force)
         if preview:
             write_preview(root)
+            write_sheet(root)
         return root
 
 
@@ -136,6 +138,42 @@ def write_preview(root: Path) -> Path | None:
     return out
 
 
+SHEET = 280  # pixels of one layout
+
+
+def write_sheet(root: Path) -> Path | None:
+    """Draw `<name>_layouts.png`, all layouts side by side, beside the root layer; None where there is only one.
+
+    The sheet of a room that has only one layout any more is taken away.
+    """
+    from PIL import Image, ImageDraw
+    from PIL.PngImagePlugin import PngInfo
+
+    from echousd.render import QUICK, RenderUnavailable, render_file
+
+    out = root.with_name(f"{root.stem}_layouts.png")
+    names = layout_names(open_stage(root))
+    if out.is_file() and not _drawn_by_us(out):
+        return None
+    if not names:
+        out.unlink(missing_ok=True)
+        return None
+    wide = min(len(names), 4)
+    sheet = Image.new("RGB", (wide * SHEET, -(-len(names) // wide) * SHEET), "white")
+    for number, name in enumerate(names):
+        try:
+            picture = render_file(root, size=SHEET, rays=QUICK, layout=name)
+        except RenderUnavailable:
+            return None
+        ImageDraw.Draw(picture).text((8, 6), name, fill="black")
+        sheet.paste(picture, (number % wide * SHEET, number // wide * SHEET))
+    buffer, mark = io.BytesIO(), PngInfo()
+    mark.add_text(*MARK)
+    sheet.save(buffer, "PNG", pnginfo=mark)
+    write_whole(out, buffer.getvalue(), left="the room itself is complete")
+    return out
+
+
 def _drawn_by_us(path: Path) -> bool:
     from PIL import Image
 
@@ -148,8 +186,7 @@ def _drawn_by_us(path: Path) -> bool:
 
 def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
     """What was asked for, what made the room, what became of every relation, and which files are ours."""
-    kept = sum(v.state == "kept" for v in room.verdicts)
-    broken = sum(v.state == "broken" for v in room.verdicts)
+    first = room.judged[0] if room.judged else Judgement()
     return {
         MANIFEST_KEY: 1,
         "name": room.name,
@@ -163,8 +200,8 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "walls": room.options.walls,
         "atlas": room.options.atlas,
         "ceiling": room.options.ceiling,
-        "layouts": max(len(room.layouts), 1),
-        "relations": {"kept": kept, "broken": broken, "unmeasured": len(room.verdicts) - kept - broken},
+        "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.judged)],
+        "relations": first.counts(),
         "notes": list(room.notes),
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
         "graph": json.loads(room.graph.to_json()),

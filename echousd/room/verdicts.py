@@ -1,14 +1,54 @@
-"""What became of every relation that a graph states."""
+"""What became of every relation that a graph states, and which boxes collide."""
 
 from __future__ import annotations
+
+import warnings
+
+import numpy as np
 
 from echomodel.boxes import Boxes
 from echomodel.rules import margins, verdicts
 from echousd.graph import SceneGraph
-from echousd.room.room import Verdict
+from echousd.repair.belonging import allowed_overlap
+from echousd.repair.geometry import pair_indices, separation
+from echousd.repair.report import TOUCH
+from echousd.room.room import Collision, Judgement, RoomData, Verdict
 from echousd.room.tensors import floor_centre, graph_batch
 
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
+
+
+class RoomWarning(UserWarning):
+    """A room is finished but does not keep its graph, or its furniture collides."""
+
+
+def judgement(graph: SceneGraph, boxes: Boxes) -> Judgement:
+    """What became of one layout, whether it was repaired or not."""
+    return Judgement(relation_verdicts(graph, boxes), colliding(graph, boxes))
+
+
+def colliding(graph: SceneGraph, boxes: Boxes) -> tuple[Collision, ...]:
+    """Pairs of boxes that run into each other deeper than they may, deepest first."""
+    pairs = pair_indices(len(graph.nodes))
+    if not len(pairs):
+        return ()
+    size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
+    allowed = allowed_overlap([node.category for node in graph.nodes], size, pairs)
+    depth = -(separation(size, position, yaw, pairs) + allowed)
+    names = graph.names
+    return tuple(
+        Collision(names[pairs[row, 0]], names[pairs[row, 1]], float(depth[row]))
+        for row in np.argsort(-depth, kind="stable")
+        if depth[row] > TOUCH
+    )
+
+
+def warn_of_faults(room: RoomData) -> None:
+    """A `RoomWarning` with what is wrong with a finished room, if anything is."""
+    faults = room.faults
+    if faults:
+        more = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
+        warnings.warn(f"the room has faults: {'; '.join(faults[:3])}{more}", RoomWarning, stacklevel=3)
 
 
 def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict") -> tuple[Verdict, ...]:

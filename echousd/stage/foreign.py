@@ -17,6 +17,7 @@ from echomodel.vocabulary import UnknownWord, normalised, vocabulary
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
+from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
@@ -49,8 +50,8 @@ class StageFrame:
 
     @classmethod
     def of(cls, stage: Usd.Stage) -> StageFrame:
-        z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
-        return cls(_Z_TO_Y if z_up else np.eye(3), UsdGeom.GetStageMetersPerUnit(stage))
+        z_up = up_axis(stage) == UsdGeom.Tokens.z
+        return cls(_Z_TO_Y if z_up else np.eye(3), metres_per_unit(stage))
 
     def box(self, bound: Gf.BBox3d) -> Box | None:
         """The box around `bound`: turned like its prim where that stands upright, else along the room's axes."""

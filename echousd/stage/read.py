@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -108,12 +110,54 @@ def room_graph(prims: RoomPrims) -> SceneGraph:
     """The graph of one room; raises StageError that names the prim at fault."""
     names = node_names(prims)
     nodes = tuple(read_node(prim, names[prim.GetPath()]) for prim in prims.nodes)
-    read = (relation_of(prim, names) for prim in prims.relations)
-    relations = tuple(relation for relation in read if relation)
+    relations = tuple(facts(prims, names))
     try:
         return SceneGraph(room=room_spec(prims), nodes=nodes, relations=relations)
     except GraphError as error:
         raise StageError(f"{place(prims.graph)}: {error}") from None
+
+
+class StatedTwice(UserWarning):
+    """Two prims of a room state one fact; it counts once."""
+
+
+def facts(prims: RoomPrims, names: dict[Sdf.Path, str]) -> Iterator[Relation]:
+    """The relations of a room; what several prims state is one fact, with the confidence of the strongest layer.
+
+    Warns `StatedTwice`; raises StageError.
+    """
+    for said in stated(prims, names).values():
+        strongest, relation = said[0]
+        if len(said) == 1:
+            yield relation
+            continue
+        others = ", ".join(f"<{prim.GetPath()}>" for prim, _ in said[1:])
+        warnings.warn(
+            f"{place(strongest)}: states '{relation}' as {others} does; one fact, confidence {relation.confidence:g}",
+            StatedTwice,
+            stacklevel=3,
+        )
+        yield relation
+
+
+def stated(prims: RoomPrims, names: dict[Sdf.Path, str]) -> dict[tuple[str, str, str], list[tuple[Usd.Prim, Relation]]]:
+    """Triple to the prims that state it with the relation as each says it, those of stronger layers first."""
+    told: dict[tuple[str, str, str], list[tuple[Usd.Prim, Relation]]] = {}
+    for prim in prims.relations:
+        relation = relation_of(prim, names)
+        if relation:
+            told.setdefault(relation.triple, []).append((prim, relation))
+    for said in told.values():
+        if len(said) > 1:
+            said.sort(key=lambda entry: _strength(entry[0]))
+    return told
+
+
+def _strength(prim: Usd.Prim) -> int:
+    """Place of the strongest layer that speaks of a prim among the layers of its stage, 0 = strongest."""
+    layers = prim.GetStage().GetLayerStack()
+    own = [spec.layer for spec in prim.GetPrimStack()]
+    return min((layers.index(layer) for layer in own if layer in layers), default=len(layers))
 
 
 def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:

@@ -15,7 +15,7 @@ from echomodel.openings import Opening
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
-from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, the_room, value
+from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, stated, the_room, value
 from echousd.stage.write import apply_apis, author_node, author_opening, author_relation, define, put
 
 Edit = Callable[[], Any]
@@ -124,11 +124,8 @@ class _Editor:
     # -- relations -----------------------------------------------------------------------------------------------------
 
     def relation_edits(self, graph: SceneGraph) -> list[Edit]:
-        held: dict[tuple[str, str, str], tuple[Usd.Prim, Relation]] = {}
-        for prim in self.prims.relations:
-            relation = relation_of(prim, self.names)
-            if relation:
-                held[relation.triple] = (prim, relation)
+        facts = stated(self.prims, self.names)
+        held = {triple: said[0] for triple, said in facts.items()}
         wanted = {relation.triple: relation for relation in graph.relations}
         gone = {triple: entry for triple, entry in held.items() if triple not in wanted}
         taken = {child.GetName() for child in self.prims.graph.GetAllChildren()}
@@ -146,7 +143,8 @@ class _Editor:
                 edits += self.other_predicate(*gone.pop(replaced), relation, taken)
             else:
                 edits.append(self.new_relation(relation, taken))
-        return [*(self.removal(prim) for prim, _ in gone.values()), *edits]
+        again = [prim for triple, said in facts.items() if triple not in wanted for prim, _ in said[1:]]
+        return [*map(self.removal, [*(prim for prim, _ in gone.values()), *again]), *edits]
 
     def inactive_relations(self) -> dict[tuple[str, str, str], Usd.Prim]:
         """Relations that somebody has deactivated, by triple: they come back by being activated."""
@@ -245,7 +243,7 @@ class _Editor:
         for prim in prims.relations:
             relation = relation_of(prim, names)
             if relation:
-                related[relation.triple] = prim
+                related.setdefault(relation.triple, prim)
         wanted = (
             ([prim.GetName() for prim in prims.nodes], list(graph.names), prims.nodes),
             (

@@ -62,6 +62,7 @@ FOUND = {
     "no_collider": {"echo:Colliders"},
     "far_collider": {"echo:Colliders"},
     "gravity_up": {"echo:Gravity"},
+    "other_units": {"echo:Units"},
     "corrupt_image": {"echo:Images"},
     "unloaded": set(),  # its payload is loaded here; the rule has a test of its own
 }

@@ -1,0 +1,69 @@
+"""Unit and up axis of a stage whose root layer may leave them open: then the layer that defines the room says them.
+
+OpenUSD reads both from the root layer alone and takes centimetres and its own up axis where nothing is said, so that a
+stronger layer without them shows a room of metres a hundred times too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pxr import Sdf, Usd, UsdGeom
+
+METRES = "metersPerUnit"
+UP_AXIS = "upAxis"
+
+
+def metres_per_unit(stage: Usd.Stage) -> float:
+    """Metres per unit of a stage."""
+    layer = _speaker(stage, METRES)
+    return float(layer.pseudoRoot.GetInfo(METRES)) if layer else float(UsdGeom.GetStageMetersPerUnit(stage))
+
+
+def up_axis(stage: Usd.Stage) -> str:
+    """`Y` or `Z`."""
+    layer = _speaker(stage, UP_AXIS)
+    return str(layer.pseudoRoot.GetInfo(UP_AXIS)) if layer else str(UsdGeom.GetStageUpAxis(stage))
+
+
+def set_units(layer: Sdf.Layer, stage: Usd.Stage) -> None:
+    """Have a layer that holds what a stage composes to say unit and up axis as well."""
+    for key, value in ((METRES, metres_per_unit(stage)), (UP_AXIS, up_axis(stage))):
+        if not layer.pseudoRoot.HasInfo(key):
+            layer.pseudoRoot.SetInfo(key, value)
+
+
+def unit_faults(stage: Usd.Stage) -> Iterator[tuple[str, bool]]:
+    """A sentence for what other programs get wrong about a stage's units, and whether the stage itself is wrong."""
+    root = stage.GetRootLayer()
+    for key in (METRES, UP_AXIS):
+        said = root.pseudoRoot.GetInfo(key) if root.pseudoRoot.HasInfo(key) else None
+        below = next((layer for layer in _layers(stage)[1:] if layer.pseudoRoot.HasInfo(key)), None)
+        if below is None:
+            continue
+        meant = below.pseudoRoot.GetInfo(key)
+        where = f"{key} is {_shown(meant)} in {below.GetDisplayName()}"
+        if said is None:
+            yield (
+                f"{root.GetDisplayName()} sets no {key}, {where}; taken as {_shown(meant)} here, "
+                "other programs may not: set it",
+                False,
+            )
+        elif said != meant:
+            yield f"{key} is {_shown(said)} in {root.GetDisplayName()}, but {where}, allowed: the same", True
+
+
+def _speaker(stage: Usd.Stage, key: str) -> Sdf.Layer | None:
+    """The strongest layer that sets a stage's metadatum: of the layer stack, else of what defines the first prims."""
+    layers = _layers(stage)
+    defining = [spec.layer for prim in stage.GetPseudoRoot().GetChildren() for spec in prim.GetPrimStack()]
+    return next((layer for layer in (*layers, *defining) if layer.pseudoRoot.HasInfo(key)), None)
+
+
+def _layers(stage: Usd.Stage) -> list[Sdf.Layer]:
+    """The layers of a stage's root, strongest first."""
+    return stage.GetLayerStack(includeSessionLayers=False)
+
+
+def _shown(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
