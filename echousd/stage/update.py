@@ -239,7 +239,7 @@ class _Editor:
         """Bring nodes and relations in the graph's order, where they are not, by `reorder nameChildren`."""
         prims = next(prims for prims in find_rooms(self.stage) if prims.room == self.prims.room)
         names = node_names(prims)
-        related = {}
+        related: dict[tuple[str, str, str], Usd.Prim] = {}
         for prim in prims.relations:
             relation = relation_of(prim, names)
             if relation:
