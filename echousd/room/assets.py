@@ -6,14 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, Vt
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, Vt
 
 from echousd.room.geometry import Geometry
 from echousd.room.joints import write_joints
 from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks
 from echousd.room.paths import DESCRIPTION, coarse_name, payload_name, piece_name, piece_path
+from echousd.room.physics import write_asset_physics
 from echousd.room.surface import Surface, surface
+from echousd.room.taxonomy import ade20k
+
+CLASSES = "_class_"  # the prim that an asset's class stands below
 
 LOD, LEVELS = "LOD", ("high", "low")  # a variant set and its variants, the default first
 
@@ -109,13 +113,13 @@ def component_layer(
     geometry: Geometry,
     data: Mapping[str, Any],
 ) -> Sdf.Layer:
-    """`<name>.usda`: kind, extentsHint, asset info, looks of its own and the payload `./<name>_geo.usdc`.
+    """`<name>.usda`: kind, class, labels, extentsHint, looks, physics and the payload `./<name>_geo.usdc`.
 
     Arguments:
         name, category, style: words; the style chooses the looks, which a room's materials layer overrides.
         extent: (2, 3) float, metres.
         slots: path of a part below the root -> its material slots.
-        geometry: whose joints are written.
+        geometry: whose joints, colliders and mass are told.
         data: customLayerData.
     """
     stage = new_stage(name, ".usda", data)
@@ -137,7 +141,19 @@ def component_layer(
         variants.SetVariantSelection(LEVELS[0])
     palette, bindings = palette_for(style), slot_paths(f"/{name}", slots)
     write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
-    return without_stage(stage, lambda layer: _add_payload(layer, name, coarse=bool(geometry.coarse)))
+    for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
+        UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+    write_asset_physics(stage, name, category, geometry, most_used(geometry))
+    return without_stage(stage, lambda layer: _add_arcs(layer, name, coarse=bool(geometry.coarse)))
+
+
+def most_used(geometry: Geometry) -> list[str]:
+    """Material slots of all parts, the one with most surface first."""
+    area: dict[str, float] = {}
+    for part in geometry.parts:
+        for slot, faces in part.slots.items():
+            area[slot] = area.get(slot, 0.0) + float(part.mesh.area_faces[faces].sum())
+    return sorted(area, key=lambda slot: (-area[slot], slot))
 
 
 def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
@@ -154,7 +170,11 @@ def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
     return out
 
 
-def _add_payload(layer: Sdf.Layer, name: str, *, coarse: bool) -> None:
+def _add_arcs(layer: Sdf.Layer, name: str, *, coarse: bool) -> None:
+    """The payloads, and a class whose opinions, in whatever stage, reach all users of the asset."""
+    classes = Sdf.PrimSpec(layer, CLASSES, Sdf.SpecifierClass)
+    Sdf.PrimSpec(classes, name, Sdf.SpecifierClass)
+    layer.GetPrimAtPath(f"/{name}").inheritPathList.prependedItems.append(Sdf.Path(f"/{CLASSES}/{name}"))
     if coarse:
         # a payload inside a variant is stronger than the one beside it, so that its meshes win
         variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LEVELS[1]].primSpec

@@ -13,6 +13,7 @@ from echousd.sight import Furniture
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 WIDE = 18.0  # mm, for a camera inside
+TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
 MARGIN = 1.06
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
@@ -114,9 +115,9 @@ def write_cameras(
     else:
         matrix = perspective_view(points, furniture)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    camera.CreateFocalLengthAttr(WIDE if walled is not None else FOCAL_LENGTH)
-    camera.CreateHorizontalApertureAttr(APERTURE)
-    camera.CreateVerticalApertureAttr(APERTURE)
+    camera.CreateFocalLengthAttr((WIDE if walled is not None else FOCAL_LENGTH) * TENTHS)
+    camera.CreateHorizontalApertureAttr(APERTURE * TENTHS)
+    camera.CreateVerticalApertureAttr(APERTURE * TENTHS)
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
     camera.CreateFocusDistanceAttr(distance)
     camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 4 * distance + 10.0))

@@ -118,20 +118,10 @@ def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
 
 
 def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
-    """`layers/physics.usda`."""
+    """`layers/physics.usda`: the scene and what never moves; the furniture's physics is in its assets."""
     stage = _room_stage(room, "physics")
     stage.OverridePrim("/Room")
-    bodies = []
-    for number, node in enumerate(room.graph.nodes):
-        asset = room.assets[node.name]
-        x, y, z = (float(v) for v in room.boxes.size[number])
-        path = f"{OBJECTS}/{node.name}"
-        geometry = room.geometry[node.name]
-        colliders = {piece_path(path, asset, c.name, c.body): c.approximation for c in geometry.colliders}
-        articulated = bool(geometry.joints)
-        bodies.append(physics.Body(path, colliders, node.category, (x, y, z), geometry.mass, articulated))
-    static = [mesh.path for part in built for mesh in part.meshes if mesh.solid]
-    physics.write_physics(stage, bodies, static)
+    physics.write_physics(stage, [mesh.path for part in built for mesh in part.meshes if mesh.solid])
     physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
 
@@ -170,7 +160,7 @@ def root_layer(room: RoomData) -> Sdf.Layer:
     Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
     Usd.ModelAPI(prim).SetAssetName(room.name)
     if room.options.up_axis == "Z":
-        root.AddRotateXOp(opSuffix="upAxis").Set(90.0)
+        root.AddRotateXOp().Set(90.0)  # without a suffix: three.js reads no other
     volume = room_volume(room)
     low, high = (Gf.Vec3f(*map(float, corner)) for corner in (volume.lower, volume.upper))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])

@@ -6,7 +6,8 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.data.furniture.solids import Joint
-from echousd.room.geometry import FRAME, Geometry, Mass
+from echousd.room.geometry import FRAME, Geometry
+from echousd.room.masses import write_mass
 from echousd.room.paths import piece_name, piece_of
 
 ARTICULATION, STATIC, ARTICULATED = "articulation", "static", "articulated"
@@ -54,27 +55,6 @@ def _joint(stage: Usd.Stage, asset: str, joint: Joint) -> None:
     drive = UsdPhysics.DriveAPI.Apply(made.GetPrim(), "linear" if slides else "angular")
     drive.CreateDampingAttr(DAMPING if slides else DAMPING / 60)  # angular drives count in degrees
     drive.CreateStiffnessAttr(0.0)
-
-
-def write_mass(prim: Usd.Prim, mass: Mass) -> None:
-    """Author mass, centre of mass and moments of inertia."""
-    api = UsdPhysics.MassAPI.Apply(prim)
-    api.CreateMassAttr(round(mass.mass, 3))
-    api.CreateCenterOfMassAttr(Gf.Vec3f(*(round(float(v), 4) for v in mass.centre)))
-    api.CreateDiagonalInertiaAttr(Gf.Vec3f(*(float(f"{v:.4g}") for v in mass.inertia)))
-    turn = Gf.Matrix3d(*np.asarray(mass.axes, float).T.ravel().tolist()).ExtractRotation().GetQuat()
-    api.CreatePrincipalAxesAttr(Gf.Quatf(turn.GetReal(), Gf.Vec3f(turn.GetImaginary())))
-
-
-def read_mass(prim: Usd.Prim) -> Mass | None:
-    """The mass that `write_mass` wrote, None where there is none or only an estimate."""
-    api = UsdPhysics.MassAPI(prim)
-    inertia = api.GetDiagonalInertiaAttr().Get() if prim.HasAPI(UsdPhysics.MassAPI) else None
-    if not inertia or not any(inertia):
-        return None
-    turn = Gf.Matrix3d(Gf.Rotation(Gf.Quatd(api.GetPrincipalAxesAttr().Get())))
-    axes = np.array(turn).T
-    return Mass(api.GetMassAttr().Get(), np.array(api.GetCenterOfMassAttr().Get()), np.array(inertia), axes)
 
 
 def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:

@@ -60,7 +60,8 @@ def write_looks(stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[s
         define_material(stage, f"{scope}/{name}", looks[name])
     for path, name in bindings.items():
         prim = stage.OverridePrim(path)
-        UsdShade.MaterialBindingAPI.Apply(prim).GetDirectBindingRel().SetTargets([Sdf.Path(f"{scope}/{name}")])
+        # `Bind` writes an uncustom relationship; three.js's parser loses a `custom rel`.
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(UsdShade.Material(stage.GetPrimAtPath(f"{scope}/{name}")))
 
 
 def planks(color: Sequence[float], *, seed: int = 0, size: int = 512, rows: int = 8) -> bytes:

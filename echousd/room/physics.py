@@ -1,36 +1,25 @@
-"""`layers/physics.usda`: rigid bodies with masses for what can be moved, static colliders for what cannot."""
+"""Physics of a room: bodies and colliders in every asset, the scene and what never moves in a layer of its own."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
-import numpy as np
-from pxr import Gf, Usd, UsdPhysics
+from pxr import Gf, Usd, UsdPhysics, UsdShade
 
 from echomodel.vocabulary import vocabulary
-from echousd.room.geometry import Mass
-from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC, write_mass
+from echousd.room.geometry import Geometry, Mass
+from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
+from echousd.room.masses import mass_of, write_mass
+from echousd.room.paths import SHELL, piece_path
 
 GRAVITY = 9.81  # m/s²
-
-
-@dataclass(frozen=True)
-class Body:
-    """One object for the physics layer.
-
-    Arguments:
-        root: path of the object. colliders: path -> approximation. category: its word. size: (x, y, z), metres.
-        mass: what it weighs, None = estimated from category and size.
-        articulated: whether its asset has joints; then it is one body only in its variant `static`.
-    """
-
-    root: str
-    colliders: Mapping[str, str]
-    category: str
-    size: tuple[float, float, float]
-    mass: Mass | None = None
-    articulated: bool = False
+SCENE = "/Room/PhysicsScene"
+# Static and dynamic friction of a material slot, and how much of its speed a thing keeps when it bounces.
+CONTACT: Mapping[str, tuple[float, float, float]] = {
+    "fabric": (0.8, 0.7, 0.0), "cushion": (0.8, 0.7, 0.0), "linen": (0.8, 0.7, 0.0), "blanket": (0.8, 0.7, 0.0),
+    "metal": (0.5, 0.4, 0.1), "glass": (0.5, 0.4, 0.1), "ceramic": (0.5, 0.4, 0.1), "mirror": (0.5, 0.4, 0.1),
+}  # fmt: skip
+WOODEN = (0.6, 0.5, 0.05)  # of every other slot
 
 
 def movable(category: str) -> bool:
@@ -38,57 +27,81 @@ def movable(category: str) -> bool:
     return vocabulary().category(category).support in ("floor", "table")
 
 
-def mass(category: str, size: tuple[float, float, float]) -> float:
-    """Estimated mass in kilograms, at least 0.2."""
-    return round(max(0.2, float(np.prod(size)) * vocabulary().category(category).density), 2)
+def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: Geometry, slots: Iterable[str]) -> None:
+    """Author colliders, mass and contact material of one asset as overs on its prims.
+
+    Arguments:
+        stage: of the component layer; its default prim is `/<asset>`, where `joints` has already written.
+        category: of the piece; what hangs gets colliders alone.
+        geometry: whose colliders and mass are told.
+        slots: its material slots, the one that most of it is made of first.
+    """
+    root = f"/{asset}"
+    for collider in geometry.colliders:
+        guide = stage.OverridePrim(piece_path(root, asset, collider.name, collider.body))
+        UsdPhysics.CollisionAPI.Apply(guide)
+        UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)
+    mass = mass_of(geometry, category)
+    volume = sum(max(float(collider.mesh.convex_hull.volume), 1e-6) for collider in geometry.colliders)
+    slot = next(iter(slots), "wood")
+    bind_contact(stage, root, f"{root}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
+    if movable(category):
+        _make_body(stage.GetPrimAtPath(root), mass, articulated=bool(geometry.joints))
 
 
-def write_physics(stage: Usd.Stage, bodies: Iterable[Body], static_meshes: Iterable[str]) -> None:
-    """Author the physics scene, bodies and colliders as overs.
+def _make_body(root: Usd.Prim, mass: Mass, *, articulated: bool) -> None:
+    """One rigid body; a piece with joints is one only in its variant `static`."""
+    if not articulated:
+        UsdPhysics.RigidBodyAPI.Apply(root)
+        write_mass(root, mass)
+        return
+    variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
+    for name in (ARTICULATED, STATIC):
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            if name == STATIC:
+                UsdPhysics.RigidBodyAPI.Apply(root)
+                write_mass(root, mass)
+            else:
+                UsdPhysics.ArticulationRootAPI.Apply(root)
+
+
+def bind_contact(
+    stage: Usd.Stage, path: str, material: str, contact: tuple[float, float, float], density: float | None = None
+) -> None:
+    """Author a physics material and bind it on a prim for purpose `physics`.
+
+    Arguments:
+        path: of the prim that gets it. material: path of the material.
+        contact: static friction, dynamic friction, restitution. density: kg/m³.
+    """
+    made = UsdShade.Material.Define(stage, material)
+    api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
+    api.CreateStaticFrictionAttr(contact[0])
+    api.CreateDynamicFrictionAttr(contact[1])
+    api.CreateRestitutionAttr(contact[2])
+    if density is not None:
+        api.CreateDensityAttr(round(density, 2))
+    binding = UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(path))
+    binding.Bind(made, UsdShade.Tokens.weakerThanDescendants, "physics")
+
+
+def write_physics(stage: Usd.Stage, static_meshes: Iterable[str]) -> None:
+    """Author the physics scene, and the colliders of what stays where it is as overs.
 
     Arguments:
         stage: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`.
-        bodies: the furniture.
         static_meshes: paths of meshes that collide as they are and never move (floor, walls).
     """
-    scene = UsdPhysics.Scene.Define(stage, "/Room/PhysicsScene")
-    scene.CreateGravityMagnitudeAttr(GRAVITY)
-    for body in bodies:
-        for path, approximation in body.colliders.items():
-            guide = stage.OverridePrim(path)
-            UsdPhysics.CollisionAPI.Apply(guide)
-            UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(approximation)
-        if movable(body.category):
-            root = stage.OverridePrim(body.root)
-            if not body.articulated:
-                rigid(root, body)
-                continue
-            variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
-            for name in (STATIC, ARTICULATED):
-                variants.AddVariant(name)
-                variants.SetVariantSelection(name)
-                with variants.GetVariantEditContext():
-                    if name == STATIC:
-                        rigid(root, body)
-                    else:
-                        UsdPhysics.ArticulationRootAPI.Apply(root)
-            variants.ClearVariantSelection()
+    UsdPhysics.Scene.Define(stage, SCENE).CreateGravityMagnitudeAttr(GRAVITY)
     for path in static_meshes:
         prim = stage.OverridePrim(path)
         UsdPhysics.CollisionAPI.Apply(prim)
         UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(UsdPhysics.Tokens.none)
-
-
-def rigid(prim: Usd.Prim, body: Body) -> None:
-    """Make a prim one rigid body."""
-    UsdPhysics.RigidBodyAPI.Apply(prim)
-    if body.mass is None:
-        UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(mass(body.category, body.size))
-    else:
-        write_mass(prim, body.mass)
+    bind_contact(stage, SHELL, f"{SHELL}/contact", WOODEN)
 
 
 def set_gravity(stage: Usd.Stage, up_axis: str) -> None:
     """Gravity's direction is in world space, so it follows the stage's up axis, not `/Room`."""
     direction = Gf.Vec3f(0, -1, 0) if up_axis == "Y" else Gf.Vec3f(0, 0, -1)
-    UsdPhysics.Scene(stage.GetPrimAtPath("/Room/PhysicsScene")).CreateGravityDirectionAttr(direction)
+    UsdPhysics.Scene(stage.GetPrimAtPath(SCENE)).CreateGravityDirectionAttr(direction)

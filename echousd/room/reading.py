@@ -17,8 +17,9 @@ from echousd.graph import SceneGraph
 from echousd.room.colliders import approximation
 from echousd.room.folder import recover
 from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
-from echousd.room.joints import read_joints, read_mass
+from echousd.room.joints import read_joints
 from echousd.room.manifest import find_manifest
+from echousd.room.masses import read_mass
 from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, coarse_file, piece_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph

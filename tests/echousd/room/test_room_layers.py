@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from pxr import Gf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 from small_room import OBJECTS, StandIn, small_graph
 
 import echousd
@@ -175,6 +175,47 @@ def test_physics(stage):
     assert set(approximation.values()) == {"convexHull", "convexDecomposition"}
     assert len(colliders) == len(OBJECTS) + 1
     assert len([p for p in stage.Traverse() if p.IsA(UsdPhysics.Scene)]) == 1
+
+
+def test_every_body_has_a_mass_that_engines_take(stage):
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            mass = UsdPhysics.MassAPI(prim)
+            moments = sorted(mass.GetDiagonalInertiaAttr().Get())
+            assert 0 < moments[0] <= moments[2] <= (moments[0] + moments[1]) * 1.001, prim
+            contact = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
+            friction = UsdPhysics.MaterialAPI(contact)
+            assert friction.GetStaticFrictionAttr().Get() >= friction.GetDynamicFrictionAttr().Get() > 0, prim
+            assert friction.GetDensityAttr().Get() > 0
+
+
+def test_an_asset_is_complete_by_itself(root):
+    alone = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    bed = alone.GetDefaultPrim()
+    assert bed.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert bed.GetAttribute("semantics:labels:category").Get() == ["double_bed"]
+    assert [p.GetName() for p in alone.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)] == ["bed_collider"]
+    assert bed.GetInherits().GetAllDirectInherits() == [Sdf.Path("/_class_/bed")]
+
+
+def test_bindings_are_no_custom_properties(stage):
+    bindings = [prim.GetRelationship("material:binding") for prim in stage.Traverse()]
+    bindings = [binding for binding in bindings if binding]
+    assert len(bindings) > 10
+    assert not any(spec.custom for binding in bindings for spec in binding.GetPropertyStack())
+
+
+def test_lenses_are_told_in_tenths_of_a_metre(stage):
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
+    assert camera.GetHorizontalApertureAttr().Get() == pytest.approx(0.36)
+    assert camera.GetFocalLengthAttr().Get() == pytest.approx(0.30)
+
+
+def test_colliders_end_where_the_meshes_do(room):
+    for name, geometry in room.geometry.items():
+        bounds = np.array([collider.mesh.bounds for collider in geometry.colliders])
+        box = np.stack([bounds[:, 0].min(0), bounds[:, 1].max(0)])
+        np.testing.assert_allclose(box, geometry.mesh.bounds, atol=2e-3, err_msg=name)
 
 
 def test_cameras_see_everything_and_light_is_there(stage, room):

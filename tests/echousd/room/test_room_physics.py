@@ -1,0 +1,62 @@
+"""Masses, inertia and colliders of single pieces."""
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Usd, UsdGeom
+
+from echomodel.vocabulary import vocabulary
+from echousd.room.colliders import collider
+from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
+from echousd.room.masses import mass_of, read_mass
+from echousd.room.meshing import box_mesh
+from echousd.room.physics import write_asset_physics
+from echousd.room.sources.boxes import ORIGIN
+from echousd.room.sources.solid import solid_geometry
+
+SIZE = np.array([1.6, 2.2, 0.6])
+
+
+def tensor(mass: Mass) -> np.ndarray:
+    return mass.axes @ np.diag(mass.inertia) @ mass.axes.T
+
+
+def test_mass_of_a_box_is_that_of_the_textbook():
+    mass = mass_of(solid_geometry(box_mesh(SIZE), "wardrobe", ORIGIN), "wardrobe")
+    x, y, z = SIZE
+    assert mass.mass == pytest.approx(x * y * z * vocabulary().category("wardrobe").density, abs=0.01)
+    np.testing.assert_allclose(mass.centre, (0, y / 2, 0), atol=1e-6)
+    wanted = mass.mass / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    np.testing.assert_allclose(tensor(mass), np.diag(wanted), atol=1e-6 * wanted.max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_written_masses_are_read_back(seed):
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]  # half of these are reflections
+    told = Mass(7.25, rng.normal(size=3), np.sort(rng.random(3)) + 1.0, turn)
+    mesh = box_mesh(SIZE)
+    part = Part("mesh", mesh, {"wood": np.arange(len(mesh.faces))})
+    geometry = Geometry((part,), (Collider("collider", mesh, "convexHull"),), Origin("boxes"), mass=told)
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Xform.Define(stage, "/chair")
+    write_asset_physics(stage, "chair", "chair", geometry, ["fabric"])
+    found = read_mass(stage.GetPrimAtPath("/chair"))
+    assert found.mass == pytest.approx(7.25)
+    np.testing.assert_allclose(found.centre, told.centre, atol=1e-4)
+    np.testing.assert_allclose(tensor(found), tensor(told), atol=1e-4)
+
+
+def test_a_prim_without_a_whole_mass_has_none():
+    stage = Usd.Stage.CreateInMemory()
+    assert read_mass(UsdGeom.Xform.Define(stage, "/chair").GetPrim()) is None
+
+
+@pytest.mark.parametrize("category", ["wardrobe", "chair"])
+def test_colliders_stand_on_planes_that_end_where_the_mesh_does(category):
+    mesh = trimesh.creation.icosphere(4, 0.5)
+    mesh.vertices *= (1.0, 2.0, 0.7)
+    light = collider(mesh, category).mesh
+    np.testing.assert_allclose(light.bounds, mesh.bounds, atol=1e-6)
+    for height in light.bounds[:, 1]:
+        assert (np.abs(light.vertices[:, 1] - height) < 1e-9).sum() >= 3
