@@ -21,7 +21,7 @@ from echousd import generate
 from echousd.graph import load_graph
 from echousd.graph.starting import starting_graph
 from echousd.repair.geometry import corners
-from echousd.room.living import living_faults
+from echousd.repair.living import living_faults
 
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
 CELL, TITLE, LINES = 420, 30, 60  # pixels
@@ -29,7 +29,7 @@ CELL, TITLE, LINES = 420, 30, 60  # pixels
 
 def cell(room, title: str) -> tuple[Image.Image, list[str]]:  # type: ignore[no-untyped-def]
     """One room from above, and its faults as sentences."""
-    faults = [fault.sentence(room.names) for fault in living_faults(room.graph, room.boxes, room.floor)]
+    faults = [fault.says for fault in living_faults(room.graph, room.boxes, room.floor)]
     picture = Image.new("RGB", (CELL, CELL + TITLE + LINES), "white")
     draw = ImageDraw.Draw(picture)
     low, high = room.floor.min(0), room.floor.max(0)

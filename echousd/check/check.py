@@ -1,4 +1,4 @@
-"""Check a room: relations, collisions, placement and USD validity in one report."""
+"""Check a room: relations, collisions, placement, living rules and USD validity in one report."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from typing import Any
 from pxr import Usd
 
 from echousd.check.collisions import Collision, find_collisions
+from echousd.check.living import find_living
 from echousd.check.objects import RoomContents, read_contents
 from echousd.check.placement import Misplacement, find_misplaced
 from echousd.check.relations import Judged, judge
 from echousd.check.validity import Fault, find_faults
+from echousd.repair.living import LivingFault
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import layout_names, showing_layout
@@ -27,12 +29,14 @@ class LayoutReport:
         name: of the variant, "" where the room has only one layout.
         relations: every relation between objects with boxes, with its verdict and margin.
         collisions, placement: what stands where it should not.
+        living: what a person would point at though the graph does not forbid it; warnings.
     """
 
     name: str
     relations: tuple[Judged, ...]
     collisions: tuple[Collision, ...]
     placement: tuple[Misplacement, ...]
+    living: tuple[LivingFault, ...]
 
     @property
     def broken(self) -> tuple[Judged, ...]:
@@ -59,6 +63,7 @@ class LayoutReport:
             },
             "collisions": [hit.to_json() for hit in self.collisions],
             "placement": [wrong.to_json() for wrong in self.placement],
+            "living": [fault.to_json() for fault in self.living],
         }
 
 
@@ -92,6 +97,11 @@ class CheckReport:
     def placement(self) -> tuple[Misplacement, ...]:
         """What is misplaced in any layout."""
         return tuple(wrong for layout in self.layouts for wrong in layout.placement)
+
+    @property
+    def living(self) -> tuple[LivingFault, ...]:
+        """What a person would point at in any layout."""
+        return tuple(fault for layout in self.layouts for fault in layout.living)
 
     @property
     def broken(self) -> tuple[Judged, ...]:
@@ -159,6 +169,7 @@ def _check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tup
             tuple(judged for room in rooms for judged in judge(room, rules)),
             tuple(hit for room in rooms for hit in find_collisions(room.objects)),
             tuple(wrong for room in rooms for wrong in _misplaced(room)),
+            tuple(fault for room in rooms for fault in find_living(room)),
         )
         return tuple(room.path for room in rooms), report
 

@@ -1,4 +1,4 @@
-"""`echousd check`: relations kept, collisions, placement and USD validity of a room."""
+"""`echousd check`: relations kept, collisions, placement, living rules and USD validity of a room."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ def register(app: typer.Typer) -> None:
         json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
         rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
         layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
+        strict: Annotated[bool, typer.Option("--strict", help="Broken living rules fail the check, too.")] = False,
     ) -> None:
-        """Check a room: relations kept, collisions, placement in all its layouts, and whether its USD is sound."""
+        """Check a room: relations, collisions, placement, living rules in all its layouts, and its USD."""
         from echousd.check import check_room
 
         report = check_room(room, rules=rules, layout=layout)
@@ -37,12 +38,12 @@ def register(app: typer.Typer) -> None:
 
             typer.echo(text.dumps(plain_json(report.to_json()), indent=2, allow_nan=False))
         else:
-            _show(report)
-        if not report.ok:
+            _show(report, strict)
+        if not report.ok or (strict and report.living):
             raise typer.Exit(1)
 
 
-def _show(report: CheckReport) -> None:
+def _show(report: CheckReport, strict: bool) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -50,8 +51,8 @@ def _show(report: CheckReport) -> None:
     console = Console(soft_wrap=True)
     table = Table("", "check", "found", box=None, header_style="bold", pad_edge=False)
 
-    def row(good: bool, check: str, found: str) -> None:
-        table.add_row("[green]ok[/]" if good else "[red]no[/]", check, escape(safe(found)))
+    def row(good: bool, check: str, found: str, bad: str = "[red]no[/]") -> None:
+        table.add_row("[green]ok[/]" if good else bad, check, escape(safe(found)))
 
     for layout in report.layouts:
         which = f"{layout.name} " if layout.name else ""
@@ -61,10 +62,12 @@ def _show(report: CheckReport) -> None:
         row(not layout.broken, f"{which}relations", f"{layout.kept} of {measured} kept{silent}")
         row(not layout.collisions, f"{which}collisions", f"{len(layout.collisions)} pairs")
         row(not layout.placement, f"{which}placement", f"{len(layout.placement)} misplaced")
+        seen = f"{len(layout.living)} things that a person would point at"
+        row(not layout.living, f"{which}living", seen, "[red]no[/]" if strict else "[yellow]!![/]")
     row(not report.errors, "USD", f"{len(report.errors)} errors, {len(report.warnings)} warnings")
     console.print(table)
     for layout in report.layouts:
-        _show_faults(console, layout)
+        _show_faults(console, layout, strict)
     for color, name, faults in (("red", "error", report.errors), ("yellow", "warning", report.warnings)):
         for fault in faults:
             console.print(
@@ -72,13 +75,13 @@ def _show(report: CheckReport) -> None:
             )
 
 
-def _show_faults(console: Console, layout: LayoutReport) -> None:
+def _show_faults(console: Console, layout: LayoutReport, strict: bool) -> None:
     """What is wrong in one layout, a line each."""
     from rich.markup import escape
 
-    def line(kind: str, text: str) -> None:
+    def line(kind: str, text: str, colour: str = "red") -> None:
         which = f"{layout.name}: " if layout.name else ""
-        console.print(f"  [red]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
+        console.print(f"  [{colour}]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
 
     for judged in layout.broken:
         line("broken", f"{judged.relation} (margin {judged.margin:+.3f})")
@@ -87,3 +90,5 @@ def _show_faults(console: Console, layout: LayoutReport) -> None:
     for wrong in layout.placement:
         far = "" if wrong.distance is None else f" by {wrong.distance:.3f} m"
         line("placement", f"{wrong.object} is {wrong.problem}{far}")
+    for seen in layout.living:
+        line("living", f"{seen.says} ({seen.rule})", "red" if strict else "yellow")

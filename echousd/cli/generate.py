@@ -58,6 +58,9 @@ def register(app: typer.Typer) -> None:
             ),
         ] = None,
         samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
+        drafts: Annotated[
+            int | None, typer.Option(help="Layouts to choose the best from; default: 8.", min=1, max=64)
+        ] = None,
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
         faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
         up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
@@ -98,7 +101,7 @@ def register(app: typer.Typer) -> None:
             imported = time.perf_counter() - started
             room = make(
                 graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,
-                steps=steps, faces=faces, options=options, progress=listen,
+                drafts=drafts, steps=steps, faces=faces, options=options, progress=listen,
             )  # fmt: skip
             spent = {"imports": imported, **room.timings}
             listen("write", 0, 1)

@@ -86,7 +86,7 @@ def edit(
         if model_used is None:
             layouts.append(_boxes_of(pinned))
             continue
-        found = sample_boxes(model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer)
+        (found,) = sample_boxes(model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer)
         found, told = finished_boxes(pinned, found, styles, repair, timer)
         layouts.append(found)
         notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes

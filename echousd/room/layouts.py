@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.graph import GraphBatch
 from echousd.graph import SceneGraph
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
@@ -20,7 +21,8 @@ from echousd.room.verdicts import judgement
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
 
-DRAWS = 3  # of one more layout at most: sizes that are given leave less room than the first had
+DRAFTS = 8  # of which the best is kept
+DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 
 
 def sample_boxes(
@@ -29,28 +31,90 @@ def sample_boxes(
     *,
     seed: int,
     number: int,
+    count: int = 1,
     steps: int | None = None,
     change: GraphEdit | None = None,
     timer: StageTimer,
-) -> Boxes:
-    """Boxes from the layout branch in the room's frame; what the graph fixes is given to it and comes back."""
-    batch = graph_batch(graph)
-    centre = floor_centre(graph)
-    nodes = graph.nodes
+) -> list[Boxes]:
+    """Drafts from the layout branch in the room's frame; what the graph fixes is given to it and comes back.
+
+    Arguments:
+        number: which draws: equal numbers and counts give equal drafts.
+        count: drafts that are drawn at once; without a `change` only.
+    """
+    centre, nodes = floor_centre(graph), graph.nodes
+    batch = GraphBatch.pack([graph_batch(graph)] * count)
     given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
     known = Boxes(
         torch.tensor([n.size or (1.0, 1.0, 1.0) for n in nodes], dtype=torch.float32),
         torch.tensor([n.position or (0.0, 0.0, 0.0) for n in nodes], dtype=torch.float32) - centre,
         torch.tensor([n.yaw or 0.0 for n in nodes], dtype=torch.float32),
     )
-    extra: dict[str, Any] = {"known": known, "known_mask": given} if bool(given.any()) else {}
+    extra: dict[str, Any] = {}
+    if bool(given.any()):
+        extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
     if steps is not None:
         extra["steps"] = steps
     if change is not None:
         extra["edit"] = change
     with timer.stage("layout") as tell, one_thread():
         found = model.sample_layout(batch, generator=seeded(seed, "layout", number), progress=tell, **extra)
-    return rounded_boxes(graph, Boxes(found.size, found.position + centre, found.yaw))
+    return [
+        rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
+        for rows in torch.arange(count * len(nodes)).chunk(count)
+    ]
+
+
+def best_boxes(
+    model: RoomModel,
+    graph: SceneGraph,
+    styles: Mapping[str, str],
+    *,
+    seed: int,
+    number: int = 0,
+    drafts: int = 1,
+    repair: bool = True,
+    sized: Boxes | None = None,
+    steps: int | None = None,
+    timer: StageTimer,
+) -> tuple[Boxes, tuple[str, ...]]:
+    """The best of several drafts after repair: kept relations first, then collisions, then the living rules.
+
+    Further drafts are drawn, all at once, only where the first one leaves something to be wished for.
+
+    Arguments:
+        drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
+        others: as `sample_boxes` and `finished_boxes`.
+    """
+    best: tuple[Boxes, tuple[str, ...]] | None = None
+    worth: tuple[float, ...] = ()
+    for start, count in ((0, 1), (DRAWN_LATER, drafts - 1)):
+        if count < 1 or (best is not None and not any(worth)):
+            break
+        for draft in sample_boxes(
+            model, graph, seed=seed, number=number + start, count=count, steps=steps, timer=timer
+        ):
+            if sized is not None:
+                draft = Boxes(sized.size, draft.position, draft.yaw)
+            found = finished_boxes(graph, draft, styles, repair, timer)
+            if drafts == 1 or not repair:
+                return found
+            with timer.stage("repair"):
+                wrong = _wishes(graph, found)
+            if best is None or wrong < worth:
+                best, worth = found, wrong
+            if not any(worth):
+                break
+    assert best is not None
+    return best
+
+
+def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]]) -> tuple[float, ...]:
+    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults."""
+    from echousd.repair.living import living_faults
+
+    boxes, conflicts = found
+    return len(judgement(graph, boxes).faults), len(conflicts), len(living_faults(graph, boxes))
 
 
 def finished_boxes(
@@ -72,37 +136,6 @@ def finished_boxes(
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
     return rounded_boxes(graph, found.boxes), found.conflicts
-
-
-def another_layout(
-    graph: SceneGraph,
-    model: RoomModel,
-    styles: Mapping[str, str],
-    *,
-    seed: int,
-    number: int,
-    repair: bool,
-    steps: int | None = None,
-    timer: StageTimer,
-) -> Boxes:
-    """One more layout of furniture that is there: of up to `DRAWS` drawings the first without faults, or the best.
-
-    Arguments:
-        graph: with the sizes of the furniture, which stay as they are.
-        number: of the layout, from 1 on.
-    """
-    best: tuple[int, Boxes] | None = None
-    for draw in range(DRAWS if repair else 1):
-        found = sample_boxes(model, graph, seed=seed, number=number + 1000 * draw, steps=steps, timer=timer)
-        size = torch.tensor([node.size for node in graph.nodes], dtype=torch.float32)
-        found, _ = finished_boxes(graph, Boxes(size, found.position, found.yaw), styles, repair, timer)
-        faults = len(judgement(graph, found).faults)
-        if best is None or faults < best[0]:
-            best = faults, found
-        if not faults:
-            break
-    assert best is not None
-    return best[1]
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

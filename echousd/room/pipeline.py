@@ -10,7 +10,7 @@ from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
-from echousd.room.layouts import another_layout, finished_boxes, plan_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
@@ -36,6 +36,7 @@ def generate(
     preset: str | None = None,
     repair: bool = True,
     samples: int = 1,
+    drafts: int | None = None,
     steps: int | None = None,
     faces: int = FACES,
     options: RoomOptions | None = None,
@@ -55,7 +56,9 @@ def generate(
             the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
         repair: move and size the sampled boxes as little as possible until the graph is kept.
-        samples: number of layouts of the same furniture, each repaired and judged.
+        samples: number of layouts of the same furniture.
+        drafts: layouts that are drawn at most for each of them, the best by relations and living rules is kept; None =
+            `DRAFTS`, or 1 for the published models, which take a thousand steps; without repair it is always 1.
         steps: sampling steps, None for the model's own.
         faces: face budget of each mesh.
         options: how the room is written.
@@ -70,6 +73,8 @@ def generate(
     source = None if shapes is None else shape_source(shapes)
     if samples < 1 or samples > 1000:
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
+    if drafts is not None and not 1 <= drafts <= 64:
+        raise ValueError(f"drafts is {drafts}, allowed: 1 to 64")
     check_seed(seed)
     check_preset(model, preset)
     timer = StageTimer(progress)
@@ -92,14 +97,16 @@ def generate(
     proposed = with_floor(graph, seed)
     free, graph = proposed is not graph, proposed
     styles = style_groups(graph)
-    sampled = sample_boxes(echo, graph, seed=seed, number=0, steps=steps, timer=timer)
-    boxes, notes = finished_boxes(graph, sampled, styles, repair, timer)
+    drafts = drafts or (DRAFTS if echo.preset == "compact" else 1)
+    boxes, notes = best_boxes(echo, graph, styles, seed=seed, drafts=drafts, repair=repair, steps=steps, timer=timer)
     notes = (*echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
-        layouts.append(
-            another_layout(sized, echo, styles, seed=seed, number=number, repair=repair, steps=steps, timer=timer)
-        )
+        found, _ = best_boxes(
+            echo, sized, styles, seed=seed, number=number, drafts=drafts, repair=repair, sized=boxes, steps=steps,
+            timer=timer,
+        )  # fmt: skip
+        layouts.append(found)
     plan = plan_boxes(layouts)
     if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
         graph = with_wider_floor(graph, box_corners(*plan))

@@ -15,6 +15,7 @@ from pxr import Sdf, Usd
 
 import echousd
 from echousd.flattening import flat_layer
+from echousd.repair.living import living_faults
 from echousd.room import folder as folders
 from echousd.room import ownership
 from echousd.room.compose import LAYERS, place_layouts, room_files
@@ -204,6 +205,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "relations": first.counts(),
         "notes": list(room.notes),
         "verdicts": [verdict.to_json() for verdict in room.verdicts],
+        "living": [fault.to_json() for fault in living_faults(room.graph, room.boxes, room.floor)],
         "graph": json.loads(room.graph.to_json()),
         "assets": dict(room.assets),
         "meshes": {asset: _mesh_facts(room.geometry[user]) for asset, user in sorted(room.asset_users.items())},

@@ -12,9 +12,10 @@ from pxr import Gf, Usd, UsdGeom, UsdValidation
 
 from echousd.check import RULES, check_room, register
 from echousd.check.collisions import find_collisions, mesh_depth, winding_number
-from echousd.check.objects import RoomObject
+from echousd.check.living import find_living
+from echousd.check.objects import RoomContents, RoomObject
 from echousd.cli.main import run
-from echousd.graph import Node
+from echousd.graph import Node, RoomSpec
 
 BAD = Path(__file__).parent.parent / "bad"
 
@@ -218,7 +219,7 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "bed and wardrobe" in capsys.readouterr().out
     assert run(["check", str(BAD / "broken_relation.usda"), "--json"]) == 1
     report = json.loads(capsys.readouterr().out)
-    assert set(report) == {"ok", "relations", "collisions", "placement", "usd"}
+    assert set(report) == {"ok", "relations", "collisions", "placement", "living", "usd"}
     assert report["relations"]["kept"] == 3
     assert report["relations"]["broken"][0]["predicate"] == "behind"
     assert report["usd"] == {"errors": [], "warnings": []}
@@ -236,3 +237,25 @@ def test_bad_input(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     empty.Save()
     assert run(["check", str(tmp_path / "empty.usda")]) == 2
     assert "no room (no EchoSceneGraph prim), nothing to check" in capsys.readouterr().err
+
+
+def test_living_rules_are_warnings_unless_strict(capsys: pytest.CaptureFixture[str]) -> None:
+    contents = RoomContents(
+        "/Room",
+        RoomSpec("bedroom", size=(4.0, 4.0)),
+        (
+            thing("bed", "double_bed", box(1.8, 1.0, 2.1), (0.0, 0.0, -0.94)),
+            thing("wardrobe", "wardrobe", box(1.6, 2.2, 0.6), (0.0, 0.0, 0.5)),
+        ),
+        (),
+        (),
+    )
+    found = {(fault.object, fault.rule): fault for fault in find_living(contents)}
+    assert found["wardrobe", "at_wall"].says == "wardrobe stands 2.20 m off the wall behind it"
+    assert found["wardrobe", "at_wall"].to_json()["object"] == "wardrobe"
+    report = check_room(BAD / "good.usda")
+    assert run(["check", str(BAD / "good.usda"), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["living"]) == len(report.living)
+    assert run(["check", str(BAD / "good.usda"), "--strict"]) == int(bool(report.living))
+    assert "living" in capsys.readouterr().out
+    assert report.ok

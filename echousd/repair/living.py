@@ -1,0 +1,55 @@
+"""What a person would point at in a room, in the words of its graph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from echomodel.rules.geometry import BoxesLike
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+
+
+@dataclass(frozen=True)
+class LivingFault:
+    """An object that breaks a living rule, perhaps about another one, by a margin (metres, radians or a share)."""
+
+    object: str
+    rule: str
+    other: str | None
+    margin: float
+    says: str
+
+    def to_json(self) -> dict:
+        """The entry of reports and manifests."""
+        said = {"object": self.object, "rule": self.rule, "other": self.other}
+        return {**said, "margin": round(self.margin, 4), "says": self.says}
+
+
+def living_faults(graph: SceneGraph, boxes: BoxesLike, floor: np.ndarray | None = None) -> tuple[LivingFault, ...]:
+    """Every living rule that an object breaks; objects whose place the graph states are not blamed.
+
+    Arguments:
+        graph: N objects, their relations, the room with its openings.
+        boxes: N boxes in its order, metres and radians.
+        floor: (k, 2) float, corners where the graph states none, metres; None = no rule of walls.
+    """
+    from echomodel.rules.living import faults
+
+    names, words = list(graph.names), vocabulary()
+    rows = {name: row for row, name in enumerate(names)}
+    triplets = [(rows[r.subject], words.predicate_id(r.predicate), rows[r.object]) for r in graph.relations]
+    corners = graph.room.corners
+    found = faults(
+        boxes,
+        [node.category for node in graph.nodes],
+        floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
+        graph.room.openings if corners is not None else (),
+        np.array(triplets, int).reshape(-1, 3),
+        given=np.array([node.position is not None for node in graph.nodes]),
+    )
+    return tuple(
+        LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
+        for f in found
+    )
