@@ -13,6 +13,7 @@ from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
 SHELL = ("floor", "wall", "ceiling", "door", "window")
+HUNG = ("picture", "mirror", "curtain")  # goes with the wall that it hangs on
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +103,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     parts: list[dict[str, np.ndarray]] = []
     images: dict[str, tuple[int, np.ndarray]] = {}
     boxes = []
+    hung: list[int] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
@@ -131,14 +133,29 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                     images[paint.texture] = (len(images), linear)
                 part["texture"][faces] = images[paint.texture][0]
         parts.append(part)
-        if mesh.category not in SHELL:
+        if mesh.category not in (*SHELL, *HUNG, "rug"):
             boxes.append(_box(mesh))
+        if mesh.category in HUNG:
+            hung.append(len(parts) - 1)
+    _hang(parts, hung, len(walls))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     sizes = np.array(boxes).reshape(-1, 7)
     furniture = Furniture(sizes[:, :3], sizes[:, 3:6], sizes[:, 6])
     return Scenery(images=tuple(image for _, image in images.values()), furniture=furniture, **joined)
+
+
+def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> None:
+    """Give what hangs on a wall the number of the nearest one."""
+    bounds = []
+    for number in range(count):
+        corners = np.concatenate([p["triangles"][p["wall"] == number].reshape(-1, 3) for p in parts])
+        bounds.append((corners.min(0), corners.max(0)))
+    for index in hung if bounds else ():
+        middle = parts[index]["triangles"].reshape(-1, 3).mean(0)
+        apart = [np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0)) for low, high in bounds]
+        parts[index]["wall"][:] = int(np.argmin(apart))
 
 
 def _box(mesh: Drawable) -> np.ndarray:

@@ -68,6 +68,7 @@ def register(app: typer.Typer) -> None:
             bool, typer.Option("--walls/--no-walls", help="Walls around the floor, with doors and windows.")
         ] = True,
         ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
+        dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "some",
         atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
         repair: Annotated[
             bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
@@ -97,7 +98,7 @@ def register(app: typer.Typer) -> None:
                 from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
             finally:
                 gc.enable()
-            options = RoomOptions(up_axis.upper(), walls, atlas, ceiling)
+            options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
             imported = time.perf_counter() - started
             room = make(
                 graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,

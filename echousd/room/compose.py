@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,11 @@ import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
+from echomodel.data.dressing import KINDS
 from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
-from echousd.room.geometry import LICENCE
+from echousd.room.dressing import Dressing, dress
+from echousd.room.dressing.layer import dressing_layer
+from echousd.room.geometry import LICENCE, Geometry
 from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.styles import ROOM_STYLE
@@ -21,7 +24,7 @@ from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
 
-LAYERS = ("materials", "physics", "layout", "graph", "geometry")  # strongest first
+LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry")  # strongest first
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,10 @@ def room_files(room: RoomData) -> dict[str, bytes]:
     for name, user in room.asset_users.items():
         made[name] = _asset(room, name, user)
         files.update(made[name].files)
+    dressing = dress(room)
+    small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
+    for asset in small.values():
+        files.update(asset.files)
     built = structure.shell_prims(room)
     palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
     files["textures/floor.png"] = materials.planks(looks.floor_color(palette), seed=room.provenance.seed)
@@ -48,8 +55,12 @@ def room_files(room: RoomData) -> dict[str, bytes]:
         "graph": graph_layer(room),
         "layout": layout_layer(room),
         "physics": physics_layer(room, built),
-        "materials": materials_layer(room, made, built),
+        "materials": materials_layer(room, made, built, {slot for asset in small.values() for slot in _slots(asset)}),
     }
+    if room.options.dress != "none":
+        looks_of = {slot: f"{ROOM_STYLE}_{slot}" for asset in small.values() for slot in _slots(asset)}
+        slots = {name: asset.slots for name, asset in small.items()}
+        layers["dressing"] = dressing_layer(dressing, slots, looks_of, layer_data(room, f"{room.name}_dressing"))
     for name, layer in layers.items():
         files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
     files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
@@ -126,8 +137,10 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
     return stage.GetRootLayer()
 
 
-def materials_layer(room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
-    """`layers/materials.usda`."""
+def materials_layer(
+    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str] = ()
+) -> Sdf.Layer:
+    """`layers/materials.usda`; `small` are the material slots of the dressing, which its own layer binds."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")
     table: dict[str, looks.Look] = {}
@@ -141,11 +154,13 @@ def materials_layer(room: RoomData, made: Mapping[str, Asset], built: Sequence[s
             name = f"{slug}_{slot}" if slug[0].isalpha() else f"style_{slug}_{slot}"
             table[name] = looks.look(palette, slot)
             bindings[path] = name
-    boards = looks.floor_color(looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}"))
+    own = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
+    table |= {f"{ROOM_STYLE}_{slot}": looks.look(own, slot) for slot in small}
+    boards = looks.floor_color(own)
     table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
     table |= structure.LOOKS
     bindings |= {mesh.path: mesh.look for part in built for mesh in part.meshes}
-    materials.write_looks(stage, table, bindings)
+    materials.write_looks(stage, table, bindings, also=[f"{ROOM_STYLE}_{slot}" for slot in small])
     return stage.GetRootLayer()
 
 
@@ -168,7 +183,8 @@ def root_layer(room: RoomData) -> Sdf.Layer:
     lights.write_lights(stage, room, volume)
     walled = room.floor if room.options.walls else None
     cameras.write_cameras(stage, volume, room_points(room), furniture, walled)
-    return assets.without_stage(stage, _add_sublayers)
+    names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
+    return assets.without_stage(stage, lambda layer: _add_sublayers(layer, names))
 
 
 def room_points(room: RoomData) -> np.ndarray:
@@ -199,15 +215,23 @@ def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
         prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
 
 
-def _add_sublayers(layer: Sdf.Layer) -> None:
-    layer.subLayerPaths = [f"./layers/{name}.usda" for name in LAYERS]
+def _add_sublayers(layer: Sdf.Layer, names: Sequence[str]) -> None:
+    layer.subLayerPaths = [f"./layers/{name}.usda" for name in names]
 
 
 def _asset(room: RoomData, name: str, user: str) -> Asset:
-    geometry, category = room.geometry[user], room.graph.node(user).category
+    geometry = room.geometry[user]
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
+    return _written(room, name, room.graph.node(user).category, room.styles[user], geometry)
+
+
+def _small_asset(room: RoomData, name: str, dressing: Dressing) -> Asset:
+    return _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, dressing.geometry[name])
+
+
+def _written(room: RoomData, name: str, category: str, style: str, geometry: Geometry) -> Asset:
     forms = {
         piece_path("", name, part.name, part.body): surface(
             part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease
@@ -222,7 +246,7 @@ def _asset(room: RoomData, name: str, user: str) -> Asset:
     if geometry.origin.credit:
         data["asset_credit"] = geometry.origin.credit
     payload = assets.geometry_layer(name, forms, geometry, data)
-    component = assets.component_layer(name, category, room.styles[user], extent, slots, geometry, data)
+    component = assets.component_layer(name, category, style, extent, slots, geometry, data)
     coarse = {
         piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
         for part in geometry.coarse
@@ -234,6 +258,10 @@ def _asset(room: RoomData, name: str, user: str) -> Asset:
         component_file(name): layer_bytes(component, ".usda"),
     }
     return Asset(name, slots, files)
+
+
+def _slots(asset: Asset) -> set[str]:
+    return {slot for slots in asset.slots.values() for slot in slots}
 
 
 def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:

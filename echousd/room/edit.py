@@ -118,6 +118,7 @@ def edit(
             manifest.get("walls", False),
             manifest.get("atlas", False),
             manifest.get("ceiling", False),
+            manifest.get("dress", "none"),
         ),
         timings=timer.seconds,
         carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},

@@ -16,7 +16,10 @@ SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they 
 DENSITY = {
     "wood": 600.0, "accent": 650.0, "fabric": 70.0, "metal": 2600.0, "glass": 2500.0, "ceramic": 900.0, "leaf": 120.0,
     "soil": 900.0, "shade": 150.0, "screen": 900.0, "cushion": 50.0, "linen": 60.0, "blanket": 60.0, "mirror": 2500.0,
-    "book": 650.0, "stem": 500.0,
+    "book": 650.0, "stem": 500.0, "rug": 250.0, "curtain": 120.0, "accent_cloth": 60.0, "picture": 300.0,
+    "frame": 600.0,
+    "paper": 700.0, "book_a": 650.0, "book_b": 650.0, "book_c": 650.0, "book_d": 650.0, "petal": 120.0, "fruit": 800.0,
+    "wax": 900.0, "wicker": 150.0, "leather": 300.0,
 }  # fmt: skip
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
 COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
@@ -44,7 +47,7 @@ def assembled(
     masses: dict[str, Mass] = {}
     for body, members in _bodies(pieces, fixed).items():
         prefix = f"{body}_" if body != fixed else ""
-        parts.append(_part(f"{prefix}mesh", members, body))
+        parts.append(part_of(f"{prefix}mesh", members, body))
         own = _bodies(plain, fixed)[body]
         hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
@@ -53,7 +56,7 @@ def assembled(
     joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
     fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
     names = {part.body: part.name for part in parts}
-    coarse = [_part(names[body], members, body) for body, members in _bodies(low, fixed).items()] if fewer else []
+    coarse = [part_of(names[body], members, body) for body, members in _bodies(low, fixed).items()] if fewer else []
     return Geometry(
         tuple(parts), tuple(colliders), origin, mass=mass_of(plain), joints=tuple(joints.values()),
         masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
@@ -83,7 +86,8 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list
     return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0)
 
 
-def _part(name: str, pieces: Sequence[Piece], body: str) -> Part:
+def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
+    """Some meshed solids as one part with a slot per material."""
     offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     faces = np.concatenate([piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)])
     mesh = trimesh.Trimesh(np.concatenate([piece.vertices for piece in pieces]), faces, process=False)

@@ -67,6 +67,21 @@ def look(palette: str, group: str) -> Look:
         "mirror": Look(linear("c9d2d4"), 0.05, metallic=1.0),
         "book": Look(linear("7a4a40"), 0.8),
         "stem": Look(linear("6b5436"), 0.85),
+        "rug": Look(linear("d9d0c0"), 0.95),
+        "curtain": Look(linear("ebe5da"), 0.9),
+        "accent_cloth": Look(linear(blanket), 0.95),
+        "picture": Look(linear("a9b0a8"), 0.8),
+        "frame": Look(linear(wood), 0.5),
+        "paper": Look(linear("f1ede4"), 0.9),
+        "book_a": Look(linear(blanket), 0.7),
+        "book_b": Look(linear("e4dccb"), 0.7),
+        "book_c": Look(linear("2f3b45"), 0.7),
+        "book_d": Look(linear("8f5a3c"), 0.7),
+        "petal": Look(linear("f0dfd5"), 0.8),
+        "fruit": Look(linear("c9862e"), 0.5),
+        "wax": Look(linear("f3eadb"), 0.5),
+        "wicker": Look(linear("b08a58"), 0.9),
+        "leather": Look(linear("5a3d2b"), 0.5),
     }[group]
 
 

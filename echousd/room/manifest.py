@@ -37,6 +37,7 @@ class Manifest(BaseModel):
     walls: bool = False
     atlas: bool = False
     ceiling: bool = False
+    dress: Literal["none", "some", "full"] = "none"
     meshes: dict[str, dict[str, Any]] = {}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
@@ -46,7 +46,13 @@ def define_material(stage: Usd.Stage, path: str, look: Look) -> UsdShade.Materia
     return material
 
 
-def write_looks(stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[str, str], scope: str = LOOKS) -> None:
+def write_looks(
+    stage: Usd.Stage,
+    looks: Mapping[str, Look],
+    bindings: Mapping[str, str],
+    scope: str = LOOKS,
+    also: Iterable[str] = (),
+) -> None:
     """Define every look that is bound, and bind it.
 
     Arguments:
@@ -54,9 +60,10 @@ def write_looks(stage: Usd.Stage, looks: Mapping[str, Look], bindings: Mapping[s
         looks: material name -> look.
         bindings: prim path of a mesh or subset -> material name.
         scope: path of the prim that the materials stand below.
+        also: names of looks that are defined, too, though another layer binds them.
     """
     UsdGeom.Scope.Define(stage, scope)
-    for name in sorted(set(bindings.values())):
+    for name in sorted({*bindings.values(), *also}):
         define_material(stage, f"{scope}/{name}", looks[name])
     for path, name in bindings.items():
         prim = stage.OverridePrim(path)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from pxr import Gf, Usd, UsdPhysics, UsdShade
 
+from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.room.geometry import Geometry, Mass
 from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
@@ -24,6 +25,8 @@ WOODEN = (0.6, 0.5, 0.05)  # of every other slot
 
 def movable(category: str) -> bool:
     """Whether an object of this category is a rigid body; what hangs on a wall or a ceiling is not."""
+    if category in SMALL:
+        return not SMALL[category].fixed
     return vocabulary().category(category).support in ("floor", "table")
 
 
@@ -37,7 +40,8 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
         slots: its material slots, the one that most of it is made of first.
     """
     root = f"/{asset}"
-    for collider in geometry.colliders:
+    lies = category in SMALL and SMALL[category].lies  # cloth is carried by what is below it
+    for collider in () if lies else geometry.colliders:
         guide = stage.OverridePrim(piece_path(root, asset, collider.name, collider.body))
         UsdPhysics.CollisionAPI.Apply(guide)
         UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)

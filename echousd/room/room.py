@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from echousd.room.geometry import Geometry
 
 
+DRESS = ("none", "some", "full")
+
+
 @dataclass(frozen=True)
 class RoomOptions:
     """How a room is written.
@@ -27,6 +30,7 @@ class RoomOptions:
         up_axis: `Y`, or `Z` (metadata and one rotation on the root prim; everything below stays as it is).
         walls: add walls around the floor, with doors and windows in their openings.
         ceiling: add a ceiling.
+        dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`.
         atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
     """
 
@@ -34,10 +38,13 @@ class RoomOptions:
     walls: bool = False
     atlas: bool = False
     ceiling: bool = False
+    dress: str = "none"
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):
             raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
+        if self.dress not in DRESS:
+            raise ValueError(f"dress is {self.dress!r}, allowed: {', '.join(DRESS)}")
 
 
 @dataclass(frozen=True)

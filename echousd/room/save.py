@@ -201,6 +201,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "walls": room.options.walls,
         "atlas": room.options.atlas,
         "ceiling": room.options.ceiling,
+        "dress": room.options.dress,
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.judged)],
         "relations": first.counts(),
         "notes": list(room.notes),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 
 SHELL = {"floor": "floor", "wall": "wall", "ceiling": "ceiling", "door": "door", "window": "windowpane"}
@@ -9,4 +10,6 @@ SHELL = {"floor": "floor", "wall": "wall", "ceiling": "ceiling", "door": "door",
 
 def ade20k(word: str) -> str:
     """The ADE20K class of a category of the vocabulary or of a part of the shell; raises `UnknownWord`."""
+    if word in SMALL:
+        return SMALL[word].ade20k
     return SHELL[word] if word in SHELL else vocabulary().category(word).ade20k

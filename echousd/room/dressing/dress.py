@@ -1,0 +1,110 @@
+"""From a room to its dressing: what stands where, and the geometry of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from echomodel.data.dressing import KINDS
+from echomodel.data.dressing import thing as solids_of
+from echousd.room.dressing import floors, tabletops, upholstery, walls
+from echousd.room.dressing.setting import Setting, Thing, standing
+from echousd.room.geometry import Collider, Geometry, Origin
+from echousd.room.joinery import mass_of, part_of, within_budget
+from echousd.room.room import RoomData
+from echousd.room.styles import free_name
+
+ORIGIN = Origin("dressing")
+RULES = (
+    floors.rugs,
+    walls.curtains,
+    walls.pictures,
+    upholstery.throws,
+    upholstery.cushions,
+    tabletops.tabletops,
+    floors.by_doors,
+    floors.baskets,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Dressing:
+    """The small things of a room.
+
+    Arguments:
+        layouts: for every layout of the room, name of a thing -> the thing.
+        assets: name of a thing -> name of its asset; one name is one asset in all layouts.
+        geometry: name of an asset -> its geometry.
+    """
+
+    layouts: tuple[Mapping[str, Thing], ...]
+    assets: Mapping[str, str]
+    geometry: Mapping[str, Geometry]
+
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Name of an asset -> its kind."""
+        return {self.assets[name]: t.kind for things in self.layouts for name, t in things.items()}
+
+
+def dress(room: RoomData) -> Dressing:
+    """Small things for every layout of a room as `room.options.dress` asks for; the same room gives the same."""
+    layouts: list[dict[str, Thing]] = []
+    assets: dict[str, str] = {}
+    geometry: dict[str, Geometry] = {}
+    known: dict[tuple, str] = {}
+    kinds: dict[str, tuple] = {}
+    taken = {*room.names, *room.assets.values()}
+    if room.options.dress != "none":
+        for number in range(max(len(room.layouts), 1)):
+            named: dict[str, Thing] = {}
+            for found in placed(room, number):
+                key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
+                if key not in known:
+                    known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
+                    geometry[known[key]] = geometry_of(found)
+                word = KINDS[found.kind].name
+                name = free_name(word, taken | set(named))
+                while kinds.setdefault(name, key) != key:  # a name has one asset in all layouts
+                    name = free_name(word, taken | set(named) | set(kinds))
+                named[name], assets[name] = found, known[key]
+            layouts.append(named)
+    return Dressing(tuple(layouts), assets, geometry)
+
+
+def placed(room: RoomData, layout: int = 0) -> list[Thing]:
+    """The things of one layout, in the order in which they were placed."""
+    setting = setting_of(room, layout)
+    for rule in RULES:
+        rule(setting)
+    return setting.placed
+
+
+def setting_of(room: RoomData, layout: int = 0) -> Setting:
+    """What the rules look at."""
+    boxes = room.layouts[layout] if room.layouts else room.boxes
+    size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
+    objects = {
+        node.name: standing(node.name, node.category, size[i], position[i], yaw[i], room.geometry[node.name])
+        for i, node in enumerate(room.graph.nodes)
+    }
+    corners = room.graph.room.corners
+    floor = np.asarray(room.floor if corners is None else corners, float)
+    return Setting(
+        objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
+        room.options.dress == "full", room.provenance.seed,
+    )  # fmt: skip
+
+
+def geometry_of(found: Thing) -> Geometry:
+    """The geometry of a thing, with one hull to bump into."""
+    kind = KINDS[found.kind]
+    solids = solids_of(found.kind, found.size, np.random.default_rng(found.variant))
+    pieces = within_budget(solids, found.size, kind.faces)
+    part = part_of("mesh", pieces)
+    hull = trimesh.convex.convex_hull(part.mesh.vertices)
+    collider = Collider("collider", trimesh.Trimesh(hull.vertices, hull.faces, process=False), "convexHull")
+    return Geometry((part,), (collider,), ORIGIN, mass_of(pieces))

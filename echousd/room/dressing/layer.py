@@ -1,0 +1,76 @@
+"""`layers/dressing.usda`: everything below `/Room/Dressing`; muted, the room is bare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
+
+from echousd.room import assets
+from echousd.room.dressing.dress import Dressing
+from echousd.room.dressing.setting import Thing
+from echousd.room.materials import LOOKS
+
+DRESSING = "/Room/Dressing"
+
+
+def dressing_layer(
+    dressing: Dressing,
+    slots: Mapping[str, Mapping[str, Sequence[str]]],
+    looks: Mapping[str, str],
+    data: Mapping[str, Any],
+) -> Sdf.Layer:
+    """The layer; several layouts are variants of `layout`, as in the layer of the layout.
+
+    Arguments:
+        dressing: what is written.
+        slots: asset -> name of a part -> its material slots.
+        looks: material slot -> name of its material in the room.
+        data: customLayerData.
+    """
+    stage = assets.new_stage("Room", ".usda", data)
+    room = stage.OverridePrim("/Room")
+    several = len(dressing.layouts) > 1
+    references: dict[str, str] = {}
+    for number, things in enumerate(dressing.layouts):
+        if not several:
+            _write(stage, things, dressing, slots, looks)
+            continue
+        variants = room.GetVariantSets().AddVariantSet("layout")
+        variants.AddVariant(f"layout_{number}")
+        variants.SetVariantSelection(f"layout_{number}")
+        with variants.GetVariantEditContext():
+            _write(stage, things, dressing, slots, looks)
+    for number, things in enumerate(dressing.layouts):
+        above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
+        references |= {f"{above}/{name}": dressing.assets[name] for name in things}
+    if several:  # the layer of the layout says which one is seen
+        room.GetVariantSets().GetVariantSet("layout").ClearVariantSelection()
+    return assets.without_stage(stage, lambda layer: _refer(layer, references))
+
+
+def _write(
+    stage: Usd.Stage,
+    things: Mapping[str, Thing],
+    dressing: Dressing,
+    slots: Mapping[str, Mapping[str, Sequence[str]]],
+    looks: Mapping[str, str],
+) -> None:
+    group = UsdGeom.Xform.Define(stage, DRESSING).GetPrim()
+    Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
+    for name, thing in things.items():
+        asset, path = dressing.assets[name], f"{DRESSING}/{name}"
+        xform = UsdGeom.Xform.Define(stage, path)
+        x, y, z = (round(float(v), 5) + 0.0 for v in thing.position)
+        xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
+        xform.AddRotateYOp().Set(round(float(np.degrees(thing.yaw)), 4) + 0.0)
+        for where, slot in assets.slot_paths(path, slots[asset]).items():
+            bound = UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(where))
+            bound.GetDirectBindingRel().SetTargets([Sdf.Path(f"{LOOKS}/{looks[slot]}")])
+
+
+def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
+    for path, asset in references.items():
+        layer.GetPrimAtPath(path).referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))

@@ -1,0 +1,158 @@
+"""What the dressing of a room looks at, and what it decides: things in their places; no pxr here."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from echomodel.data.dressing import KINDS
+from echomodel.openings import Opening, free_area
+from echomodel.vocabulary import Category, vocabulary
+from echousd.room.geometry import Geometry
+
+APART = 0.008  # metres of air between a small thing and everything else
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """One small thing in its place.
+
+    Arguments:
+        kind: a word of `echomodel.data.dressing.KINDS`.
+        size: (3,) float extents, metres. position: (3,) centre of its bottom, room frame. yaw: radians about +Y.
+        on: the object that it belongs to, "" for floor and walls.
+        variant: seed of its program; things of one kind, size and variant share an asset.
+        count: how many things a person would count.
+    """
+
+    kind: str
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
+    on: str = ""
+    variant: int = 0
+    count: int = 1
+
+    @property
+    def footprint(self) -> shapely.Polygon:
+        """Its box in plan."""
+        return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """One object of the graph in its place."""
+
+    name: str
+    row: Category
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
+    geometry: Geometry
+
+    @property
+    def footprint(self) -> shapely.Polygon:
+        """Its box in plan."""
+        return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+    @property
+    def top(self) -> float:
+        """Height of its highest point, metres."""
+        return float(self.position[1] + self.size[1])
+
+    def to_room(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) points of the object's frame in the room's."""
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        x, y, z = np.asarray(points, float).T
+        return np.stack([cos * x + sin * z, y, cos * z - sin * x], 1) + self.position
+
+
+@dataclass(eq=False)
+class Setting:
+    """The room as the rules see it, and the things placed so far.
+
+    Arguments:
+        objects: what the graph put there.
+        floor: (k, 2) float corners, metres. openings: in its edges.
+        height: of the room, metres. walls: whether there are any to hang things on.
+        full: place as much as looks good, not only a little.
+        seed: of all choices.
+    """
+
+    objects: Mapping[str, Standing]
+    floor: np.ndarray
+    openings: tuple[Opening, ...]
+    height: float
+    walls: bool
+    full: bool
+    seed: int
+    placed: list[Thing] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.room = shapely.Polygon(self.floor)
+        self.ways = [(shapely.Polygon(free_area(self.floor, o)), o) for o in self.openings if o.kind != "window"]
+
+    def rng(self, *words: str) -> np.random.Generator:
+        """Numbers of its own for everything that is decided, so that one thing less changes no other."""
+        key = "/".join((str(self.seed), "dressing", *words)).encode()
+        return np.random.default_rng(int.from_bytes(hashlib.blake2b(key, digest_size=8).digest(), "big"))
+
+    def of(self, *words: str) -> list[Standing]:
+        """The objects of some roles or categories, in the order of the graph."""
+        return [o for o in self.objects.values() if o.row.role in words or o.row.name in words]
+
+    def clear(self, thing: Thing, *, host: str = "", margin: float = APART, floor: bool = True) -> bool:
+        """Whether a thing stands in the room, in nobody's way, and meets neither an object but its host nor a thing."""
+        plan = thing.footprint
+        if floor and not self.room.buffer(0.005).contains(plan):
+            return False
+        low, high = float(thing.position[1]), float(thing.position[1] + thing.size[1])
+        around = plan.buffer(margin)
+        if any(way.intersects(around) for way, o in self.ways if low < o.height):
+            return False
+        for other in self.objects.values():
+            if other.name == host or other.top < low + 1e-4 or other.position[1] > high + margin:
+                continue
+            if other.footprint.intersects(around) and reaches(other, low, high).intersects(around):
+                return False
+        return not any(
+            other.footprint.intersects(around)
+            for other in self.placed
+            if KINDS[other.kind].name != "rug"
+            and other.position[1] < high
+            and other.position[1] + other.size[1] > low + 1e-4
+        )
+
+
+def standing(
+    name: str, category: str, size: np.ndarray, position: np.ndarray, yaw: float, geometry: Geometry
+) -> Standing:
+    """An object with its row of the vocabulary."""
+    row = vocabulary().category(category)
+    return Standing(name, row, np.asarray(size, float), np.asarray(position, float), float(yaw), geometry)
+
+
+def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
+    """A rectangle in plan (x, z), `size` along its own x and z, turned by `yaw` about +Y."""
+    half = np.asarray(size, float) / 2
+    signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])
+    x, z = (signs * half).T
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return shapely.Polygon(np.stack([cos * x + sin * z, cos * z - sin * x], 1) + np.asarray(centre, float))
+
+
+def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
+    """What an object covers in plan between two heights (the hull of it), metres."""
+    mesh = thing.geometry.mesh
+    corners = thing.to_room(mesh.vertices)[mesh.faces]
+    y = corners[..., 1]
+    within = (y.max(1) > low) & (y.min(1) < high)
+    points = corners[within].reshape(-1, 3)
+    inside = points[(points[:, 1] > low - 0.02) & (points[:, 1] < high + 0.02)]
+    if len(inside) < 3:  # only long triangles pass through
+        inside = points
+    return shapely.MultiPoint(inside[:, [0, 2]]).convex_hull if len(inside) else shapely.Polygon()

@@ -1,0 +1,131 @@
+"""Cushions on sofas and armchairs, throws over the foot of beds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.data.dressing import usual_size
+from echousd.room.dressing.setting import Setting, Standing, Thing
+
+SINK = 0.015  # metres that a cushion sinks into a seat
+STEP = 0.02  # metres from place to place
+
+
+def cushions(setting: Setting) -> None:
+    """Cushions in the corners of sofas, one on an armchair."""
+    for host in setting.of("sofa", "armchair", "lounge_chair"):
+        rng = setting.rng(host.name, "cushion")
+        size = usual_size("cushion", rng)
+        wide = float(host.size[0])
+        ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
+        if setting.full and wide > 1.7:
+            ends.append(-0.62)
+        variant = int(rng.integers(3))
+        seat = _Seat.of(host)
+        if seat is None:
+            continue
+        for end in ends:
+            spot = seat.resting(end, size)
+            if spot is None:
+                continue
+            place = host.to_room(spot[None])[0]
+            yaw = host.yaw - 0.12 * end * float(rng.uniform(0.3, 1.6))
+            thing = Thing("cushion", size, place, yaw, host.name, variant)
+            if setting.clear(thing, host=host.name, margin=0.0, floor=False):
+                setting.placed.append(thing)
+
+
+class _Seat:
+    """Heights of an upholstered piece on a grid, object frame."""
+
+    def __init__(self, x: np.ndarray, z: np.ndarray, height: np.ndarray, level: float) -> None:
+        self.x, self.z, self.height, self.level = x, z, height, level
+
+    @classmethod
+    def of(cls, host: Standing) -> _Seat | None:
+        """The seat of an object, None where nothing of it looks like one."""
+        mesh = host.geometry.mesh
+        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        double = np.linalg.norm(normal, axis=1)
+        y = corners[..., 1].mean(1)
+        top = 0.75 * float(host.size[1])
+        up = (normal[:, 1] > 0.85 * double) & (y > 0.2) & (y < min(0.62, top)) & (double > 0)
+        if double[up].sum() / 2 < 0.12:
+            return None
+        order = np.argsort(y[up])
+        share = np.cumsum(double[up][order])
+        level = float(y[up][order][np.searchsorted(share, 0.6 * share[-1])])
+        half = host.size[[0, 2]] / 2
+        x = np.arange(-half[0], half[0], STEP) + STEP / 2
+        z = np.arange(-half[1], half[1], STEP) + STEP / 2
+        return cls(x, z, _heights(corners[normal[:, 1] > 0.05 * double], x, z), level)
+
+    def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
+        """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
+        free = np.abs(self.height - self.level) < 0.07
+        wide, deep = (max(1, int(np.ceil(size[k] / STEP))) for k in (0, 2))
+        if wide > len(self.x) or deep > len(self.z):
+            return None
+        total = np.cumsum(np.cumsum(np.pad(free.astype(int), ((1, 0), (1, 0))), 0), 1)
+        count = total[wide:, deep:] - total[:-wide, deep:] - total[wide:, :-deep] + total[:-wide, :-deep]
+        fits = np.argwhere(count >= 0.93 * wide * deep)
+        if not len(fits):
+            return None
+        wish = end * (len(self.x) - wide) / 2 + (len(self.x) - wide) / 2
+        cost = fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)
+        i, k = fits[int(np.argmin(cost))]
+        under = self.height[i : i + wide, k : k + deep]
+        return np.array([self.x[i] + (wide - 1) * STEP / 2, float(np.median(under)) - SINK,
+                         self.z[k] + (deep - 1) * STEP / 2])  # fmt: skip
+
+
+def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(len(x), len(z)) float: height of the highest surface over each cell of a grid, -inf where there is none."""
+    out = np.full((len(x), len(z)), -np.inf)
+    # Small triangles fill the cells that their corners and middles lie in; large ones are drawn cell by cell.
+    points = np.concatenate(
+        [corners.reshape(-1, 3), corners.mean(1), (corners[:, :2] + corners[:, 1:]).reshape(-1, 3) / 2]
+    )
+    i, k = ((points[:, axis] - line[0]) / STEP + 0.5 for axis, line in ((0, x), (2, z)))
+    inside = (i >= 0) & (i < len(x)) & (k >= 0) & (k < len(z))
+    np.maximum.at(out, (i[inside].astype(int), k[inside].astype(int)), points[inside, 1])
+    flat = corners[:, :, [0, 2]]
+    one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    low, high = flat.min(1), flat.max(1)
+    for n in np.flatnonzero((np.abs(area) > 1e-10) & ((high - low).max(1) > 1.5 * STEP)):
+        rows, columns = (slice(*np.searchsorted(line, (low[n, a], high[n, a]))) for a, line in ((0, x), (1, z)))
+        if rows.start == rows.stop or columns.start == columns.stop:
+            continue
+        px, pz = x[rows, None] - flat[n, 0, 0], z[None, columns] - flat[n, 0, 1]
+        u = (px * two[n, 1] - pz * two[n, 0]) / area[n]
+        v = (one[n, 0] * pz - one[n, 1] * px) / area[n]
+        y0, y1, y2 = corners[n, :, 1]
+        y = np.where((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9), y0 + u * (y1 - y0) + v * (y2 - y0), -np.inf)
+        np.maximum(out[rows, columns], y, out=out[rows, columns])
+    return out
+
+
+def throws(setting: Setting) -> None:
+    """A blanket across the foot of every bed that lets it lie flat and hang down."""
+    for host in setting.of("bed"):
+        rng = setting.rng(host.name, "throw")
+        mesh = host.geometry.mesh
+        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        deep = float(np.clip(0.3 * host.size[2], 0.4, 0.75))
+        for back in (0.12, 0.2, 0.3):
+            z = float(host.size[2]) / 2 - back - deep / 2
+            here = corners[(corners[..., 2].min(1) < z + deep / 2) & (corners[..., 2].max(1) > z - deep / 2)]
+            lying = here[..., 2].min(1) > z - 3 * deep  # boards along the whole bed end where the bed ends
+            top = float(here[lying][..., 1].max()) if lying.any() else 0.0
+            if not 0.25 < top < 0.85:
+                continue
+            side = here[here[..., 1].max(1) > top - 0.2]
+            half = float(np.abs(side[..., 0]).max())
+            size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+            spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
+            thing = Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)))
+            if setting.clear(thing, host=host.name, margin=0.0):
+                setting.placed.append(thing)
+                break

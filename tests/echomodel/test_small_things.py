@@ -1,0 +1,29 @@
+"""Programs of small things."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from echomodel.data.dressing import KINDS, thing, usual_size
+from echomodel.data.furniture.assembly import pieces_of
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(4))
+def test_closed_solids_that_fill_their_size(kind, seed):
+    rng = np.random.default_rng(seed)
+    size = usual_size(kind, rng)
+    pieces = pieces_of(thing(kind, size, rng), size, detail=seed)
+    for piece in pieces:
+        assert trimesh.Trimesh(piece.vertices, piece.faces, process=False).is_volume
+    points = np.concatenate([piece.vertices for piece in pieces])
+    assert np.ptp(points, axis=0) == pytest.approx(size, abs=1e-6)
+    assert points[:, 1].min() == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_programs_draw_in_about_the_size_that_was_asked_for(kind):
+    rng = np.random.default_rng(1)
+    size = usual_size(kind, rng)
+    points = np.concatenate([piece.vertices for piece in pieces_of(thing(kind, size, rng))])
+    assert np.ptp(points, axis=0) == pytest.approx(size, rel=0.35), "stretched by a third"

@@ -1,0 +1,148 @@
+"""Small things: where they stand, that they stay out of the way, and that the room is the same without them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from pxr import Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdValidation
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echomodel.data.dressing import KINDS
+from echousd.check import check_room
+from echousd.room import RoomOptions
+from echousd.room.compose import room_files
+from echousd.room.dressing.dress import dress, placed, setting_of
+from echousd.room.dressing.surfaces import surfaces
+from echousd.stage import read_graph
+
+
+@pytest.fixture(scope="module")
+def bare():
+    return echousd.generate("samples/living_room.usda", seed=1, shapes="boxes", options=RoomOptions(walls=True))
+
+
+@pytest.fixture(scope="module")
+def room(bare):
+    return replace(bare, options=RoomOptions(walls=True, dress="full"))
+
+
+@pytest.fixture(scope="module")
+def root(room, tmp_path_factory):
+    return room.save(tmp_path_factory.mktemp("rooms") / "living_room", preview=False)
+
+
+def test_nothing_else_changes(bare, room):
+    plain, dressed = room_files(bare), room_files(room)
+    small = {path for path in dressed if path not in plain}
+    assert small
+    assert all(path == "layers/dressing.usda" or path.startswith("assets/small_") for path in small)
+    touched = {path for path in plain if dressed[path] != plain[path]}
+    assert touched <= {"living_room.usda", "layers/materials.usda"}
+
+
+def test_same_room_same_things(room):
+    assert room_files(room) == room_files(room)
+    assert not dress(replace(room, options=RoomOptions())).layouts
+
+
+def test_muted_the_room_is_bare(root, room):
+    stage = Usd.Stage.Open(str(root))
+    assert stage.GetPrimAtPath("/Room/Dressing").GetChildren()
+    assert read_graph(stage) == room.graph
+    stage.MuteLayer(str(root.parent / "layers/dressing.usda"))
+    assert not stage.GetPrimAtPath("/Room/Dressing")
+    assert read_graph(stage) == room.graph
+
+
+def test_every_thing_is_a_proper_prim(root):
+    stage = Usd.Stage.Open(str(root))
+    assert stage.GetCompositionErrors() == []
+    words = {kind.name: kind for kind in KINDS.values()}
+    for prim in stage.GetPrimAtPath("/Room/Dressing").GetChildren():
+        assert Usd.ModelAPI(prim).GetKind() == "component", prim
+        word = UsdSemantics.LabelsAPI(prim, "category").GetLabelsAttr().Get()[0]
+        assert UsdSemantics.LabelsAPI(prim, "ade20k").GetLabelsAttr().Get()[0] == words[word].ade20k
+        if not words[word].fixed:
+            assert prim.HasAPI(UsdPhysics.RigidBodyAPI)
+            assert UsdPhysics.MassAPI(prim).GetMassAttr().Get() > 0
+            assert any(child.HasAPI(UsdPhysics.CollisionAPI) for child in prim.GetChildren())
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    assert [error.GetMessage() for error in errors] == []
+    assert check_room(root).ok
+
+
+def test_things_stay_in_the_room_and_out_of_each_other(room):
+    setting = setting_of(room)
+    things = placed(room)
+    upright = [t for t in things if not KINDS[t.kind].lies]
+    for number, one in enumerate(upright):
+        assert setting.room.buffer(0.02).contains(one.footprint), one
+        for other in upright[number + 1 :]:
+            apart = min(one.position[1] + one.size[1], other.position[1] + other.size[1]) <= max(
+                one.position[1], other.position[1]
+            )
+            assert apart or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
+
+
+def test_nothing_stands_over_an_edge_or_in_the_air(room):
+    objects = setting_of(room).objects
+    standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and t.kind != "cushion"]
+    assert standing
+    for thing in standing:
+        host = objects[thing.on]
+        assert host.footprint.contains(thing.footprint), thing
+        assert thing.position[1] == pytest.approx(host.top, abs=1e-6)  # boxes have one level
+
+
+def test_doors_stay_free(room):
+    setting = setting_of(room)
+    for thing in placed(room):
+        if thing.kind != "curtain":
+            assert not any(way.intersects(thing.footprint) and thing.position[1] < o.height for way, o in setting.ways)
+
+
+def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
+    from echomodel.data.furniture import Choices, Style, solids
+    from echousd.room.dressing.setting import standing
+    from echousd.room.geometry import Origin
+    from echousd.room.joinery import assembled
+
+    size = np.array([1.0, 1.9, 0.35])
+    rng = np.random.default_rng(5)
+    parts = solids("bookshelf", Style.draw(rng), Choices.draw(rng), size)
+    host = standing(
+        "shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=5000, origin=Origin("x"))
+    )
+    levels = surfaces(host)
+    assert len(levels) >= 3
+    for level in levels:
+        assert level.air >= 0.06
+        assert shapely.box(-0.51, -0.18, 0.51, 0.18).contains(level.area)
+
+
+def test_layouts_have_dressings_of_their_own(tmp_path):
+    graph = small_graph()
+    room = echousd.generate(
+        graph, seed=3, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(dress="some")
+    )
+    moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
+    room = replace(room, layouts=(room.boxes, moved))
+    root = room.save(tmp_path / "two", preview=False)
+    stage = Usd.Stage.Open(str(root))
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    places = []
+    for name in ("layout_0", "layout_1"):
+        variants.SetVariantSelection(name)
+        things = stage.GetPrimAtPath("/Room/Dressing").GetChildren()
+        cache = UsdGeom.XformCache()
+        places.append([tuple(cache.GetLocalToWorldTransform(p).ExtractTranslation()) for p in things])
+    assert places[0] != places[1]
+
+
+def test_unknown_amount():
+    with pytest.raises(ValueError, match="dress is 'lots', allowed: none, some, full"):
+        RoomOptions(dress="lots")
