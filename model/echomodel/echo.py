@@ -120,8 +120,8 @@ class EchoModel:
             noise: (N, 8) starting noise in place of the generator's.
             start: level of noise at which sampling begins, on the room generator's arrangement of the same furniture
                 (`echomodel.drafts`), 0 = that arrangement, 1 = on noise alone, None = the config's. Sampling begins on
-                noise where the arrangement keeps little of what is told, many relations are, boxes are known, or the
-                floor is not.
+                noise the more often the less of what is told the arrangement keeps, and where many relations are told,
+                boxes are known, or the floor is not.
             progress: called with (steps done, steps).
 
         Returns:

@@ -70,13 +70,13 @@ def test_layouts_begin_on_a_draft_where_one_helps(model: EchoModel, monkeypatch:
 
     def draft(graph: GraphBatch, generator: torch.Generator, *, rules: str) -> tuple[Boxes, Tensor]:
         asked.append(graph.num_scenes)
-        return boxes(graph.num_nodes), torch.tensor([1.0, 0.1])[: graph.num_scenes]
+        return boxes(graph.num_nodes), torch.tensor([1.0, 0.0])[: graph.num_scenes]
 
     monkeypatch.setattr(layouts, "drafted", draft)
     found = model.sample_layout(packed, generator=seeded(), start=0.0)
     assert asked == [2]  # the dense graph is not drafted
     assert torch.equal(found.position[:3], torch.zeros(3, 3))  # start 0: the draft itself
-    assert (found.position[6:] != 0).any()  # a draft that keeps little of what is told is left
+    assert (found.position[6:] != 0).any()  # a draft that keeps nothing of what is told is left
     noise = model.sample_layout(dense, generator=seeded(), start=1.0)
     assert torch.equal(model.sample_layout(dense, generator=seeded(), start=0.1).position, noise.position)
     model.sample_layout(unknown, generator=seeded(), start=0.1)

@@ -22,7 +22,7 @@ from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener
 from echomodel.samplers import Predict, guided, sample
 
-TRUST = 0.6  # a draft that keeps less of what is told is no beginning
+TRUST = 2.0  # a draft that keeps a share of what is told is begun on with this power of it as probability
 MOST_TOLD = 4.0  # relations an object; graphs that tell more leave nothing for a draft to add
 Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
 
@@ -66,7 +66,8 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
         return _denoised(model, latent, graph, how, None, 1.0)
     draft, share = drafted(_scenes(graph, open_), how.generator, rules=how.rules)
     trusted = open_.clone()
-    trusted[open_] = share.to(open_.device) >= TRUST
+    luck = torch.rand(len(share), generator=how.generator)
+    trusted[open_] = (luck < share**TRUST).to(open_.device)
     draft = draft[trusted[open_].repeat_interleave(counts[open_])].to(graph.category.device)
     out = torch.zeros(graph.num_nodes, 7, device=graph.category.device)
     for mask, level in ((trusted, begin), (~trusted, 1.0)):
