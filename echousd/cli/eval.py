@@ -107,6 +107,7 @@ def _repairing(rules: str) -> Finish:
         done = repair_boxes(
             room.categories, room.size, room.position, room.yaw, triplets.numpy(),
             floor_polygon=room.floor_polygon if len(room.floor_polygon) else None, height=room.height, rules=rules,
+            openings=room.openings,
         )  # fmt: skip
         return replace(room, size=done.size, position=done.position, yaw=done.yaw)
 

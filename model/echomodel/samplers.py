@@ -17,6 +17,7 @@ from echomodel.config import Objective, Sampler
 from echomodel.objectives import add_noise, expand
 from echomodel.schedule import alpha_sigma, sampling_levels
 
+FEWEST = 4  # steps from a draft
 Predict = Callable[[Tensor, Tensor], Tensor]
 Progress = Callable[[int, int], None]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
@@ -139,7 +140,7 @@ def sample(
     if draft is not None and start == 0:
         return draft
     if draft is not None and start < 1:
-        levels = sampling_levels(max(1, round(steps * start))) * start
+        levels = sampling_levels(max(FEWEST, round(steps * start))) * start
         x = add_noise(draft, x, torch.full((len(x),), start, dtype=x.dtype, device=x.device), objective)
     options = {"known": known, "known_mask": known_mask, "generator": generator, "progress": progress}
     return SAMPLERS[sampler](predict, x, levels, objective, **options)
