@@ -39,10 +39,11 @@ def cell(room, title: str) -> tuple[Image.Image, list[str]]:  # type: ignore[no-
         return [tuple(p) for p in ((np.asarray(points) - low) * scale + (20, 20 + TITLE)).tolist()]
 
     draw.polygon(at(room.floor), fill="#f7f5f2", outline="black", width=3)
+    outline = room.floor if room.graph.room.corners is None else np.asarray(room.graph.room.corners)
     for opening in room.graph.room.openings:
         colour = "#4a90d9" if opening.kind == "window" else "#b07030"
-        draw.line(at(segment(room.floor, opening)), fill=colour, width=7)
-        if len(sweep := swing_area(room.floor, opening)):
+        draw.line(at(segment(outline, opening)), fill=colour, width=7)
+        if len(sweep := swing_area(outline, opening)):
             draw.polygon(at(sweep), outline=colour)
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
     plan = corners(size, position, yaw)

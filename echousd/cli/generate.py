@@ -102,7 +102,8 @@ def register(app: typer.Typer) -> None:
             imported = time.perf_counter() - started
             room = make(
                 graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,
-                drafts=drafts, steps=steps, faces=faces, options=options, progress=listen,
+                drafts=drafts, earlier=None if flat else output, steps=steps, faces=faces, options=options,
+                progress=listen,
             )  # fmt: skip
             spent = {"imports": imported, **room.timings}
             listen("write", 0, 1)

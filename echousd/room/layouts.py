@@ -127,6 +127,7 @@ def finished_boxes(
     from echousd.repair import RepairConfig
     from echousd.repair import repair as repaired
 
+    graph = _with_homeless_unlocked(graph)
     with timer.stage("repair"):
         found = repaired(graph, boxes)
         same = _alike(graph, found.boxes, styles, boxes)
@@ -136,6 +137,13 @@ def finished_boxes(
             if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
                 found = second
     return rounded_boxes(graph, found.boxes), found.conflicts
+
+
+def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
+    """The graph in which what is locked without having a place may be placed."""
+    if not any(node.locked and node.position is None for node in graph.nodes):
+        return graph
+    return graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

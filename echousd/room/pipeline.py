@@ -11,6 +11,7 @@ from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
 from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
+from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
@@ -37,6 +38,7 @@ def generate(
     repair: bool = True,
     samples: int = 1,
     drafts: int | None = None,
+    earlier: Path | None = None,
     steps: int | None = None,
     faces: int = FACES,
     options: RoomOptions | None = None,
@@ -59,6 +61,7 @@ def generate(
         samples: number of layouts of the same furniture.
         drafts: layouts that are drawn at most for each of them, the best by relations and living rules is kept; None =
             `DRAFTS`, or 1 for the published models, which take a thousand steps; without repair it is always 1.
+        earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
         steps: sampling steps, None for the model's own.
         faces: face budget of each mesh.
         options: how the room is written.
@@ -84,7 +87,10 @@ def generate(
 
         file = Path(graph).name
         with timer.stage("read"):
-            graph = load_graph(graph)
+            read = Path(graph)
+            graph, homeless = with_locked_places(load_graph(read), read, earlier)
+    else:
+        graph, homeless = with_locked_places(graph, earlier)
     if len(graph.nodes) > MAX_OBJECTS:
         raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
     with timer.stage("load"):
@@ -121,7 +127,7 @@ def generate(
         floor=room_floor(graph, layouts),
         layouts=tuple(layouts),
         judged=tuple(judgement(graph, found) for found in layouts),
-        notes=(*crowded, *notes),
+        notes=(*crowded, *homeless, *notes),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=options or RoomOptions(),
         timings=timer.seconds,

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -6,6 +8,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.room.locking import with_locked_places
 from echousd.room.styles import asset_names, equal_sizes, shared_assets, style_groups
 from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import relation_verdicts
@@ -147,3 +150,18 @@ def test_more_objects_than_a_room_may_hold_are_refused():
     crowd = SceneGraph("living_room", tuple(Node(f"chair_{i}", "dining_chair") for i in range(401)))
     with pytest.raises(ValueError, match="the graph: 401 objects, allowed in one room: 400"):
         echousd.generate(crowd, model=StandIn(), shapes="boxes")
+
+
+def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -> None:
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("bed", "double_bed"), Node("wardrobe", "wardrobe")))
+    first = echousd.generate(graph, seed=1, shapes="boxes")
+    first.save(tmp_path / "room", preview=False)
+    locked = graph.lock("wardrobe").relate("bed", "left", "wardrobe")
+    again = echousd.generate(locked, seed=9, shapes="boxes", earlier=tmp_path / "room")
+    for field in ("size", "position", "yaw"):
+        assert torch.allclose(getattr(again.boxes, field)[1], getattr(first.boxes, field)[1], atol=2e-3)
+    stage = tmp_path / "room" / "room.usda"
+    text = SceneGraph.from_stage(str(stage)).lock("wardrobe")
+    assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
+    homeless = echousd.generate(locked, seed=9, shapes="boxes")
+    assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes
