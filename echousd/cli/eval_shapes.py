@@ -46,7 +46,7 @@ def shapes(
 
     from echomodel.data.shapeset import ShapeSet
     from echomodel.data.sheet import contact_sheet
-    from echomodel.echo import EchoModel
+    from echomodel.loading import load_model
     from echomodel.metrics.shape_evaluation import ShapeEvaluation, class_shapes, evaluate_shapes
 
     if (meshes is None) == (shape_set is None):
@@ -64,7 +64,7 @@ def shapes(
             bar.update(tasks[what], completed=done)
 
         settings = ShapeEvaluation(limit=limit, rooms=rooms, seed=seed, steps=steps)
-        loaded = EchoModel.load(model)
+        loaded = load_model(model)
         result, made = evaluate_shapes(loaded, found, settings, progress)
         if per_class:
             result["classes"], made = _cleaned(class_shapes(loaded, per_class, seed, progress))

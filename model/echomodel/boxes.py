@@ -186,15 +186,16 @@ class BoxStatistics:
         Raises:
             ValueError: sizes are normalised within classes and there is no `category`.
         """
-        low = torch.tensor([*self.size_low, *self.position_low])[None]
-        high = torch.tensor([*self.size_high, *self.position_high])[None]
+        device = "cpu" if category is None else category.device
+        low = torch.tensor([*self.size_low, *self.position_low])[None].to(device)
+        high = torch.tensor([*self.size_high, *self.position_high])[None].to(device)
         middle, half = (low + high) / 2, (high - low) / 2
         if not self.classes:
             return BoxScale(middle, half, half, self.log_size)
         if category is None:
             raise ValueError("box statistics normalise sizes within classes: the classes of the boxes are needed")
         sizes = torch.tensor(self.classes).to(category.device)[category].split(3, dim=1)
-        places = (values[:, 3:].to(category.device).expand(len(category), 3) for values in (middle, half, half))
+        places = (values[:, 3:].expand(len(category), 3) for values in (middle, half, half))
         centre, below, above = (torch.cat(pair, 1) for pair in zip(sizes, places, strict=True))
         return BoxScale(centre, below, above, self.log_size)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from importlib import resources
 from pathlib import Path
 
@@ -9,15 +10,16 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.compact.branches import branches
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
-from echomodel.compact.given import known_values, starting_noise
+from echomodel.compact.given import known_values, repeated, starting_noise
 from echomodel.compact.joined import equal_furniture, joined
 from echomodel.compact.layouts import LayoutSampling, sample_boxes
 from echomodel.compact.learned import in_learned_words, unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, shape_predictor
-from echomodel.compact.wholeness import bearing, group_means, wholeness
+from echomodel.compact.wholeness import group_means, merit
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, StepListener, part_of, touched_nodes
@@ -68,14 +70,14 @@ class EchoModel:
         return "compact"
 
     @property
-    def has_shapes(self) -> bool:
-        """Whether there are a shape branch and its autoencoder."""
-        return {"autoencoder", "shape"} <= set(self.model.parts)
+    def branches(self) -> frozenset[str]:
+        """What can be sampled with these weights: `layout`, `shape`, `furniture`."""
+        return branches(self.model.parts)
 
     @property
-    def has_furniture(self) -> bool:
-        """Whether there is a furniture branch."""
-        return {"latent", "furniture"} <= set(self.model.parts)
+    def description_width(self) -> int:
+        """Numbers in a description of a piece of furniture."""
+        return sum(self.config.furniture.kinds) + self.config.furniture.numbers
 
     @property
     def config(self) -> CompactConfig:
@@ -85,7 +87,7 @@ class EchoModel:
     @property
     def device(self) -> torch.device:
         """Where the weights are."""
-        return next(self.model.parameters()).device
+        return self.model.device
 
     @torch.no_grad()
     def sample_layout(
@@ -202,11 +204,7 @@ class EchoModel:
             ValueError: a graph, box, shape or argument that the model cannot work with; the message names it.
         """
         settings, coder = self.config.shape, self.model.autoencoder
-        graph = self._checked(graph)
-        if len(boxes) != graph.num_nodes:
-            raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
-        boxes = boxes.to(self.device)
-        boxes.check()
+        graph, boxes = self._checked(graph), self._of(graph, boxes)
         known, known_mask = known_values(graph, known, known_mask, self.device)
         given = None if known is None else self.model.shape.codes(coder.encode(known))
         equal, steps = equal_furniture(graph), steps or settings.steps
@@ -223,13 +221,13 @@ class EchoModel:
                 starts = [settings.temperature * x[equal] for x in starts]
             codes = sample(
                 sampler or settings.sampler, self._shape_predictor(graph, boxes.size, equal, edit, guidance, count),
-                torch.cat(starts), steps, settings.objective, known=_repeated(given, count),
-                known_mask=_repeated(known_mask, count), generator=generator,
+                torch.cat(starts), steps, settings.objective, known=repeated(given, count),
+                known_mask=repeated(known_mask, count), generator=generator,
                 progress=part_of(progress, number, len(rounds)),
             )  # fmt: skip
             for draw in codes.chunk(count):
                 drawn = self._decoded(draw)
-                whole = group_means(self._merit(drawn, boxes, graph), equal) if tries > 1 else best
+                whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
                 if not len(grids):
                     grids, best = drawn, whole
                     continue
@@ -238,6 +236,14 @@ class EchoModel:
         if known is None or known_mask is None:
             return grids
         return torch.where(known_mask[:, None, None, None], known, grids)
+
+    @torch.no_grad()
+    def reconstruct(self, grids: Tensor) -> Tensor:
+        """Grids (N, 64, 64, 64) in [-1, 1] through the autoencoder and back."""
+        if "autoencoder" not in self.model.parts:
+            raise ValueError(f"the weights ({self.hash}) hold no autoencoder")
+        coder = self.model.autoencoder
+        return coder.decode(coder.encode(grids.to(self.device))).float()
 
     @torch.no_grad()
     def sample_furniture(
@@ -273,14 +279,10 @@ class EchoModel:
             ValueError: a graph, box or argument that the model cannot work with; the message names it.
         """
         settings = self.config.furniture
-        graph = self._checked(graph)
-        if len(boxes) != graph.num_nodes:
-            raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
-        boxes = boxes.to(self.device)
-        boxes.check()
+        graph, boxes = self._checked(graph), self._of(graph, boxes)
         known, known_mask = known_values(graph, known, known_mask, self.device)
-        equal, width = equal_furniture(graph), sum(settings.kinds) + settings.numbers
-        start = starting_noise((graph.num_nodes, width), generator, noise, self.device)
+        equal = equal_furniture(graph)
+        start = starting_noise((graph.num_nodes, self.description_width), generator, noise, self.device)
         graph = with_whole_styles(graph, joined(graph, styles))
         bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
@@ -307,22 +309,19 @@ class EchoModel:
         first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
         return agreeing(predict, equal.repeat(count) + first)
 
-    @staticmethod
-    def _merit(grids: Tensor, boxes: Boxes, graph: GraphBatch) -> Tensor:
-        """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
-        return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, graph.triplets))
-
     def _decoded(self, codes: Tensor) -> Tensor:
         """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time."""
         latents, decode = self.model.shape.latents, self.model.autoencoder.decode
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half_decode):
+        with torch.autocast(self.device.type, torch.bfloat16) if self.half_decode else nullcontext():
             return torch.cat([decode(latents(part)).float() for part in codes.split(4)])
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
         graph.check()
         return graph.to(self.device)
 
-
-def _repeated(values: Tensor | None, count: int) -> Tensor | None:
-    """(N, ...) behind itself `count` times."""
-    return None if values is None else torch.cat([values] * count)
+    def _of(self, graph: GraphBatch, boxes: Boxes) -> Boxes:
+        if len(boxes) != graph.num_nodes:
+            raise ValueError(f"{len(boxes)} boxes for a graph of {graph.num_nodes} nodes, expected one each")
+        boxes = boxes.to(self.device)
+        boxes.check()
+        return boxes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 import torch
 from torch import Tensor
@@ -59,8 +59,8 @@ class RoomModel(Protocol):
         ...
 
     @property
-    def has_shapes(self) -> bool:
-        """Whether `sample_shapes` works."""
+    def branches(self) -> frozenset[str]:
+        """What can be sampled: `layout`, `shape` (`sample_shapes`), `furniture` (see `FurnitureModel`)."""
         ...
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
@@ -83,7 +83,7 @@ class RoomModel(Protocol):
         Arguments:
             graph: S scenes, N nodes.
             generator: source of all randomness.
-            steps: sampling steps, None = the model's own; raises ValueError where they cannot be chosen.
+            steps: sampling steps, None = the model's own; raises ValueError for more than there are.
             known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
             edit: what was changed in the graph, None = nothing.
             progress: called with (steps done, steps).
@@ -105,3 +105,38 @@ class RoomModel(Protocol):
         Raises ValueError for a model without a shape branch.
         """
         ...
+
+    def reconstruct(self, grids: Tensor) -> Tensor:
+        """Grids (N, 64, 64, 64) float32 in [-1, 1] through the autoencoder and back; raises ValueError where it takes
+        others."""
+        ...
+
+
+class FurnitureModel(RoomModel, Protocol):
+    """A model of rooms that also describes furniture."""
+
+    @property
+    def description_width(self) -> int:
+        """Numbers in a description."""
+        ...
+
+    def sample_furniture(
+        self,
+        graph: GraphBatch,
+        boxes: Boxes,
+        *,
+        generator: torch.Generator,
+        steps: int | None = None,
+        known: Tensor | None = None,
+        known_mask: Tensor | None = None,
+        styles: Tensor | None = None,
+        edit: GraphEdit | None = None,
+        progress: StepListener | None = None,
+    ) -> Tensor:
+        """Descriptions (N, D) float32 of N pieces of furniture, see `EchoModel.sample_furniture`."""
+        ...
+
+
+def furnishes(model: RoomModel | None) -> TypeGuard[FurnitureModel]:
+    """Whether there is a model and it describes furniture."""
+    return model is not None and "furniture" in model.branches

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, expand
+from echomodel.objectives import add_noise, drawn_noise, expand
 from echomodel.schedule import alpha_sigma, sampling_levels
 
 FEWEST = 4  # steps from a draft
@@ -68,7 +68,7 @@ def ancestral(
         mean = (ratio * r * r * x + b * between * clean) / (s * s)
         if end == 0:
             return mean
-        noise = torch.randn(x.shape, generator=generator, dtype=x.dtype, device=x.device)
+        noise = drawn_noise(x, generator)
         return mean + math.sqrt(max(between, 0.0)) * r / s * noise
 
     return _march(step, predict, x, levels, known, known_mask, progress)

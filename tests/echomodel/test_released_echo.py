@@ -97,6 +97,37 @@ def test_boxes_and_shapes_for_the_objects_alone(config):
     assert ("lamp standing on nightstand" in words.asked) == (model.preset == "paper")
 
 
+def test_steps_are_spread_over_the_published_ones():
+    model, told = echo(), []
+    few = model.sample_layout(BEDROOM, generator=seeded(), steps=5, progress=lambda *state: told.append(state))
+    few.check()
+    assert told == [(done, 5) for done in range(1, 6)]
+    whole = model.sample_layout(BEDROOM, generator=seeded())
+    assert not torch.equal(few.position, whole.position)
+    every = model.sample_layout(BEDROOM, generator=seeded(), steps=20)
+    assert torch.equal(every.position, whole.position)
+    with pytest.raises(ValueError, match=r"layout steps is 21, allowed: 1\.\.20"):
+        model.sample_layout(BEDROOM, generator=seeded(), steps=21)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 1000])
+def test_spaced_tables_are_a_schedule_of_their_own(count):
+    published = LayoutTables.linear()
+    tables, steps = published.spaced(count)
+    assert len(steps) == len(tables.betas) == count
+    assert int(steps[-1]) == 999
+    assert bool((steps.diff() > 0).all())
+    assert torch.equal(tables.alphas_cumprod, published.alphas_cumprod[steps])
+    assert torch.allclose((1 - tables.betas.double()).cumprod(0), tables.alphas_cumprod.double(), rtol=1e-5)
+
+
+def test_the_autoencoder_takes_grids_of_its_own_size_alone():
+    with pytest.raises(ValueError, match="autoencoder have 32 voxels a side, not 64"):
+        echo().reconstruct(torch.ones(1, 64, 64, 64))
+    grids = torch.rand(2, 32, 32, 32, generator=seeded()) - 0.5
+    assert echo().reconstruct(grids).shape == grids.shape
+
+
 def test_fixed_boxes_come_back():
     known = Boxes(torch.full((4, 3), 0.5), torch.full((4, 3), 0.25), torch.full((4,), 0.75))
     mask = torch.tensor([True, False, False, True])
@@ -193,7 +224,7 @@ def test_files_and_features_that_do_not_fit_are_named(tmp_path: Path):
     loaded.model.text_encoder = "random-12"
     write_released(tmp_path / "named.safetensors", loaded.model, loaded.model.config, loaded.classes, None)
     assert ReleasedEcho.load(tmp_path / "named.safetensors").text.name == "random-12"
-    assert (loaded.preset, len(loaded.hash), loaded.has_shapes) == ("released", 12, True)
+    assert (loaded.preset, len(loaded.hash), loaded.branches) == ("released", 12, {"layout", "shape"})
     with pytest.raises(ValueError, match="box statistics are missing: convert the checkpoint with --bounds FILE"):
         loaded.sample_layout(BEDROOM, generator=seeded())
     loaded.model.classes = None

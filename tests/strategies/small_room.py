@@ -50,7 +50,7 @@ class StandIn:
     `edits` are the graph edits that it was told of.
     """
 
-    hash, preset, has_shapes = "standin", "compact", True
+    hash, preset, branches = "standin", "compact", frozenset({"layout", "shape"})
 
     def __init__(self, shift: float = 0.0) -> None:
         self.shift = shift

@@ -10,6 +10,7 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.data.furniture import solids
 from echomodel.data.furniture.description import WIDTH, piece_of
+from echomodel.protocols import furnishes
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import assembled
 from echousd.room.sources.source import ShapeRequest, Shapes, per_asset
@@ -28,14 +29,13 @@ class AssembledParts:
 
     def check(self, model: RoomModel | None) -> None:
         """Raises ValueError for a model without a furniture branch, or one that describes furniture in other words."""
-        if model is None or not getattr(model, "has_furniture", False):
+        if not furnishes(model):
             raise ValueError(
                 "these weights have no furniture branch; use --shapes sdf, --shapes boxes or other weights"
             )
-        own = model.config.furniture  # type: ignore[attr-defined]
-        if sum(own.kinds) + own.numbers != WIDTH:
+        if model.description_width != WIDTH:
             raise ValueError(
-                f"these weights describe furniture by {sum(own.kinds) + own.numbers} numbers, this version by {WIDTH}; "
+                f"these weights describe furniture by {model.description_width} numbers, this version by {WIDTH}; "
                 "train them again or use --shapes sdf"
             )
 
@@ -55,8 +55,9 @@ class AssembledParts:
 
 def descriptions(request: ShapeRequest) -> np.ndarray:
     """(n, WIDTH) float32: the model's description of every object."""
-    SOURCE.check(request.model)
     graph, boxes, model = request.graph, request.boxes, request.model
+    SOURCE.check(model)
+    assert furnishes(model)
     centred = Boxes(boxes.size, boxes.position - floor_centre(graph), boxes.yaw)
     words = sorted(set(request.styles.values()))
     styles = torch.tensor([words.index(request.styles[name]) for name in graph.names])
@@ -66,7 +67,7 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
         extra["known"] = torch.tensor([kept.get(name, (0.0,) * WIDTH) for name in graph.names])
         extra["known_mask"] = torch.tensor([name in kept for name in graph.names])
     with request.timer.stage("shapes") as tell:
-        found = model.sample_furniture(  # type: ignore[union-attr]
+        found = model.sample_furniture(
             graph_batch(graph), centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip

@@ -27,7 +27,7 @@ class SignedDistances:
 
     def check(self, model: RoomModel | None) -> None:
         """Raises ValueError for a model without a shape branch."""
-        if model is None or not model.has_shapes:
+        if model is None or "shape" not in model.branches:
             raise ValueError("these weights have no shape branch; use shapes 'boxes' (--shapes boxes) or other weights")
 
     def shapes(self, request: ShapeRequest) -> Shapes:

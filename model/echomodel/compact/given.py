@@ -49,3 +49,8 @@ def starting_noise(
     if bool(bad.any()):
         raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
     return noise.to(device)
+
+
+def repeated(values: Tensor | None, count: int) -> Tensor | None:
+    """(N, ...) behind itself `count` times."""
+    return None if values is None else torch.cat([values] * count)

@@ -8,6 +8,7 @@ the config says.
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 
 import torch
@@ -137,9 +138,10 @@ class LayoutDenoiser(nn.Module):
         return features, replace(context.pairs, told=told)
 
 
-def exactly(x: Tensor) -> torch.autocast:
+def exactly(x: Tensor) -> AbstractContextManager[None]:
     """Numbers that stand for centimetres are not rounded where the rest is computed in bfloat16."""
-    return torch.autocast(x.device.type, enabled=False)
+    device = x.device.type
+    return torch.autocast(device, enabled=False) if torch.amp.is_autocast_available(device) else nullcontext()
 
 
 def box_features(boxes: Tensor, frequencies: int) -> Tensor:

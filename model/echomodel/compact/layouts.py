@@ -64,11 +64,11 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
     open_ = told <= MOST_TOLD
     if not bool(open_.any()):
         return _denoised(model, latent, graph, how, None, 1.0)
-    draft, share = drafted(_scenes(graph, open_), how.generator, rules=how.rules)
+    draft, share = drafted(_scenes(graph, open_).to("cpu"), how.generator, rules=how.rules)
     trusted = open_.clone()
     luck = torch.rand(len(share), generator=how.generator)
     trusted[open_] = (luck < share**TRUST).to(open_.device)
-    draft = draft[trusted[open_].repeat_interleave(counts[open_])].to(graph.category.device)
+    draft = draft[trusted[open_].repeat_interleave(counts[open_]).cpu()].to(graph.category.device)
     out = torch.zeros(graph.num_nodes, 7, device=graph.category.device)
     for mask, level in ((trusted, begin), (~trusted, 1.0)):
         if bool(mask.any()):

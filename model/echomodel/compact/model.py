@@ -16,24 +16,17 @@ from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.autoencoder import Autoencoder
+from echomodel.compact.branches import PARTS
 from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig, from_dict, to_json
+from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 
 _SHARED = ("categories", "predicates", "room_types", "rules")
 FORMAT = "echousd-compact-1"
-_MADE = {
-    "latent": LatentGraph,
-    "layout": LayoutDenoiser,
-    "autoencoder": Autoencoder,
-    "shape": ShapeDenoiser,
-    "furniture": FurnitureDenoiser,
-}
-PARTS = tuple(_MADE)
-MEASURES = 2  # set of measures of the drafts that this version computes
 
 
 class WeightsError(ValueError):
@@ -54,7 +47,7 @@ class CompactModel(nn.Module):
         self.config, self.statistics = config, statistics
         self.parts = tuple(parts)
         for name in self.parts:
-            self.add_module(name, _MADE[name](config))
+            self.add_module(name, PARTS[name].module(config))
 
     latent: LatentGraph
     layout: LayoutDenoiser
@@ -62,13 +55,18 @@ class CompactModel(nn.Module):
     shape: ShapeDenoiser
     furniture: FurnitureDenoiser
 
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next(self.parameters()).device
+
     def part_tensors(self, part: str) -> dict[str, Tensor]:
         """State of one part, keys with the part's name in front."""
-        return {f"{part}.{key}": value for key, value in getattr(self, part).state_dict().items()}
+        return {f"{part}.{key}": value for key, value in self.get_submodule(part).state_dict().items()}
 
     def part_parameters(self, part: str) -> list[nn.Parameter]:
         """Parameters of one part."""
-        return list(getattr(self, part).parameters())
+        return list(self.get_submodule(part).parameters())
 
     def write(self, path: Path, parts: Sequence[str]) -> None:
         """Write parts to a weights file, see `save_weights`."""
@@ -89,9 +87,8 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half:
         "vocabulary": json.dumps(_words(model.config)),
         "parts": json.dumps(list(parts)),
     }
-    partial = path.with_suffix(".partial")
-    save_file(tensors, partial, metadata=metadata)
-    partial.replace(path)
+    with whole_file(path) as beside:
+        save_file(tensors, beside, metadata=metadata)
 
 
 def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:
@@ -140,26 +137,22 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
     joined, first = None, None
     for path, header in metadata.items():
         raw, parts = json.loads(header["config"]), json.loads(header["parts"])
-        if "layout" in parts and "drafts" not in raw["layout"]:
-            raise WeightsError(f"{path}: is of an earlier version, whose layout branch did not draft; train it again")
-        if "layout" in parts and raw["layout"].get("measures", 1) != MEASURES:
-            raise WeightsError(
-                f"{path}: is of an earlier version, whose layout branch knew no doors and windows; start a training "
-                "from it with the recipe's field 'warm'"
-            )
+        for part in parts:
+            if reason := PARTS[part].outdated(raw[part]):
+                raise WeightsError(f"{path}: is of an earlier version, {reason}")
         own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
         if json.loads(header.get("vocabulary", "{}")) != _words(own):
             raise WeightsError(f"{path}: was trained with other words than the first of this version's vocabulary")
         for other in (set(PARTS) - set(parts)) & set(raw):
             # settings of a part that lies in another file; an older version's may hold fields that are gone
             with suppress(ValueError):
-                own = replace(own, **{other: getattr(from_dict(CompactConfig, {other: raw[other]}), other)})
+                own = replace(own, **{other: vars(from_dict(CompactConfig, {other: raw[other]}))[other]})
         if joined is None:
             joined, first = own, path
         for shared in _SHARED:
-            if getattr(own, shared) != getattr(joined, shared):
+            if vars(own)[shared] != vars(joined)[shared]:
                 raise WeightsError(f"{path}: {shared} differs from that of {first}, they are not one model")
-        joined = replace(joined, **{part: getattr(own, part) for part in parts})
+        joined = replace(joined, **{part: vars(own)[part] for part in parts})
     assert joined is not None
     return joined
 

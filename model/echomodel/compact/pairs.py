@@ -31,6 +31,10 @@ class Pairs:
     told: Tensor
     scale: Tensor
 
+    def to(self, device: torch.device | str) -> Pairs:
+        """The same pairs on another device."""
+        return Pairs(*(tensor.to(device) for tensor in (self.receiver, self.sender, self.told, self.scale)))
+
     def without(self, node_mask: Tensor, told: Tensor) -> Pairs:
         """The pairs between the nodes where `node_mask` (N,) bool is true, with `told` (P, 2R) in place of the old."""
         keep = (node_mask[self.receiver] & node_mask[self.sender]).nonzero()[:, 0]

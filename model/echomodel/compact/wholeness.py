@@ -71,6 +71,11 @@ def bearing(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
     return out
 
 
+def merit(grids: Tensor, boxes: Boxes, triplets: Tensor) -> Tensor:
+    """What draws are chosen by: (N,), whole shapes that bear what stands on them first."""
+    return wholeness(grids) * (0.1 + 0.9 * bearing(grids, boxes, triplets))
+
+
 def group_means(values: Tensor, groups: Tensor) -> Tensor:
     """Each value (N, ...) replaced by the mean of its group; groups (N,) int64 in [0, N)."""
     total = torch.zeros_like(values).index_add(0, groups, values)

@@ -28,7 +28,7 @@ from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
     from echomodel.data.shapeset import ShapeSet
-    from echomodel.echo import EchoModel
+    from echomodel.protocols import RoomModel
 
 POINTS = 1024
 FIRST_ROOM = 10_000_000  # rooms from here on are in no training set of ours
@@ -46,7 +46,7 @@ class ShapeEvaluation:
 
 
 def evaluate_shapes(
-    model: EchoModel,
+    model: RoomModel,
     shapes: ShapeSet,
     settings: ShapeEvaluation = ShapeEvaluation(),
     progress: Callable[[str, int, int], None] | None = None,
@@ -67,10 +67,8 @@ def evaluate_shapes(
     Raises ValueError when the set has nothing held out or the weights lack a part.
     """
     told = progress or (lambda what, done, total: None)
-    needed = ("autoencoder", "shape", "latent") if settings.rooms else ("autoencoder",)
-    missing = [part for part in needed if not hasattr(model.model, part)]
-    if missing:
-        raise ValueError(f"the weights ({model.hash}) hold no {' and no '.join(missing)}; name weights with --model")
+    if settings.rooms and "shape" not in model.branches:
+        raise ValueError(f"the weights ({model.hash}) hold no shape branch; name weights with --model")
     held = np.flatnonzero(shapes.held_out)
     if len(held) == 0:
         raise ValueError(f"{shapes.directory}: holds out no shape to reconstruct")
@@ -79,7 +77,8 @@ def evaluate_shapes(
     names = [shapes.categories[shapes.category[i]] for i in chosen]
     result: dict = {"set": str(shapes.directory), "model": model.hash, **asdict(settings)}
     result["reconstruction"] = reconstruction_scores(
-        lambda i: shapes[int(chosen[i])], names, lambda grid: _reconstructed(model, grid),
+        lambda i: shapes[int(chosen[i])], names,
+        lambda grid: model.reconstruct(torch.from_numpy(grid)[None])[0].cpu().numpy(),
         lambda done, total: told("reconstruct", done, total),
     )  # fmt: skip
     meshes: dict[str, list[trimesh.Trimesh]] = {}
@@ -89,7 +88,7 @@ def evaluate_shapes(
 
 
 def class_shapes(
-    model: EchoModel, count: int, seed: int = 0, progress: Callable[[str, int, int], None] | None = None
+    model: RoomModel, count: int, seed: int = 0, progress: Callable[[str, int, int], None] | None = None
 ) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
     """Generate `count` objects of every class, each alone in its scene: (64, 64, 64) grids and (3,) sizes in metres.
 
@@ -113,15 +112,8 @@ def class_shapes(
     return found
 
 
-@torch.no_grad()
-def _reconstructed(model: EchoModel, grid: np.ndarray) -> np.ndarray:
-    coder = model.model.autoencoder
-    wanted = torch.from_numpy(grid)[None].to(model.device)
-    return coder.decode(coder.encode(wanted))[0].float().cpu().numpy()
-
-
 def _generation(
-    model: EchoModel, shapes: ShapeSet, settings: ShapeEvaluation, told: Callable[[str, int, int], None]
+    model: RoomModel, shapes: ShapeSet, settings: ShapeEvaluation, told: Callable[[str, int, int], None]
 ) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
     words = [category.name for category in vocabulary().categories]
     rng = np.random.default_rng([settings.seed, 1])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from echomodel.graph import GraphBatch
 from echomodel.protocols import touched_nodes
 from echomodel.released.editing import pack_changes, pack_scenes
 from echomodel.released.encoder import SceneGraphTensors
+from echomodel.released.grids import DISTANCE, published_grids, turned_back
 from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
 from echomodel.released.placing import LEVEL
 from echomodel.released.scene import published_scene
@@ -74,9 +74,11 @@ class ReleasedEcho:
         return self.model.config.preset
 
     @property
-    def has_shapes(self) -> bool:
-        """Whether there are a shape branch and its autoencoder."""
-        return self.model.config.shape is not None and self.model.config.vqvae is not None
+    def branches(self) -> frozenset[str]:
+        """`layout` and, with its autoencoder, `shape`: those that the file holds."""
+        config = self.model.config
+        shape = config.shape is not None and config.vqvae is not None
+        return frozenset(name for name, there in (("layout", config.layout is not None), ("shape", shape)) if there)
 
     def sample_layout(
         self,
@@ -89,23 +91,24 @@ class ReleasedEcho:
         edit: GraphEdit | None = None,
         progress: StepListener | None = None,
     ) -> Boxes:
-        """Boxes by the published 1,000 ancestral steps.
+        """Boxes by ancestral steps.
 
         Arguments:
-            steps: warned of and not used, the published schedule has one length.
+            steps: how many of the published 1,000 steps, evenly spread; None = all.
             known, known_mask: boxes that are put in afterwards: the published sampler cannot be told of them.
             others: as `EchoModel.sample_layout`.
 
         Raises:
-            ValueError: no layout branch, no box statistics, a category without a class, or no text features.
+            ValueError: no layout branch, no box statistics, too many steps, a category without a class, or no text
+                features.
         """
         graph = in_published_words(graph)
-        if steps is not None:
-            warnings.warn("the published layout has steps of its own, those asked for count for shapes", stacklevel=2)
         scenes, objects = self._scenes(graph)
         change = None if edit is None else self._change(graph, scenes, edit)
         whole, _ = pack_scenes(scenes)
-        boxes = self.model.sample_layout(whole, generator=generator, change=change, progress=progress)[objects]
+        boxes = self.model.sample_layout(whole, generator=generator, steps=steps, change=change, progress=progress)[
+            objects
+        ]
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
         if known is None or known_mask is None:
             return boxes
@@ -142,9 +145,17 @@ class ReleasedEcho:
         latents = self.model.sample_shapes(
             whole, generator=generator, steps=steps or 100, change=change, progress=progress
         )[objects]
-        grids = torch.cat([self.model.vqvae.decode(part)[:, 0] for part in latents.split(DECODED)])
-        # A quarter turn: the point (x, y, z) of a published shape is (-z, y, x) in its box (SPEC: section 10).
-        return grids.transpose(1, 3).flip(1).contiguous() - LEVEL
+        return turned_back(torch.cat([self.model.vqvae.decode(part) for part in latents.split(DECODED)])) - LEVEL
+
+    @torch.no_grad()
+    def reconstruct(self, grids: Tensor) -> Tensor:
+        """Grids (N, 64, 64, 64) in [-1, 1] through the autoencoder and back, turned as it knows them."""
+        coder = self.model.vqvae
+        if coder.config.resolution != grids.shape[1]:
+            sides = f"{coder.config.resolution} voxels a side, not {grids.shape[1]}"
+            raise ValueError(f"the grids of this model's autoencoder have {sides}")
+        through = [coder(published_grids(part, part.shape[1])) for part in grids.split(DECODED)]
+        return turned_back(torch.cat(through)) / DISTANCE
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
         """One sentence for every relation of the graph that SG-FRONT lacks; categories have classes, see `labels`."""

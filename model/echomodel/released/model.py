@@ -135,38 +135,41 @@ class ReleasedModel(GraphEncoder):
         graph: SceneGraphTensors,
         *,
         generator: torch.Generator,
+        steps: int | None = None,
         change: GraphChange | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Boxes:
-        """Boxes of all nodes by 1,000 ancestral steps (EchoScene, section 3.3); sizes can come out negative.
+        """Boxes of all nodes by ancestral steps (EchoScene, section 3.3); sizes can come out negative.
 
         Arguments:
             graph: one or many scenes. generator: source of all randomness. change: as `conditions`.
+            steps: how many of the published 1,000 steps, None = all.
             progress: called with (steps done, steps).
 
         Returns:
             N boxes in the scene's own frame, metres and radians.
 
         Raises:
-            ValueError: no layout branch, no box statistics, or a graph that cannot be used.
+            ValueError: no layout branch, no box statistics, more steps than there are, or a graph that cannot be used.
         """
         net, statistics = self.layout_net, self.statistics
         if statistics is None:
             raise ValueError("box statistics are missing: convert the checkpoint with --bounds FILE")
         conditions = self.eval().conditions(graph, change, generator)
+        tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
         bound = FrozenLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
         shape = (len(graph.classes), net.config.channels)
         start = torch.randn(shape, generator=generator)
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
         variance = "beta" if self.config.preset == "paper" else "posterior"
         states = ancestral(
-            bound,
+            lambda x, t: bound(x, chosen[t]),
             start,
-            self.layout_tables,
+            tables,
             noise=lambda step: torch.randn(shape, generator=generator),
             variance=variance,
         )
-        return Boxes.decode(last(states, progress, len(self.layout_tables.betas)), statistics.scale())
+        return Boxes.decode(last(states, progress, len(chosen)), statistics.scale())
 
     @torch.no_grad()
     def sample_shapes(

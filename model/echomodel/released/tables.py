@@ -35,6 +35,23 @@ class LayoutTables:
         betas64 = np.linspace(start, end, steps, dtype=np.float64)
         bar = torch.from_numpy(np.cumprod(1.0 - betas64)).float()
         betas, alphas = torch.from_numpy(betas64).float(), torch.from_numpy(1.0 - betas64).float()
+        return cls._of(betas, alphas, bar)
+
+    def spaced(self, count: int) -> tuple[LayoutTables, Tensor]:
+        """Tables of `count` of these T steps, evenly spread, and which they are: (count,) int64 (Nichol and Dhariwal
+        2021, section 4); raises ValueError for an impossible count."""
+        total = len(self.betas)
+        if not 1 <= count <= total:
+            raise ValueError(f"layout steps is {count}, allowed: 1..{total}")
+        if count == total:
+            return self, torch.arange(total)
+        steps = torch.linspace(total - 1, 0, count, dtype=torch.float64).round().long().flip(0)
+        bar = self.alphas_cumprod[steps]
+        alphas = bar / torch.cat([torch.ones(1), bar[:-1]])
+        return self._of(1.0 - alphas, alphas, bar), steps
+
+    @classmethod
+    def _of(cls, betas: Tensor, alphas: Tensor, bar: Tensor) -> LayoutTables:
         previous = torch.cat([torch.ones(1), bar[:-1]])
         variance = betas * (1.0 - previous) / (1.0 - bar)
         return cls(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -9,7 +11,9 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
+from echomodel.objectives import drawn_noise
 from echomodel.training.shapes import draw_grids, read
+from echomodel.training.start import Start
 
 NOISE = 0.1  # standard deviation added to the latent, so that the decoder forgives a denoiser's small errors
 
@@ -32,6 +36,8 @@ class AutoencoderStage:
     """
 
     trained = saved = ("autoencoder",)
+    parts: ClassVar[tuple[str, ...]] = saved
+    needs: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, shapes: ShapeSet, batch: int, components: ShapeDenoiser | None = None) -> None:
         self.shapes, self.batch, self.components = shapes, batch, components
@@ -39,20 +45,29 @@ class AutoencoderStage:
         if not len(self.held):
             self.held = self.used
 
+    @classmethod
+    def open(cls, start: Start) -> AutoencoderStage:
+        """The stage of a recipe; a new autoencoder starts from the shapes' PCA."""
+        stage = cls(start.shapes(), start.recipe.shapes_per_batch, start.components)
+        if "autoencoder" not in start.given:
+            stage.initialise(start.model, start.generator)
+        return stage
+
     def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
         """Start from the PCA of patches."""
         model.autoencoder.initialise(draw_grids(self.shapes, self.used, 64, generator))
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
-        grids = draw_grids(self.shapes, self.used, self.batch // (2 if self.components else 1), generator)
+        count = self.batch // (2 if self.components else 1)
+        grids = draw_grids(self.shapes, self.used, count, generator).to(model.device)
         latent = model.autoencoder.encode(grids)
-        noise = NOISE * torch.randn(latent.shape, generator=generator)
+        noise = NOISE * drawn_noise(latent, generator)
         error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
         if self.components is None:
             return error, {"reconstruction": error}
         picked = torch.randint(len(self.used), (self.batch,), generator=generator)
-        whole = read(self.shapes, self.used[picked.numpy()])
+        whole = read(self.shapes, self.used[picked.numpy()]).to(model.device)
         blurred = self.projected(model.autoencoder.encode(whole), generator)
         projected = reconstruction_loss(whole, model.autoencoder.decode(blurred).float())
         return error + projected, {"reconstruction": error, "projected": projected}
@@ -63,7 +78,7 @@ class AutoencoderStage:
         assert self.components is not None
         codes = self.components.codes(latent.float())
         if generator is not None:
-            codes = codes + NOISE * torch.randn(codes.shape, generator=generator)
+            codes = codes + NOISE * drawn_noise(codes, generator)
         return self.components.latents(codes)
 
     @torch.no_grad()
@@ -75,7 +90,7 @@ class AutoencoderStage:
         scores: list[float] = []
         through: list[float] = []
         for start in range(0, len(picked), 8):
-            grids = read(self.shapes, picked[start : start + 8])
+            grids = read(self.shapes, picked[start : start + 8]).to(model.device)
             rebuilt = model.autoencoder(grids)
             errors.append((grids - rebuilt).abs().mean())
             unions.extend(overlap(grids, rebuilt).tolist())
@@ -110,7 +125,7 @@ def surface_points(grid: Tensor) -> np.ndarray:
     """Vertices of the zero level in voxels (k, 3), none where there is no surface."""
     from skimage.measure import marching_cubes
 
-    values = grid.numpy()
+    values = grid.cpu().numpy()
     if not values.min() < 0 < values.max():
         return np.zeros((0, 3))
     return marching_cubes(values, 0.0)[0]

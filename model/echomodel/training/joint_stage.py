@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import torch
 from torch import Tensor
 
@@ -9,6 +11,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.training.layout_stage import LayoutStage, edited_latent
 from echomodel.training.rooms import draw_batch
 from echomodel.training.shape_stage import ShapeStage, room_shapes, shape_loss
+from echomodel.training.start import Start
 
 
 class JointStage:
@@ -22,19 +25,26 @@ class JointStage:
     """
 
     trained = saved = ("latent", "layout", "shape")
+    parts: ClassVar[tuple[str, ...]] = ("latent", "layout", "autoencoder", "shape")
+    needs: ClassVar[tuple[str, ...]] = ("autoencoder",)
 
     def __init__(self, layout: LayoutStage, shape: ShapeStage) -> None:
         self.layout, self.shape = layout, shape
 
+    @classmethod
+    def open(cls, start: Start) -> JointStage:
+        """Both stages of a recipe, on the same rooms."""
+        layout = LayoutStage.open(start)
+        return cls(layout, ShapeStage.on(layout.rooms, start))
+
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Sum of both branches' losses on one random batch."""
-        batch = draw_batch(self.layout.rooms, self.layout.nodes, generator)
+        batch = draw_batch(self.layout.rooms, self.layout.nodes, generator).to(model.device)
         layout, parts = self.layout.scored(model, batch, generator)
         few = draw_batch(self.layout.rooms, self.shape.batch, generator)
-        objects = room_shapes(few, self.shape.shapes)
-        clean = self.shape.codes(model)[objects.shape]
-        sizes = self.shape.shapes.sizes[objects.shape]
-        shape, more = shape_loss(model, objects, clean, sizes, generator, edited_latent(model, few))
+        objects = room_shapes(few, self.shape.shapes).to(model.device)
+        latent = edited_latent(model, few.to(model.device))
+        shape, more = shape_loss(model, objects, *self.shape.truth(model, objects), generator, latent)
         return layout + shape, {**parts, **more}
 
     def validate(self, model: CompactModel) -> dict[str, float]:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import torch
 from torch import Tensor
 
-from echomodel.boxes import Boxes
+from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import measurable, pair_features, wall_features
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import layout_predictor
-from echomodel.objectives import add_noise, clean_from, draw_levels, target
+from echomodel.objectives import add_noise, clean_from, draw_levels, drawn_noise, target
 from echomodel.openingrows import clearances
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import sample
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
+from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
 DRAFT = 0.3  # weight of each draft's own denoising loss
@@ -49,8 +52,8 @@ def layout_loss(
     scale = model.statistics.scale(batch.graph.category)
     clean = batch.boxes.encode(scale)
     known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
-    level = draw_levels(batch.graph.num_scenes, generator)[batch.graph.scene] * ~known
-    noise = torch.randn(clean.shape, generator=generator)
+    level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
+    noise = drawn_noise(clean, generator)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
     context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale, batch.tidy)
     outputs = model.layout.drafts(noisy, level, context)
@@ -120,8 +123,8 @@ def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Ten
 def draw_known(scene: Tensor, scenes: int, generator: torch.Generator) -> Tensor:
     """(N,) bool: in half of the scenes nothing is known, in the others a random share of the nodes."""
     some = torch.rand(scenes, generator=generator) < 0.5
-    share = torch.rand(scenes, generator=generator) * some
-    return torch.rand(len(scene), generator=generator) < share[scene]
+    share = (torch.rand(scenes, generator=generator) * some).to(scene.device)
+    return torch.rand(len(scene), generator=generator).to(scene.device) < share[scene]
 
 
 class LayoutStage:
@@ -136,6 +139,8 @@ class LayoutStage:
     """
 
     saved = ("latent", "layout")
+    parts: ClassVar[tuple[str, ...]] = saved
+    needs: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,
@@ -150,9 +155,17 @@ class LayoutStage:
         self.relation_weight, self.measure_weight = relation_weight, measure_weight
         self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 
+    @classmethod
+    def open(cls, start: Start) -> LayoutStage:
+        """The stage of a recipe; new layouts are normalised by its rooms."""
+        recipe, (rooms, held) = start.recipe, (start.rooms(held=held) for held in (False, True))
+        if "layout" not in start.given:
+            start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rooms.category, recipe.model.categories)
+        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, recipe.measure_weight)
+
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
-        return self.scored(model, draw_batch(self.rooms, self.nodes, generator), generator)
+        return self.scored(model, draw_batch(self.rooms, self.nodes, generator).to(model.device), generator)
 
     def scored(
         self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator
@@ -170,7 +183,7 @@ class LayoutStage:
             picked = (self.held.rules == number).nonzero()[:rooms, 0]
             if not len(picked):
                 continue
-            batch = make_batch(self.held, picked, generator, train=False)
+            batch = make_batch(self.held, picked, generator, train=False).to(model.device)
             boxes = sample_boxes(model, batch, generator)
             pair, predicate = batch.predicates.nonzero(as_tuple=True)
             triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
@@ -190,6 +203,6 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     layout = model.config.layout
     latent = model.latent(batch.graph.category, batch.pairs)
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
-    noise = torch.randn(batch.graph.num_nodes, 8, generator=generator)
+    noise = drawn_noise(batch.boxes.size.new_empty(batch.graph.num_nodes, 8), generator)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
     return Boxes.decode(vectors, model.statistics.scale(batch.graph.category))

@@ -16,6 +16,7 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.released.config import PaperSizes, paper
 from echomodel.released.editing import pack_changes, pack_scenes, pseudo_graph
 from echomodel.released.encoder import SceneGraphTensors
+from echomodel.released.grids import published_grids
 from echomodel.released.model import GraphChange, ReleasedModel
 from echomodel.released.scene import published_scene
 from echomodel.roomboxes import RoomBoxes
@@ -23,7 +24,6 @@ from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder
 from echomodel.training.shapes import read
 from echomodel.vocabulary import vocabulary
 
-DISTANCE = 4 / 64  # our grids hold distances over 4 voxels, the published ones in sides of the grid
 SCENE_BOX = (-1.0,) * 6  # what the published loader gives the `_scene_` node, with an angle of -1
 AUTOENCODER = "vqvae"
 
@@ -149,15 +149,6 @@ class PaperStage:
         found = torch.cat([encoder.encode(part) for part in torch.cat(grids).split(8)])
         missing = sum(len(room) + 2 for room in rooms) - len(found)
         return torch.cat([found, found.new_zeros(max(missing, 0), *found.shape[1:])])
-
-
-def published_grids(grids: Tensor, side: int = 64) -> Tensor:
-    """Our grids (K, 64, 64, 64) in the published frame, whose +X is an object's front, and unit: (K, 1, R, R, R).
-
-    `side` is R, 64 or a part of it for a smaller autoencoder, whose voxels are means.
-    """
-    turned = (grids.flip(1).transpose(1, 3) * DISTANCE)[:, None].contiguous()
-    return turned if side == grids.shape[1] else torch.nn.functional.avg_pool3d(turned, grids.shape[1] // side)
 
 
 def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -12,10 +14,11 @@ from echomodel.data.furniture.choices import OPEN
 from echomodel.data.furniture.description import draw_styles
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels
+from echomodel.objectives import add_noise, draw_levels, drawn_noise
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import PackedRooms, draw_batch
 from echomodel.training.shape_stage import ShapeBatch, draw_suites, first_of_group, shifted
+from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
 STYLES, HELD, SEED = 20_000, 500, 1  # styles to learn from and to validate with; they are a third of a kilobyte each
@@ -35,10 +38,10 @@ def parts_loss(
     """
     settings, scenes = model.config.furniture, batch.graph.num_scenes
     known = draw_known(batch.graph.scene, scenes, generator)
-    level = shifted(draw_levels(scenes, generator))[batch.graph.scene] * ~known
-    noise = torch.randn(clean.shape, generator=generator)
+    level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
+    noise = drawn_noise(clean, generator)
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
-    shared = (torch.rand(scenes, generator=generator) < 0.75)[batch.graph.scene, None]
+    shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[batch.graph.scene, None]
     noise = torch.where(shared, noise[first_of_group(batch)], noise)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, settings.objective))
     with torch.no_grad():
@@ -68,6 +71,8 @@ class PartsStage:
     """
 
     trained = saved = ("furniture",)
+    parts: ClassVar[tuple[str, ...]] = ("latent", "furniture")
+    needs: ClassVar[tuple[str, ...]] = ("latent",)
 
     def __init__(self, rooms: PackedRooms, nodes: int) -> None:
         self.rooms, self.nodes = rooms, nodes
@@ -76,6 +81,11 @@ class PartsStage:
         self.styles, self.held = styles[:STYLES], styles[STYLES:]
         words = [category.name for category in vocabulary().categories]
         self.sizes = torch.tensor(np.array([[sample_size(w, rng) for _ in range(200)] for w in words])).float()
+
+    @classmethod
+    def open(cls, start: Start) -> PartsStage:
+        """The stage of a recipe."""
+        return cls(start.rooms(held=False), start.recipe.nodes)
 
     def draw(self, generator: torch.Generator) -> tuple[ShapeBatch, Tensor]:
         """Rooms on even draws, suites on odd ones, with the size (N, 3) of every object."""
@@ -106,7 +116,8 @@ class PartsStage:
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
         batch, size = self.draw(generator)
-        return parts_loss(model, batch, self.described(batch, self.styles, generator), size, generator)
+        clean = self.described(batch, self.styles, generator).to(model.device)
+        return parts_loss(model, batch.to(model.device), clean, size.to(model.device), generator)
 
     @torch.no_grad()
     def validate(self, model: CompactModel) -> dict[str, float]:
@@ -115,7 +126,8 @@ class PartsStage:
         found: dict[str, list[float]] = {}
         for _ in range(4):
             batch, size = self.suites(32, generator)
-            _, parts = parts_loss(model, batch, self.described(batch, self.held, generator), size, generator)
+            clean = self.described(batch, self.held, generator).to(model.device)
+            _, parts = parts_loss(model, batch.to(model.device), clean, size.to(model.device), generator)
             for name, value in parts.items():
                 found.setdefault(f"held/{name}", []).append(float(value))
         return {name: float(np.mean(values)) for name, values in found.items()}

@@ -117,6 +117,10 @@ class LayoutBatch:
     added: Tensor
     touched: Tensor
 
+    def to(self, device: torch.device | str) -> LayoutBatch:
+        """The same batch on another device."""
+        return LayoutBatch(**{f.name: vars(self)[f.name].to(device) for f in fields(self)})
+
 
 def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator) -> LayoutBatch:
     """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from torch import Tensor
@@ -11,10 +12,11 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels, expand, output_from, target
+from echomodel.objectives import add_noise, draw_levels, drawn_noise, expand, output_from, target
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
-from echomodel.training.shapes import EncodedShapes
+from echomodel.training.shapes import EncodedShapes, encoded_set
+from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
 LOWEST = 0.1  # level below which the loss weight 1 / level^2 of a predicted clean latent stops growing
@@ -35,6 +37,11 @@ class ShapeBatch:
     shape: Tensor
     room: LayoutBatch | None = None
 
+    def to(self, device: torch.device | str) -> ShapeBatch:
+        """The same batch on another device."""
+        room = None if self.room is None else self.room.to(device)
+        return ShapeBatch(self.graph.to(device), self.pairs.to(device), self.shape.to(device), room)
+
 
 def shape_loss(
     model: CompactModel,
@@ -54,10 +61,10 @@ def shape_loss(
     settings, scenes = model.config.shape, batch.graph.num_scenes
     objective = settings.objective
     known = draw_known(batch.graph.scene, scenes, generator)
-    level = shifted(draw_levels(scenes, generator))[batch.graph.scene] * ~known
-    noise = torch.randn(clean.shape, generator=generator)
+    level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
+    noise = drawn_noise(clean, generator)
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
-    shared = torch.rand(scenes, generator=generator) < 0.75
+    shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)
     noise = torch.where(expand(shared[batch.graph.scene], noise), noise[first_of_group(batch)], noise)
     noisy = torch.where(expand(known, clean), clean, add_noise(clean, noise, level, objective))
     latent = model.latent(batch.graph.category, batch.pairs) if graph_latent is None else graph_latent
@@ -126,10 +133,25 @@ class ShapeStage:
     """
 
     trained = saved = ("shape",)
+    parts: ClassVar[tuple[str, ...]] = ("latent", "autoencoder", "shape")
+    needs: ClassVar[tuple[str, ...]] = ("latent", "autoencoder")
 
     def __init__(self, rooms: PackedRooms, shapes: EncodedShapes, batch: int) -> None:
         self.rooms, self.shapes, self.batch = rooms, shapes, batch
         self._codes: Tensor | None = None
+
+    @classmethod
+    def open(cls, start: Start) -> ShapeStage:
+        """The stage of a recipe, its shapes encoded; a new denoiser is fitted to them."""
+        return cls.on(start.rooms(held=False), start)
+
+    @classmethod
+    def on(cls, rooms: PackedRooms, start: Start) -> ShapeStage:
+        """As `open`, on rooms that are read already."""
+        stage = cls(rooms, encoded_set(start.model.autoencoder, start.shapes()), start.recipe.shapes_per_batch)
+        if "shape" not in start.given and not start.resume:
+            stage.initialise(start.model, start.generator)
+        return stage
 
     def initialise(self, model: CompactModel, generator: torch.Generator) -> None:
         """Fit the denoiser's components to the styles that are trained on."""
@@ -140,7 +162,9 @@ class ShapeStage:
     def codes(self, model: CompactModel) -> Tensor:
         """(M, K) codes of the whole set, computed at first use, when a resumed run has its components back."""
         if self._codes is None:
-            self._codes = torch.cat([model.shape.codes(part.float()) for part in self.shapes.latents.split(256)])
+            self._codes = torch.cat(
+                [model.shape.codes(part.float().to(model.device)) for part in self.shapes.latents.split(256)]
+            )
         return self._codes
 
     def draw(self, generator: torch.Generator) -> ShapeBatch:
@@ -152,8 +176,11 @@ class ShapeStage:
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
         batch = self.draw(generator)
-        clean = self.codes(model)[batch.shape]
-        return shape_loss(model, batch, clean, self.shapes.sizes[batch.shape], generator)
+        return shape_loss(model, batch.to(model.device), *self.truth(model, batch), generator)
+
+    def truth(self, model: CompactModel, batch: ShapeBatch) -> tuple[Tensor, Tensor]:
+        """Codes (N, K) and sizes (N, 3) of the shapes of a batch, on the model's device."""
+        return self.codes(model)[batch.shape.to(model.device)], self.shapes.sizes[batch.shape.cpu()].to(model.device)
 
     @torch.no_grad()
     def validate(self, model: CompactModel) -> dict[str, float]:
@@ -162,8 +189,7 @@ class ShapeStage:
         losses = []
         for _ in range(4):
             batch = draw_suites(8, self.shapes.held, generator)
-            clean, size = self.codes(model)[batch.shape], self.shapes.sizes[batch.shape]
-            losses.append(shape_loss(model, batch, clean, size, generator)[0])
+            losses.append(shape_loss(model, batch.to(model.device), *self.truth(model, batch), generator)[0])
         return {"held/shape": float(torch.stack(losses).mean())}
 
 

@@ -36,8 +36,9 @@ def encoded_set(autoencoder: Autoencoder, shapes: ShapeSet, batch: int = 16) -> 
     numbers = shapes.style * categories + shapes.category
     if len(shapes) % categories or not np.array_equal(numbers, np.arange(len(shapes))):
         raise ValueError(f"{shapes.directory}: is no parametric shape set (every category in every style, in order)")
+    device = autoencoder.basis.device
     out = [
-        autoencoder.encode(read(shapes, part)).half()
+        autoencoder.encode(read(shapes, part).to(device)).half().cpu()
         for part in np.array_split(np.arange(len(shapes)), max(1, len(shapes) // batch))
     ]
     held = torch.from_numpy(shapes.held_out.reshape(-1, categories)[:, 0])

@@ -7,6 +7,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -83,6 +84,7 @@ class Trainer:
         for name in model.parts:
             for parameter in model.part_parameters(name):
                 parameter.requires_grad_(name in stage.trained)
+        self.device = next(model.parameters()).device
         self.average = copy.deepcopy(model).requires_grad_(False).eval()
         self.trained = {name: p for name, p in model.named_parameters() if p.requires_grad}
         decayed = [p for p in self.trained.values() if p.ndim > 1]
@@ -91,7 +93,7 @@ class Trainer:
         self.optimizer = torch.optim.AdamW(
             [{"params": decayed, "weight_decay": settings.decay}, {"params": others, "weight_decay": 0.0}],
             lr=settings.rate,
-            fused=True,
+            fused=self.device.type in ("cpu", "cuda"),
         )
         self.step = 0
         if resume:
@@ -137,7 +139,8 @@ class Trainer:
         for group in self.optimizer.param_groups:
             group["lr"] = settings.rate_at(self.step, self.recipe.steps)
         generator = step_generator(self.recipe.seed, self.step, self.rank)
-        with torch.autocast("cpu", torch.bfloat16, enabled=self.recipe.precision == "bfloat16"):
+        half = self.recipe.precision == "bfloat16"
+        with torch.autocast(self.device.type, torch.bfloat16) if half else nullcontext():
             loss, parts = loss_module(generator)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(list(self.trained.values()), settings.clip)
@@ -164,7 +167,7 @@ class Trainer:
             for key, value in self.optimizer.state[parameter].items():
                 tensors[f"optimizer.{key}.{name}"] = torch.as_tensor(value)
         metadata = {"step": str(self.step), "recipe": to_json(self.recipe)}
-        copies = {key: value.detach().contiguous().clone() for key, value in tensors.items()}
+        copies = {key: value.detach().cpu().contiguous().clone() for key, value in tensors.items()}
         with whole_file(self.folder / "checkpoint.safetensors") as beside:
             save_file(copies, beside, metadata=metadata)
         self.average.write(self.folder / "weights.safetensors", self.stage.saved)
@@ -190,7 +193,8 @@ class Trainer:
                 averaged[name].copy_(tensors[f"average.{name}"])
                 if f"optimizer.step.{name}" in tensors:  # published networks have weights that nothing reads
                     self.optimizer.state[parameter] = {
-                        key: tensors[f"optimizer.{key}.{name}"] for key in ("step", "exp_avg", "exp_avg_sq")
+                        key: tensors[f"optimizer.{key}.{name}"].to(parameter.device)
+                        for key in ("step", "exp_avg", "exp_avg_sq")
                     }
         self.step = int(metadata["step"])
 

@@ -13,12 +13,13 @@ from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.released.echo import ReleasedEcho
+from echomodel.released.grids import DISTANCE, published_grids, turned_back
 from echomodel.released.model import ReleasedModel
 from echomodel.released.placing import fit_to_box
 from echomodel.released.tables import LayoutTables
 from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.logs import read_log
-from echomodel.training.paper_stage import PaperModel, PaperStage, published_grids, scene_boxes, text_encoder
+from echomodel.training.paper_stage import PaperModel, PaperStage, scene_boxes, text_encoder
 from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.run import open_run
 from echomodel.training.trainer import step_generator
@@ -127,6 +128,7 @@ def test_shapes_lie_in_the_published_frame(data: Path) -> None:
     placed = published_grids(grid[None])
     assert placed.shape == (1, 1, 64, 64, 64)
     assert float(placed.max()) == pytest.approx(0.0625)
+    assert torch.equal(turned_back(placed) / DISTANCE, grid[None])
     inside = (placed[0, 0] < 0).nonzero().double().numpy() / 64 - 0.5
     fitted = fit_to_box(inside, np.array([2.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]), centre_first=False)
     top = fitted[fitted[:, 1] > 0.5]

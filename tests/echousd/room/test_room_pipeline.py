@@ -122,7 +122,7 @@ def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
 
 
 class NoShapes(StandIn):
-    has_shapes = False
+    branches = frozenset({"layout"})
 
 
 class Empty(StandIn):

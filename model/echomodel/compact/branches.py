@@ -1,0 +1,66 @@
+"""The parts of the compact model, each registered once under the name of its settings in `CompactConfig`.
+
+A branch is a part that gives something of a room: boxes, shapes, furniture. A further branch is a module with its
+network and its sampling, its settings in `CompactConfig`, its row here, and a training stage in `echomodel.training`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from torch import nn
+
+from echomodel.compact.autoencoder import Autoencoder
+from echomodel.compact.furniture import FurnitureDenoiser
+from echomodel.compact.latent import LatentGraph
+from echomodel.compact.layout import LayoutDenoiser
+from echomodel.compact.shape import ShapeDenoiser
+from echomodel.config import CompactConfig
+
+MEASURES = 2  # set of measures of the drafts that this version computes
+
+
+def _usable(settings: Mapping[str, Any]) -> str | None:
+    return None
+
+
+@dataclass(frozen=True)
+class Part:
+    """What weights files and the model know of a part.
+
+    Arguments:
+        module: builds it from the whole configuration.
+        needs: other parts without which it gives nothing.
+        branch: whether it gives something of a room.
+        outdated: settings as a weights file holds them -> why this version cannot use them, None = it can.
+    """
+
+    module: Callable[[CompactConfig], nn.Module]
+    needs: tuple[str, ...] = ()
+    branch: bool = False
+    outdated: Callable[[Mapping[str, Any]], str | None] = _usable
+
+
+def _outdated_layout(settings: Mapping[str, Any]) -> str | None:
+    if "drafts" not in settings:
+        return "whose layout branch did not draft; train it again"
+    if settings.get("measures", 1) != MEASURES:
+        return "whose layout branch knew no doors and windows; start a training from it with the recipe's field 'warm'"
+    return None
+
+
+PARTS: dict[str, Part] = {
+    "latent": Part(LatentGraph),
+    "layout": Part(LayoutDenoiser, ("latent",), branch=True, outdated=_outdated_layout),
+    "autoencoder": Part(Autoencoder),
+    "shape": Part(ShapeDenoiser, ("latent", "autoencoder"), branch=True),
+    "furniture": Part(FurnitureDenoiser, ("latent",), branch=True),
+}
+
+
+def branches(parts: Iterable[str]) -> frozenset[str]:
+    """Names of the branches among `parts` that have what they need beside them."""
+    there = set(parts)
+    return frozenset(name for name in there if PARTS[name].branch and there.issuperset(PARTS[name].needs))
