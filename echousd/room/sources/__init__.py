@@ -19,7 +19,7 @@ MODULES = {
 
 def default_source(model: RoomModel | None) -> str:
     """`parts` where the model can describe furniture, else `sdf`."""
-    return "parts" if model is None or getattr(model, "has_furniture", False) else "sdf"
+    return "parts" if model is None or "furniture" in model.branches else "sdf"
 
 
 def shape_source(name: str) -> ShapeSource:
