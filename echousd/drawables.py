@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from echousd.stage import values
 from echousd.stage.encoding import StageError
+from echousd.stage.forms import forms, polygons
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, read_image
 
@@ -53,23 +54,31 @@ class Drawable:
 
 
 def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
-    """Every visible mesh of purpose default or render, instances included; Z-up and other units are converted."""
+    """Every visible surface of purpose default or render, instances included; Z-up and other units are converted.
+
+    Surfaces without polygons (curves, volumes ...) are left out with a warning.
+    """
     to_world = np.diag([metres_per_unit(stage)] * 3 + [1.0])
     if up_axis(stage) == UsdGeom.Tokens.z:
         to_world[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ to_world[:3]
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
-        if prim.GetTypeName() != "Mesh" or not _visible(prim):
-            continue
-        mesh = UsdGeom.Mesh(prim)
-        part = _triangles(mesh)
+    shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
+    for form in forms(stage.GetPseudoRoot(), cache, _visible):
+        prim = form.prim
+        part = shapes[prim] if prim in shapes else _triangles(prim)
+        if form.above is not None:
+            shapes[prim] = part
         if part is not None:
             face, triangles, normals, st = part
-            world = to_world @ values.matrix(cache.GetLocalToWorldTransform(prim), prim)
-            paints = tuple(_paints(mesh, face, known))
-            path, component, category = str(prim.GetPath()), _component(prim), _category(prim)
-            yield Drawable(path, component, category, world, triangles, normals, st, paints)
+            paints = tuple(_paints(prim, face, known))
+            component = (
+                _component(prim)
+                if form.above is None
+                else f"{_component(form.above)}{form.path.partition('[')[2].partition(']')[0]}"
+            )
+            category = _category(prim) or (_category(form.above) if form.above else "")
+            yield Drawable(form.path, component, category, to_world @ form.world, triangles, normals, st, paints)
 
 
 def paint_image(paint: Paint) -> np.ndarray:
@@ -104,10 +113,10 @@ def _component(prim: Usd.Prim) -> str:
     return prim.GetName()
 
 
-def _triangles(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None] | None:
-    """Fan triangles of a mesh: the face that each came from, corners, corner normals, st."""
-    arrays = values.mesh_arrays(mesh)
-    points, counts, index = arrays.points, arrays.counts, arrays.indices
+def _triangles(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None] | None:
+    """Fan triangles of a surface: the face of the prim that each came from, corners, corner normals, st."""
+    surface = polygons(prim)
+    points, counts, index = surface.points, surface.counts, surface.indices
     if not (counts > 2).any():
         return None
     first = np.cumsum(counts) - counts
@@ -115,12 +124,17 @@ def _triangles(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
     face = np.repeat(np.arange(len(counts)), fans)
     step = np.arange(len(face)) - np.repeat(np.cumsum(fans) - fans, fans)
     corner = np.stack([first[face], first[face] + step + 1, first[face] + step + 2], 1)
-    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+    if UsdGeom.Gprim(prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     triangles = points[index[corner]]
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
     normals = np.repeat(flat[:, None], 3, axis=1)
+    if surface.normals is not None:
+        return surface.face[face], triangles, surface.normals[index[corner]], None
+    if not prim.IsA(UsdGeom.Mesh):
+        return face, triangles, normals, None
+    mesh = UsdGeom.Mesh(prim)
     authored = _corner_values(mesh, "normals", 3, index, len(points), face, corner)
     if authored is not None:
         length = np.linalg.norm(authored, axis=-1, keepdims=True)
@@ -165,10 +179,10 @@ def _flattened(primvar: UsdGeom.Primvar) -> Any:
     return np.asarray(found)[index]
 
 
-def _paints(mesh: UsdGeom.Mesh, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
-    """Materials of a mesh with the triangles that they colour."""
-    paints = [(_bound(mesh.GetPrim(), known), np.arange(len(face)))]
-    for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
+def _paints(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
+    """Materials of a surface with the triangles that they colour."""
+    paints = [(_bound(prim, known), np.arange(len(face)))]
+    for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
         chosen = np.zeros(int(face.max(initial=0)) + 1, bool)
         inside = values.array(subset.GetIndicesAttr(), whole=True)
         chosen[inside[(inside >= 0) & (inside < len(chosen))]] = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,10 @@ from pxr import Tf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import StageError
+from echousd.stage.forms import forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import matrix, mesh_arrays, numbers
+from echousd.stage.values import matrix
 
 Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
 HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
@@ -117,12 +117,12 @@ def _object(
     own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
     points, faces = [], []
     count = 0
-    for mesh in meshes_below(prim, others):
-        found = _readable(lambda mesh=mesh: triangulated(mesh))  # type: ignore[misc]
+    for form in forms(prim, cache, _counts, others):
+        found = _readable(lambda form=form: triangulated(form.prim))  # type: ignore[misc]
         if found is None or not len(found[1]):
             continue
         vertices, triangles = found
-        world = to_room @ matrix(cache.GetLocalToWorldTransform(mesh), mesh)
+        world = to_room @ form.world
         points.append(vertices @ world[:3, :3].T + world[:3, 3])
         faces.append(triangles + count)
         count += len(vertices)
@@ -147,29 +147,16 @@ def _object(
     return RoomObject(node, vertices, np.concatenate(faces), high - low, position, yaw)
 
 
-def meshes_below(prim: Usd.Prim, others: set | frozenset = frozenset()) -> Iterator[Usd.Prim]:
-    """The visible render geometry at and below a prim, without guides and proxies and without the prims in `others`."""
-    prims = iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
-    for found in prims:
-        if found.GetPath() in others:
-            prims.PruneChildren()
-        elif found.IsA(UsdGeom.Gprim):
-            image = UsdGeom.Imageable(found)
-            if image.ComputePurpose() not in HIDDEN and image.ComputeVisibility() != UsdGeom.Tokens.invisible:
-                yield found
+def _counts(prim: Usd.Prim) -> bool:
+    """Whether a surface is one that people see: no guide, no proxy, not invisible."""
+    image = UsdGeom.Imageable(prim)
+    return image.ComputePurpose() not in HIDDEN and image.ComputeVisibility() != UsdGeom.Tokens.invisible
 
 
 def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
-    """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int; other gprims become their box."""
-    if not prim.IsA(UsdGeom.Mesh):
-        extent = UsdGeom.Boundable(prim).ComputeExtent(Usd.TimeCode.Default())
-        return (
-            _box(numbers(extent, 3, f"<{prim.GetPath()}>: its extent"))
-            if extent
-            else (np.zeros((0, 3)), np.zeros((0, 3), int))
-        )
-    arrays = mesh_arrays(UsdGeom.Mesh(prim))
-    points, counts, indices = arrays.points, arrays.counts, arrays.indices
+    """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int."""
+    surface = polygons(prim)
+    points, counts, indices = surface.points, surface.counts, surface.indices
     if not len(points):
         return np.zeros((0, 3)), np.zeros((0, 3), int)
     starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
@@ -179,9 +166,3 @@ def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
         for k in range(1, corners - 1):
             triangles.append(np.stack((indices[first], indices[first + k], indices[first + k + 1]), 1))
     return points, np.concatenate(triangles) if triangles else np.zeros((0, 3), int)
-
-
-def _box(extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    corners = np.array([[extent[(k >> axis) & 1, axis] for axis in range(3)] for k in range(8)], float)
-    quads = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
-    return corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])

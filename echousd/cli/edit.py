@@ -36,7 +36,7 @@ def register(app: typer.Typer) -> None:
         wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
         """Change what a room holds; objects that the change does not touch stay byte for byte."""
-        from echousd.cli.generate import check_output, progress_bar, report, telling_faults, writing
+        from echousd.cli.generate import check_output, end, progress_bar, report, telling_faults, writing
         from echousd.graph.text import relation_from_text
         from echousd.room.edit import edit as change
         from echousd.room.reading import read_room
@@ -73,6 +73,7 @@ def register(app: typer.Typer) -> None:
         for step in steps:
             say(step)
         report(made, root, preview)
+        end([(made, root, preview)])
 
 
 def _named(text: str) -> tuple[str, str]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +15,7 @@ from echousd.cli.output import say
 
 if TYPE_CHECKING:
     from echousd.room import Room
+    from echousd.room.house import Place
 
 TITLES = {
     "read": "Reading the graph",
@@ -42,6 +43,9 @@ def register(app: typer.Typer) -> None:
                 "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
             ),
         ],
+        room: Annotated[
+            str | None, typer.Option(help="Prim path of one room of several; default: all of them.")
+        ] = None,
         seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
         preset: Annotated[
             str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
@@ -83,14 +87,22 @@ def register(app: typer.Typer) -> None:
         ] = False,
         wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
-        """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD."""
+        """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD.
+
+        A stage of several rooms becomes a folder for each and a root layer that composes them.
+        """
         from echousd.room.manifest import check_seed
 
         started = time.perf_counter()
         check_seed(seed)
         check_output(output, flat=flat, force=force)
         set_crate_version(crate)
-        with writing(output, flat=flat, force=force, wait=wait), telling_faults(), progress_bar() as listen:
+        house = () if room or flat else rooms_of(graph)
+        with ExitStack() as held:
+            if not house:
+                held.enter_context(writing(output, flat=flat, force=force, wait=wait))
+            held.enter_context(telling_faults())
+            listen = held.enter_context(progress_bar())
             gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
             try:
                 from echousd.room.pipeline import generate as make
@@ -99,32 +111,79 @@ def register(app: typer.Typer) -> None:
             finally:
                 gc.enable()
             options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
-            imported = time.perf_counter() - started
-            room = make(
-                graph, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair, samples=samples,
-                drafts=drafts, earlier=None if flat else output, steps=steps, faces=faces, options=options,
-                progress=listen,
-            )  # fmt: skip
-            spent = {"imports": imported, **room.timings}
-            listen("write", 0, 1)
-            mark = time.perf_counter()
-            root = save_flat(room, output, force=force) if flat else save_layers(room, output, force=force)
-            spent["write"] = time.perf_counter() - mark
-            listen("write", 1, 1)
-            preview = None
-            if not flat:
-                listen("preview", 0, 1)
-                mark = time.perf_counter()
-                preview = write_preview(root)
-                preview = write_sheet(root) or preview
-                spent["preview"] = time.perf_counter() - mark
-                listen("preview", 1, 1)
+            spent = {"imports": time.perf_counter() - started}
+
+            def one(path: str | None, folder: Path) -> tuple[Room, Path, Path | None]:
+                made = make(
+                    graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
+                    samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
+                    options=options, progress=listen,
+                )  # fmt: skip
+                with took(spent, "write", listen):
+                    root = save_flat(made, folder, force=force) if flat else save_layers(made, folder, force=force)
+                preview = None
+                if not flat:
+                    with took(spent, "preview", listen):
+                        preview = write_preview(root)
+                        preview = write_sheet(root) or preview
+                for stage, seconds in made.timings.items():
+                    spent[stage] = spent.get(stage, 0.0) + seconds
+                return made, root, preview
+
+            made = generate_house(output, house, one, force=force, wait=wait) if house else [one(room, output)]
         if timings:
             total = time.perf_counter() - started
             spent |= {"other": total - sum(spent.values()), "total": total}
             for stage, seconds in spent.items():
                 typer.echo(f"{stage:>10} {seconds:7.2f} s")
-        report(room, root, preview)
+        for each in made:
+            report(*each)
+        end(made)
+
+
+Made = tuple["Room", Path, Path | None]
+
+
+def rooms_of(graph: Path) -> Sequence[Place]:
+    """The rooms of a stage that holds several."""
+    if graph.suffix.lower() not in (".usda", ".usdc", ".usd", ".usdz"):
+        return ()
+    from echousd.room.house import places
+
+    return places(graph)
+
+
+def generate_house(
+    output: Path, house: Sequence[Place], one: Callable[[str, Path], Made], *, force: bool, wait: bool
+) -> list[Made]:
+    """Every room of a house in a folder of its own, and the layer that composes them."""
+    from echousd.room.house import check_house, write_house
+
+    root = output / f"{output.name}.usda"
+    check_house(root, force=force)
+    made = []
+    for place in house:
+        with writing(output / place.name, flat=False, force=force, wait=wait):
+            made.append(one(place.path, output / place.name))
+    write_house(root, house, {place.name: each[1] for place, each in zip(house, made, strict=True)}, force=force)
+    say(f"house    {root}")
+    return made
+
+
+@contextmanager
+def took(spent: dict[str, float], stage: str, listen: Callable[[str, int, int], None]) -> Iterator[None]:
+    """Note how long a stage took, and tell the bar."""
+    started = time.perf_counter()
+    listen(stage, 0, 1)
+    yield
+    listen(stage, 1, 1)
+    spent[stage] = spent.get(stage, 0.0) + time.perf_counter() - started
+
+
+def end(made: Sequence[Made]) -> None:
+    """Exit code 1 if a room has faults."""
+    if any(room.faults for room, *_ in made):
+        raise typer.Exit(1)
 
 
 def check_output(output: Path, *, flat: bool, force: bool) -> None:
@@ -211,7 +270,7 @@ def progress_bar() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def report(room: Room, root: Path, preview: Path | None) -> None:
-    """Say what was made and what the graph asked for in vain; ends with exit code 1 where that is anything."""
+    """Say what was made and what the graph asked for in vain."""
     say(f"room     {root}")
     if preview is not None:
         say(f"preview  {preview}")
@@ -225,5 +284,3 @@ def report(room: Room, root: Path, preview: Path | None) -> None:
             say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
     for note in room.notes:
         say(f"note     {note}")
-    if room.faults:
-        raise typer.Exit(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +24,10 @@ NEW_EXAMPLES = """Examples:
 
     echousd new bedroom.usda --room bedroom --size 4 3.5 --door 'south 0.3' --window 'north 1.2 1.6'
 
-    echousd new bedroom.yaml --room bedroom     (a text to edit by hand)"""
+    echousd new bedroom.yaml --room bedroom     (a text to edit by hand)
+
+Frames: the room's front is +X, its right +Z, up +Y; lengths are metres, yaw is radians about +Y or, as in 90 deg,
+degrees; at yaw 0 the front of an object looks along +Z."""
 
 GRAPH_EXAMPLES = """Examples:
 
@@ -230,7 +234,7 @@ def _facts(node: Node) -> list[str]:
     if node.position:
         facts.append("at " + " ".join(f"{value:.3g}" for value in node.position))
     if node.yaw is not None:
-        facts.append(f"yaw {node.yaw:.3g}")
+        facts.append(f"yaw {math.degrees(node.yaw):.4g} deg")
     facts += ["locked"] if node.locked else []
     return [safe(fact) for fact in (*facts, *(f"{key}={value}" for key, value in node.attributes.items()))]
 

@@ -69,6 +69,30 @@ _positive = _real("a positive number, metres", lambda number: number > 0)
 _share = _real("a number from 0 to 1", lambda number: 0 <= number <= 1)
 
 
+ANGLE_TEXT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(deg|degrees?|°|rad|radians?)\s*")
+
+
+def angle(value: Any) -> float:
+    """Radians from a number of radians or a text with its unit, such as `90 deg`; raises ValueError."""
+    told = value
+    if isinstance(value, str):
+        match = ANGLE_TEXT.fullmatch(value)
+        try:
+            value = float(match[1]) * (1.0 if match[2].startswith("rad") else math.pi / 180) if match else math.nan
+        except ValueError:
+            value = math.nan
+    try:
+        number = _converted(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"found {shown(told)}, allowed: radians, or degrees as in 90 deg")
+    if abs(number) > 2 * math.pi + 1e-6:
+        hint = f"; {told:g} degrees are written {told:g} deg" if isinstance(told, int | float) else ""
+        raise ValueError(f"found {shown(told)}, allowed: -2 pi to 2 pi radians{hint}")
+    return number
+
+
 def _numbers(count: int, each: Callable[[Any], float], allowed: str) -> Callable[[Any], tuple[float, ...]]:
     def check(value: Any) -> tuple[float, ...]:
         try:
@@ -180,7 +204,13 @@ Size: TypeAlias = Annotated[
     Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))
 ]
 Position: TypeAlias = Annotated[Vector | None, _optional(_numbers(3, _number, "three numbers [x, y, z], metres"))]
-Angle: TypeAlias = Annotated[float | None, _optional(_number)]
+Angle: TypeAlias = Annotated[
+    float | None,
+    _optional(angle),
+    WithJsonSchema(
+        {"anyOf": [{"type": "number"}, {"type": "string", "description": "such as 90 deg"}, {"type": "null"}]}
+    ),
+]
 Confidence: TypeAlias = Annotated[float, BeforeValidator(_share), Field(ge=0, le=1)]
 Attributes: TypeAlias = Annotated[dict[str, Scalar], BeforeValidator(_attributes)]
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]

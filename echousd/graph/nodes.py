@@ -103,7 +103,7 @@ class Node(PlainModel):
         style: objects with the same style group belong together.
         size: (x, y, z) extents in the object frame, metres, where fixed.
         position: (x, y, z) centre of the bottom face in the room frame, metres, where fixed.
-        yaw: radians about +Y, where fixed.
+        yaw: radians about +Y, where fixed (a text may be in degrees, such as `90 deg`); at 0 the front looks along +Z.
         locked: the object stays as it is when the room is generated again.
         attributes: free data, identifiers to texts, numbers or booleans.
     """

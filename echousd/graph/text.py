@@ -79,7 +79,10 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
         raise GraphError(f"room is missing, allowed: one of {types}, or a mapping with type")
     key = "nodes" if "nodes" in data else "objects"
     room = _room(data)
-    nodes = [_built(Node, fields, ("nodes", i)) for i, fields in enumerate(_objects(data.get(key), key))]
+    nodes = [
+        _built(Node, _in_radians(fields, ("nodes", i)), ("nodes", i))
+        for i, fields in enumerate(_objects(data.get(key), key))
+    ]
     stated = data.get("relations")
     if not isinstance(stated, list | None):
         raise GraphError(
@@ -171,6 +174,18 @@ def _objects(entries: Any, key: str) -> Iterator[dict[str, Any]]:
                 name = f"{name}_{counted[name]}"
             fields["name"] = name
         yield fields
+
+
+def _in_radians(fields: dict[str, Any], about: Path) -> dict[str, Any]:
+    """The fields with `yaw` for `yaw_degrees`."""
+    if "yaw_degrees" not in fields:
+        return fields
+    if "yaw" in fields:
+        raise GraphError("both yaw and yaw_degrees are given, allowed: one of them", (*about, "yaw_degrees"))
+    said = fields["yaw_degrees"]
+    if isinstance(said, bool) or not isinstance(said, int | float) or not abs(said) <= 360:
+        raise GraphError(f"yaw_degrees: found {shown(said)}, allowed: -360 to 360", (*about, "yaw_degrees"))
+    return {**{key: value for key, value in fields.items() if key != "yaw_degrees"}, "yaw": f"{said} deg"}
 
 
 def _own_name(category: str) -> str:

@@ -31,6 +31,7 @@ MAX_OBJECTS = 400  # of one room: repair and the layout's echoes grow faster tha
 def generate(
     graph: SceneGraph | str | Path,
     *,
+    room: str | None = None,
     seed: int = 0,
     shapes: str | None = None,
     model: RoomModel | str | Path | None = None,
@@ -51,6 +52,7 @@ def generate(
 
     Arguments:
         graph: the graph, or a file that holds one (stage, YAML, JSON).
+        room: prim path of one room where the file holds several.
         seed: of all randomness, 0 to 2^63 - 1; equal arguments give equal rooms.
         shapes: where geometry comes from, a name of `echousd.room.sources`: `parts`, furniture built from the model's
             descriptions, `sdf`, the model's shape branch, or plain `boxes`; None = `parts` where the model can.
@@ -88,7 +90,7 @@ def generate(
         file = Path(graph).name
         with timer.stage("read"):
             read = Path(graph)
-            graph, homeless = with_locked_places(load_graph(read), read, earlier)
+            graph, homeless = with_locked_places(load_graph(read, room), None if room else read, earlier)
     else:
         graph, homeless = with_locked_places(graph, earlier)
     if len(graph.nodes) > MAX_OBJECTS:
@@ -118,7 +120,7 @@ def generate(
         graph = with_wider_floor(graph, box_corners(*plan))
     graph = with_placed_openings(graph, plan, seed)
     made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
-    room = Room(
+    made_room = Room(
         name=graph.room.type,
         graph=graph,
         boxes=boxes,
@@ -132,5 +134,5 @@ def generate(
         options=options or RoomOptions(),
         timings=timer.seconds,
     )
-    warn_of_faults(room)
-    return room
+    warn_of_faults(made_room)
+    return made_room

@@ -69,7 +69,7 @@ def nodes(draw: st.DrawFn, name: str) -> Node:
         style=draw(st.none() | texts),
         size=draw(st.none() | st.tuples(metres, metres, metres)),
         position=draw(st.none() | st.tuples(numbers, numbers, numbers)),
-        yaw=draw(st.none() | numbers),
+        yaw=draw(st.none() | st.floats(-6.28, 6.28)),
         locked=draw(st.booleans()),
         attributes=draw(st.dictionaries(names, scalars, max_size=3)),
     )

@@ -165,7 +165,7 @@ def test_graph_shows_styles_and_attributes_as_they_are(echousd_command, tmp_path
     )
     (tmp_path / "g.json").write_text(graph.to_json())
     out = echousd_command("graph", tmp_path / "g.json").out
-    assert "a  desk  style [red]x[/]  size 1 x 2 x 3  at 0 0 1  yaw 1.5  locked  note=[bold]" in out
+    assert "a  desk  style [red]x[/]  size 1 x 2 x 3  at 0 0 1  yaw 85.94 deg  locked  note=[bold]" in out
 
 
 def test_graph_prints_the_schema(echousd_command):

@@ -176,7 +176,7 @@ def test_faults_in_yaml_name_file_and_line(tmp_path, monkeypatch, text, message)
         ('{\t"room": "study",\t"room": "bedroom"}', "x.json:1: key 'room' stands twice"),
         (
             '{"room": "study", "nodes": [{"name": "a", "category": "bed", "yaw": NaN}]}',
-            "x.json:1: object 'a': yaw: found nan, allowed: a finite number",
+            "x.json:1: object 'a': yaw: found nan, allowed: radians, or degrees as in 90 deg",
         ),
     ],
 )
@@ -253,3 +253,31 @@ def test_the_json_schema_offers_words_and_lets_aliases_pass():
     assert schema["$defs"]["Relation"]["additionalProperties"] is False
     assert node["size"]["anyOf"][0]["minItems"] == node["size"]["anyOf"][0]["maxItems"] == 3
     json.dumps(schema)
+
+
+@pytest.mark.parametrize(
+    ("written", "radians"),
+    [("yaw: 90 deg", 1.5707963), ("yaw: -45°", -0.7853982), ("yaw_degrees: 180", 3.1415927), ("yaw: 1.5 rad", 1.5)],
+)
+def test_angles_may_be_degrees(written, radians):
+    graph = SceneGraph.from_yaml(f"room: bedroom\nobjects: {{bed: {{category: bed, {written}}}}}\n")
+    assert graph.node("bed").yaw == pytest.approx(radians)
+    assert SceneGraph.from_yaml(graph.to_yaml()) == graph
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        (
+            "yaw: 90",
+            "line 2: object 'bed': yaw: found 90, allowed: -2 pi to 2 pi radians; 90 degrees are written 90 deg",
+        ),
+        ("yaw: 90 grad", "line 2: object 'bed': yaw: found '90 grad', allowed: radians, or degrees as in 90 deg"),
+        ("yaw: 1, yaw_degrees: 2", "line 2: both yaw and yaw_degrees are given, allowed: one of them"),
+        ("yaw_degrees: 400", "line 2: yaw_degrees: found 400, allowed: -360 to 360"),
+    ],
+)
+def test_angles_that_cannot_be_meant(written, said):
+    with pytest.raises(GraphError) as caught:
+        SceneGraph.from_yaml(f"room: bedroom\nobjects: {{bed: {{category: bed, {written}}}}}\n")
+    assert str(caught.value) == said

@@ -1,0 +1,182 @@
+"""Everything on a stage that has a surface, as polygons: meshes, subdivision surfaces, solids, placed instances."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from pxr import Sdf, Usd, UsdGeom
+
+from echousd.stage import values
+from echousd.stage.encoding import StageError
+from echousd.stage.subdivision import refined, smooth_normals
+
+MAX_INSTANCES = 50_000  # of one instancer
+SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
+SIDES = 32  # corners of a circle
+
+
+class SkippedForms(UserWarning):
+    """Visible prims of kinds that have no polygons here; they are left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """One visible surface.
+
+    Arguments:
+        prim: its prim, whose materials, primvars and labels count.
+        path: prim path, with the instance's number where an instancer placed it.
+        world: (4, 4) float, the prim's frame to the world of the stage, column vectors, in the stage's unit.
+        above: the instancer whose name and labels count besides those of `prim`, None where there is none.
+    """
+
+    prim: Usd.Prim
+    path: str
+    world: np.ndarray
+    above: Usd.Prim | None = None
+
+
+def forms(
+    root: Usd.Prim,
+    cache: UsdGeom.XformCache,
+    wanted: Callable[[Usd.Prim], bool],
+    others: set[Sdf.Path] | frozenset[Sdf.Path] = frozenset(),
+) -> Iterator[Form]:
+    """The surfaces at and below a prim, through instances and instancers.
+
+    Arguments:
+        wanted: whether a prim is visible and of a purpose that counts.
+        others: prims that are left out with all below them.
+
+    Warns `SkippedForms` of curves, points, volumes and the like. Raises StageError for an instancer that holds more
+    than `MAX_INSTANCES`.
+    """
+    skipped: Counter[str] = Counter()
+    first: dict[str, str] = {}
+    prims = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in prims:
+        if prim.GetPath() in others:
+            prims.PruneChildren()
+        elif prim.IsA(UsdGeom.PointInstancer):
+            prims.PruneChildren()  # prototypes are seen where they are placed
+            if wanted(prim):
+                yield from _instances(UsdGeom.PointInstancer(prim), cache, wanted)
+        elif prim.IsA(UsdGeom.Boundable) and prim.IsA(UsdGeom.Gprim) and wanted(prim):
+            if prim.IsA(UsdGeom.Mesh) or prim.GetTypeName() in SOLIDS:
+                yield Form(prim, str(prim.GetPath()), values.matrix(cache.GetLocalToWorldTransform(prim), prim))
+            else:
+                skipped[str(prim.GetTypeName())] += 1
+                first.setdefault(str(prim.GetTypeName()), str(prim.GetPath()))
+    if skipped:
+        told = ", ".join(f"{count} {kind} (such as <{first[kind]}>)" for kind, count in skipped.items())
+        warnings.warn(f"left out, as they have no polygons: {told}", SkippedForms, stacklevel=2)
+
+
+def _instances(
+    instancer: UsdGeom.PointInstancer, cache: UsdGeom.XformCache, wanted: Callable[[Usd.Prim], bool]
+) -> Iterator[Form]:
+    prim = instancer.GetPrim()
+    which = values.array(instancer.GetProtoIndicesAttr(), whole=True)
+    if len(which) > MAX_INSTANCES:
+        raise StageError(f"<{prim.GetPath()}> places {len(which)} instances, allowed: {MAX_INSTANCES}")
+    prototypes = [prim.GetStage().GetPrimAtPath(path) for path in instancer.GetPrototypesRel().GetForwardedTargets()]
+    if len(which) and (which.min() < 0 or which.max() >= len(prototypes)):
+        raise StageError(
+            f"<{prim.GetPath()}>: protoIndices reach from {which.min()} to {which.max()}, "
+            f"allowed: 0 to {len(prototypes) - 1}"
+        )
+    now = Usd.TimeCode.Default()
+    keep = UsdGeom.PointInstancer.IncludeProtoXform
+    places = instancer.ComputeInstanceTransformsAtTime(now, now, keep, UsdGeom.PointInstancer.IgnoreMask) or []
+    seen = instancer.ComputeMaskAtTime(now) or [True] * len(places)
+    own = values.matrix(cache.GetLocalToWorldTransform(prim), prim)
+    known: dict[int, list[tuple[Form, np.ndarray]]] = {}
+    for number, place in enumerate(places):
+        kind = int(which[number])
+        if not seen[number] or not prototypes[kind]:
+            continue
+        if kind not in known:  # below the prototype, relative to it
+            base = np.linalg.inv(values.matrix(cache.GetLocalToWorldTransform(prototypes[kind]), prototypes[kind]))
+            known[kind] = [(form, base @ form.world) for form in forms(prototypes[kind], cache, wanted)]
+        for form, local in known[kind]:
+            world = own @ values.matrix(place, prim) @ local
+            yield Form(form.prim, f"{prim.GetPath()}[{number}]{form.path}", world, prim)
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Polygons of a surface in its prim's own frame and unit.
+
+    Arguments:
+        points: (v, 3) float; counts: (f,) int, corners of each face; indices: (c,) int, point of each corner.
+        face: (f,) int, the face of the prim that each came from.
+        normals: (v, 3) float of a smooth surface, None where the prim says its own or has edges.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    indices: np.ndarray
+    face: np.ndarray
+    normals: np.ndarray | None = None
+
+
+def polygons(prim: Usd.Prim) -> Polygons:
+    """The polygons of a mesh (refined where it is a subdivision surface) or of one of `SOLIDS`.
+
+    Raises StageError for values of other types.
+    """
+    if not prim.IsA(UsdGeom.Mesh):
+        mesh = solid(prim)
+        count = len(mesh.faces)
+        points, faces = np.array(mesh.vertices), np.array(mesh.faces)
+        smooth = np.array(mesh.vertex_normals) if prim.GetTypeName() in ("Sphere", "Capsule") else None
+        return Polygons(points, np.full(count, 3), faces.ravel(), np.arange(count), smooth)
+    arrays = values.mesh_arrays(UsdGeom.Mesh(prim))
+    face = np.arange(len(arrays.counts))
+    if is_subdivision(prim) and (arrays.counts > 2).all() and len(face):
+        points, counts, indices, face = refined(arrays.points, arrays.counts, arrays.indices)
+        return Polygons(points, counts, indices, face, smooth_normals(points, indices))
+    return Polygons(arrays.points, arrays.counts, arrays.indices, face)
+
+
+def is_subdivision(prim: Usd.Prim) -> bool:
+    """Whether a mesh says that it is a subdivision surface (many that are none leave the scheme open)."""
+    scheme = UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr()
+    return scheme.HasAuthoredValue() and values.given(scheme) in ("catmullClark", "loop")
+
+
+def solid(prim: Usd.Prim) -> trimesh.Trimesh:
+    """One of `SOLIDS` as triangles, in the prim's own frame and unit."""
+    kind = prim.GetTypeName()
+
+    def length(name: str, default: float) -> float:
+        return max(values.number(prim.GetAttribute(name), default), 1e-9)
+
+    radius, height = (
+        length("radius", 0.5 if kind == "Capsule" else 1.0),
+        length("height", 1.0 if kind == "Capsule" else 2.0),
+    )
+    if kind == "Cube":
+        return trimesh.creation.box([length("size", 2.0)] * 3)
+    if kind == "Sphere":
+        return trimesh.creation.icosphere(3, radius)
+    if kind == "Plane":
+        x, y = length("width", 2.0) / 2, length("length", 2.0) / 2
+        mesh = trimesh.Trimesh([(-x, -y, 0), (x, -y, 0), (x, y, 0), (-x, y, 0)], [(0, 1, 2), (0, 2, 3)], process=False)
+    elif kind == "Cylinder":
+        mesh = trimesh.creation.cylinder(radius, height, sections=SIDES)
+    elif kind == "Cone":
+        mesh = trimesh.creation.cone(radius, height, sections=SIDES)
+    else:
+        mesh = trimesh.creation.capsule(height, radius, count=[SIDES, SIDES // 2])
+    mesh.apply_translation(-mesh.bounds.mean(0))  # USD's solids lie around their origin
+    axis = str(values.given(prim.GetAttribute("axis")) or "Z")
+    turn = {"X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]}.get(axis)
+    if turn is not None:
+        mesh.apply_transform(np.block([[np.array(turn, float), np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
+    return mesh

@@ -1,0 +1,132 @@
+"""Solids, instancers and subdivision surfaces are seen by pictures, glb and check as what they are."""
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Gf, Usd, UsdGeom
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.check.objects import read_contents
+from echousd.drawables import read_drawables
+from echousd.stage.forms import SkippedForms, polygons
+from echousd.stage.read import find_rooms
+from echousd.stage.subdivision import refined
+
+
+def empty():
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    return stage
+
+
+def drawn(stage):
+    """All triangles in the world, as one mesh."""
+    parts = [(d.triangles @ d.world[:3, :3].T + d.world[:3, 3]).reshape(-1, 3) for d in read_drawables(stage)]
+    points = np.concatenate(parts)
+    return trimesh.Trimesh(points, np.arange(len(points)).reshape(-1, 3), process=True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "volume", "extent"),
+    [
+        ("Cube", {"size": 2.0}, 8.0, (2, 2, 2)),
+        ("Sphere", {"radius": 1.0}, 4.19, (2, 2, 2)),
+        ("Cylinder", {"radius": 1.0, "height": 3.0, "axis": "Y"}, 9.42, (2, 3, 2)),
+        ("Cone", {"radius": 1.0, "height": 3.0, "axis": "X"}, 3.14, (3, 2, 2)),
+        ("Capsule", {"radius": 0.5, "height": 1.0, "axis": "Z"}, 1.309, (1, 1, 2)),
+    ],
+)
+def test_solids_are_drawn_as_they_are(kind, values, volume, extent):
+    stage = empty()
+    prim = getattr(UsdGeom, kind).Define(stage, "/Thing").GetPrim()
+    for name, value in values.items():
+        prim.GetAttribute(name).Set(value)
+    mesh = drawn(stage)
+    assert mesh.is_watertight
+    assert mesh.volume == pytest.approx(volume, rel=0.04)
+    np.testing.assert_allclose(mesh.extents, extent, rtol=0.02)
+    np.testing.assert_allclose(mesh.bounds.mean(0), 0, atol=0.01)
+
+
+def test_cone_points_along_its_axis():
+    stage = empty()
+    UsdGeom.Cone.Define(stage, "/Thing").CreateAxisAttr("Y")
+    points = drawn(stage).vertices
+    (tip,) = points[points[:, 1] > 0.99]
+    np.testing.assert_allclose(tip, (0, 1, 0), atol=1e-6)
+
+
+def cube(stage, path, scheme):
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreatePointsAttr(np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32))
+    mesh.CreateFaceVertexCountsAttr([4] * 6)
+    mesh.CreateFaceVertexIndicesAttr(np.ravel(quads).tolist())
+    if scheme:
+        mesh.CreateSubdivisionSchemeAttr(scheme)
+    return mesh
+
+
+def test_subdivision_surfaces_are_round_and_others_keep_their_edges():
+    for scheme, extent in (("catmullClark", 1.7), ("none", 2.0), ("", 2.0)):
+        stage = empty()
+        prim = cube(stage, "/Thing", scheme).GetPrim()
+        mesh = drawn(stage)
+        assert mesh.is_watertight
+        assert mesh.extents[0] == pytest.approx(extent, abs=0.1), scheme
+        assert len(polygons(prim).counts) == (96 if scheme == "catmullClark" else 6)
+
+
+def test_catmull_clark_on_a_flat_sheet_keeps_it_flat_and_its_border():
+    grid = np.array([(x, 0.0, z) for z in range(4) for x in range(4)])
+    quads = [(i, i + 1, i + 5, i + 4) for r in range(3) for i in range(4 * r, 4 * r + 3)]
+    points, counts, indices, face = refined(grid, np.full(9, 4), np.ravel(quads), 2)
+    np.testing.assert_allclose(points[:, 1], 0)
+    assert len(counts) == 9 * 16
+    assert np.bincount(face).tolist() == [16] * 9
+    assert np.ptp(points[indices, 0]) == pytest.approx(3.0, abs=0.2)
+
+
+def test_instancers_place_their_prototypes():
+    stage = empty()
+    instancer = UsdGeom.PointInstancer.Define(stage, "/Many")
+    UsdGeom.Cube.Define(stage, "/Many/Prototypes/Small").CreateSizeAttr(0.5)
+    instancer.CreatePrototypesRel().SetTargets(["/Many/Prototypes/Small"])
+    instancer.CreateProtoIndicesAttr([0, 0, 0])
+    instancer.CreatePositionsAttr([Gf.Vec3f(0, 0, 0), Gf.Vec3f(2, 0, 0), Gf.Vec3f(4, 0, 0)])
+    instancer.InvisId(1, Usd.TimeCode.Default())
+    assert len(list(read_drawables(stage))) == 2
+    np.testing.assert_allclose(drawn(stage).extents, (4.5, 0.5, 0.5))
+    instancer.GetProtoIndicesAttr().Set([0, 1, 0])
+    with pytest.raises(ValueError, match="</Many>: protoIndices reach from 0 to 1, allowed: 0 to 0"):
+        list(read_drawables(stage))
+
+
+def test_what_has_no_polygons_is_named():
+    stage = empty()
+    UsdGeom.Cube.Define(stage, "/Cube")
+    UsdGeom.BasisCurves.Define(stage, "/Cable")
+    with pytest.warns(SkippedForms, match="left out, as they have no polygons: 1 BasisCurves .such as </Cable>"):
+        assert len(list(read_drawables(stage))) == 1
+
+
+def test_check_measures_solids_in_the_place_of_meshes(tmp_path):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "graph.usda"))
+    ball = UsdGeom.Sphere.Define(stage, "/Room/Objects/wardrobe/Ball")
+    ball.CreateRadiusAttr(0.5)
+    ball.AddTranslateOp().Set((1.0, 0.5, 2.0))
+    (room,) = (read_contents(prims) for prims in find_rooms(stage))
+    (thing,) = room.objects
+    np.testing.assert_allclose(thing.size, (1, 1, 1), atol=0.02)
+    np.testing.assert_allclose(thing.position, (1, 0, 2), atol=0.02)
+    assert len(thing.faces) > 100  # no box
+
+
+def test_rooms_of_ours_look_as_before(tmp_path):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    names = [d.path for d in read_drawables(room.stage)]
+    assert "/Room/Objects/bed/bed_mesh" in names
+    assert len(names) == len(set(names))
