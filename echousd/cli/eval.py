@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import Console
     from torch import Tensor
 
@@ -50,6 +52,7 @@ def layout(
         typer.Option(help="Noise to begin with, on an arrangement by the room generator; 1 = noise alone."),
     ] = None,
     repair: Annotated[bool, typer.Option("--repair", help="Repair the layouts, as generate does.")] = False,
+    drafts: Annotated[int, typer.Option(help="With --repair: the best of so many layouts of each room.")] = 1,
     judge: Annotated[bool, typer.Option("--judge", help="Also: can a classifier tell them from true ones?")] = False,
     seeds: Annotated[int, typer.Option(help="Also: how different are so many layouts of one graph?")] = 0,
     model: Annotated[
@@ -72,12 +75,12 @@ def layout(
 
     found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(
-        rules, drop, seed, change, add, complete, contradictions, told=told, judge=judge, seeds=seeds
+        rules, drop, seed, change, add, complete, contradictions, told=told, judge=judge, drafts=drafts, seeds=seeds
     )
     console = Console(stderr=True, highlight=False)
     if model == "truth":
-        if seeds:
-            raise ValueError("--seeds compares several layouts of a room, the true one is one")
+        if seeds or drafts > 1:
+            raise ValueError("--seeds and --drafts need several layouts of a room, the true one is one")
         sampler = _truth(found)
     else:
         weights = None if model is None else Path(model)
@@ -98,18 +101,27 @@ def layout(
 
 
 def _repairing(rules: str) -> Finish:
-    """The repair of `generate`, for rooms as boxes."""
+    """The repair of `generate`, for rooms as boxes: the first draft without a fault, else the one with fewest."""
     from dataclasses import replace
 
+    from echomodel.rules.living import faults
     from echousd.repair.repair import repair_boxes
 
-    def finish(room: RoomBoxes, triplets: Tensor) -> RoomBoxes:
-        done = repair_boxes(
-            room.categories, room.size, room.position, room.yaw, triplets.numpy(),
-            floor_polygon=room.floor_polygon if len(room.floor_polygon) else None, height=room.height, rules=rules,
-            openings=room.openings,
-        )  # fmt: skip
-        return replace(room, size=done.size, position=done.position, yaw=done.yaw)
+    def finish(drafts: Sequence[RoomBoxes], triplets: Tensor) -> RoomBoxes:
+        found: list[tuple[int, int, RoomBoxes]] = []
+        for room in drafts:
+            floor = room.floor_polygon if len(room.floor_polygon) else None
+            done = repair_boxes(
+                room.categories, room.size, room.position, room.yaw, triplets.numpy(),
+                floor_polygon=floor, height=room.height, rules=rules, openings=room.openings,
+            )  # fmt: skip
+            made = replace(room, size=done.size, position=done.position, yaw=done.yaw)
+            wrong = len(faults(made, room.categories, floor, room.openings, triplets))
+            broken = int((done.verdict == 0).sum()) + len(done.collisions) + len(done.outside)
+            found.append((broken, wrong, made))
+            if broken + wrong == 0:
+                break
+        return min(found, key=lambda one: one[:2])[2]
 
     return finish
 

@@ -47,7 +47,7 @@ class EditedGraph:
 
 
 Sampler = Callable[[EditedGraph], Boxes]
-Finish = Callable[[RoomBoxes, Tensor], RoomBoxes]
+Finish = Callable[[Sequence[RoomBoxes], Tensor], RoomBoxes]
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,7 @@ class LayoutEvaluation:
         contradictions: keep what contradicts a changed relation, as the published evaluation does.
         scenes: scenes in a batch.
         judge: also let a judge tell the layouts, and the room generator's, from the true ones.
+        drafts: layouts of each room that `finish` chooses from.
         seeds: of the first `VARIED` rooms, layouts to compare with one another; 0 = none.
     """
 
@@ -78,6 +79,7 @@ class LayoutEvaluation:
     scenes: int = 64
     told: float | None = None
     judge: bool = False
+    drafts: int = 1
     seeds: int = 0
 
 
@@ -96,7 +98,7 @@ def evaluate_layout(
         sample: gives the N boxes of some scenes, in the order of their nodes.
         settings: rules, dropping, edits.
         progress: called with (scenes done, in all).
-        finish: what becomes of each generated room and the (e, 3) relations told of it, a repair for instance.
+        finish: what becomes of the drafts of each room and the (e, 3) relations told of it, a repair for instance.
 
     Returns:
         `rooms` scored, `settings`, `generation` (and `change`, `add`, `complete`): shares of relations kept per
@@ -125,7 +127,9 @@ def evaluate_layout(
             if mode == "generation":
                 made = _rooms_of(rooms[part], edited.graph, boxes)
                 if finish is not None:
-                    made = [finish(room, graph.triplets) for room, graph in zip(made, graphs[part], strict=True)]
+                    more = [_rooms_of(rooms[part], edited.graph, sample(edited)) for _ in range(settings.drafts - 1)]
+                    drafts = zip(made, *more, strict=True)
+                    made = [finish(d, graph.triplets) for d, graph in zip(drafts, graphs[part], strict=True)]
                     boxes = Boxes.cat([Boxes.from_room(room) for room in made])
                 drawn += made
             found.append(boxes.to("cpu"))
