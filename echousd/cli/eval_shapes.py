@@ -36,10 +36,14 @@ def shapes(
     sheet: Annotated[Path | None, typer.Option(help="Write a contact sheet of what is generated per class.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Write all figures to a JSON file.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
+    source: Annotated[
+        str | None, typer.Option("--shapes", help="parts or sdf; default: sdf where a set is named, else parts.")
+    ] = None,
 ) -> None:
     """Reconstruct held-out shapes and generate shapes for new rooms, and score both against a set.
 
-    Example: echousd eval shapes --set data/packed/shapes --rooms 12 --sheet shapes.png
+    Examples: echousd eval shapes --sheet parts.png, or
+    echousd eval shapes --shapes sdf --set data/packed/shapes --rooms 12 --sheet shapes.png
     """
     from rich.console import Console
     from rich.progress import Progress
@@ -49,6 +53,12 @@ def shapes(
     from echomodel.loading import load_model
     from echomodel.metrics.shape_evaluation import ShapeEvaluation, class_shapes, evaluate_shapes
 
+    source = source or ("parts" if meshes is None and shape_set is None else "sdf")
+    if source not in ("parts", "sdf"):
+        raise ValueError(f"--shapes is {source!r}, allowed: parts, sdf")
+    if source == "parts":
+        _parts(meshes or shape_set, model, per_class or 8, seed, steps, sheet, out, json_out=json_out)
+        return
     if (meshes is None) == (shape_set is None):
         raise ValueError("name one set to compare with: --meshes FOLDER or --set FOLDER")
     folder = meshes or shape_set
@@ -76,6 +86,56 @@ def shapes(
         typer.echo(json.dumps(result))
     else:
         _print(result)
+
+
+def _parts(
+    compared: Path | None,
+    weights: Path | None,
+    per_class: int,
+    seed: int,
+    steps: int | None,
+    sheet: Path | None,
+    out: Path | None,
+    *,
+    json_out: bool,
+) -> None:
+    """Score furniture made of parts, against a set of shapes as well where one is named."""
+    from rich.console import Console
+
+    from echomodel.data.shapeset import ShapeSet
+    from echomodel.data.sheet import contact_sheet
+    from echomodel.echo import EchoModel
+    from echomodel.metrics.parts_evaluation import PartsEvaluation, evaluate_parts
+
+    folder = compared / "shapes" if compared and (compared / "shapes").is_dir() else compared
+    shapes = None if folder is None else ShapeSet(folder)
+    settings = PartsEvaluation(per_class=per_class, seed=seed, steps=steps)
+    result, made = evaluate_parts(EchoModel.load(weights), settings, shapes)
+    if sheet is not None:
+        contact_sheet([(name, made[name]) for name in sorted(made)]).save(sheet)
+    if out is not None:
+        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+    if json_out:
+        typer.echo(json.dumps(result))
+        return
+    console, pieces, style = Console(highlight=False), result["pieces"], result["style"]
+    console.print(
+        f"{pieces['pieces']} pieces, {pieces['closed']} closed, {pieces['loose']} with a loose part, "
+        f"boxes filled to {1000 * pieces['box_error']:.2g} mm"
+    )
+    console.print(
+        f"style distance across classes: told {style['told']:.3f}, nothing told {style['untold']:.3f}, "
+        f"of other suites {style['other']:.3f}, ratio {style['ratio']:.2f}"
+    )
+    console.print(
+        f"within a class: style distance {result['diversity']['style_distance']:.3f}, "
+        f"{result['diversity']['distinct']} of {pieces['pieces']} pieces differ"
+    )
+    for name in ("sets", "shapes_sets"):
+        if "mean" in result.get(name, {}):
+            row = result[name]["mean"]
+            what = "drawn anew" if name == "sets" else result["shapes_set"]
+            console.print(f"against {what}: MMD {row['mmd']:.4f}, COV {row['cov']:.2f}, 1-NNA {row['acc']:.2f}")
 
 
 def _cleaned(shapes: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:

@@ -31,6 +31,9 @@ def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
             prim = stage.OverridePrim(f"/{asset}/{piece_name(asset, body)}")
             UsdPhysics.RigidBodyAPI.Apply(prim)
             write_mass(prim, mass)
+        # on the frame, not on the asset's root: importers take whatever bears it for a body
+        frame = stage.OverridePrim(f"/{asset}/{piece_name(asset, FRAME)}")
+        UsdPhysics.ArticulationRootAPI.Apply(frame)
         UsdGeom.Scope.Define(stage, f"/{asset}/{piece_name(asset, 'joints')}")
         for joint in geometry.joints:
             _joint(stage, asset, joint)

@@ -61,13 +61,11 @@ def _make_body(root: Usd.Prim, mass: Mass, *, articulated: bool) -> None:
         return
     variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
     for name in (ARTICULATED, STATIC):
-        variants.SetVariantSelection(name)
-        with variants.GetVariantEditContext():
-            if name == STATIC:
-                UsdPhysics.RigidBodyAPI.Apply(root)
-                write_mass(root, mass)
-            else:
-                UsdPhysics.ArticulationRootAPI.Apply(root)
+        variants.AddVariant(name)
+    variants.SetVariantSelection(STATIC)  # articulated, its bodies are those of its joints
+    with variants.GetVariantEditContext():
+        UsdPhysics.RigidBodyAPI.Apply(root)
+        write_mass(root, mass)
 
 
 def bind_contact(

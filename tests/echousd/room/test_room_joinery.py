@@ -67,3 +67,36 @@ def test_what_needs_more_boxes_than_the_budget_leaves_the_smallest_out():
     made = piece("bookshelf", np.array([2.0, 2.2, 0.35]), faces=100)
     assert made.faces <= 100
     np.testing.assert_allclose(made.mesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
+
+
+def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    import echousd
+    from echousd.graph import Node, RoomSpec, SceneGraph
+
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("chest", "dresser", size=(0.9, 1.0, 0.45)),), ())
+    room = echousd.generate(graph, seed=1)
+    assert room.provenance.shapes == "parts"
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    chest = stage.GetPrimAtPath("/Room/Objects/chest")
+    assert chest.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert not [prim for prim in Usd.PrimRange(chest) if prim.IsA(UsdPhysics.Joint)]
+
+    def faces() -> int:
+        meshes = (UsdGeom.Mesh(prim) for prim in Usd.PrimRange(chest) if prim.IsA(UsdGeom.Mesh))
+        return sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes)
+
+    fine = faces()
+    chest.GetVariantSet("LOD").SetVariantSelection("low")
+    assert faces() < fine
+    chest.GetVariantSet("articulation").SetVariantSelection("articulated")
+    assert not chest.HasAPI(UsdPhysics.RigidBodyAPI)
+    joints = [UsdPhysics.Joint(prim) for prim in Usd.PrimRange(chest) if prim.IsA(UsdPhysics.Joint)]
+    assert len(joints) >= 2
+    for joint in joints:
+        ends = [rel.GetTargets()[0] for rel in (joint.GetBody0Rel(), joint.GetBody1Rel())]
+        assert all(stage.GetPrimAtPath(end).HasAPI(UsdPhysics.RigidBodyAPI) for end in ends)
+        assert str(ends[0]).endswith("_frame")
+        slide = UsdPhysics.PrismaticJoint(joint)
+        assert 0 == slide.GetLowerLimitAttr().Get() < slide.GetUpperLimitAttr().Get() < 0.45

@@ -26,7 +26,7 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.05)]
     parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
     if style.back == "shell":
-        arms = seat + (h - seat) * (0.15 + 0.4 * style.arm_height)
+        arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
         shell = Shell(
             centre=np.array([0, seat - thick * 0.6, d * 0.15]),
             half=(w / 2, d * 0.62),
@@ -120,7 +120,7 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 half=(w / 2, d * 0.55),
                 thickness=0.05,
                 back=h - seat,
-                front=(h - seat) * 0.35,
+                front=(h - seat) * 0.6,
                 ease=2.0,
                 material="fabric",
             ),

@@ -40,7 +40,7 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
         outline = [(a, 0.0), (a * narrow, h)]
     neck = outline[-1][0]
     inner = max(thick, neck - thick)
-    reach = a + 0.9 * (neck - a)
+    reach = a + 0.9 * (neck - a) - 0.5 * thick
     high = 0.985 if kind == "dome" else 0.93
     bulb = min(0.045, 0.4 * inner, 0.3 * h)
     skin = Lathe(centre=place, profile=wall(outline, thick), squash=squash, hollow=True, material="shade", role="shade")

@@ -274,11 +274,7 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         ]
         profile = np.array(outline) * [w, h]
         bag = Lathe(profile=profile, squash=d / w, material="fabric", role="seat")
-        hollow = Ball(
-            centre=np.array([0, h * 0.42, d * 0.16]), half=np.array([w * 0.4, h * 0.2, d * 0.3]), material="fabric",
-            power=2.5, turn=rotation(x=0.25), role="seat",
-        )  # fmt: skip
-        return [bag, hollow]
+        return [bag]
     if kind == "lounger":
         return [
             Ball(

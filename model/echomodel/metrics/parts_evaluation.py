@@ -1,0 +1,167 @@
+"""Scores of furniture made of parts: do pieces hold together, share a told style, differ else, look like the class."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+import trimesh
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.data.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.data.tsdf import mesh_from_tsdf
+from echomodel.graph import GraphBatch
+from echomodel.metrics.pieces import loose_solids
+from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    from echomodel.data.shapeset import ShapeSet
+    from echomodel.echo import EchoModel
+
+POINTS = 1024
+SUITE = 4  # pieces of different classes in a suite
+Told = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class PartsEvaluation:
+    """How much to score: `per_class` pieces of every class, `suites` of four pieces; `steps`, None = the model's."""
+
+    per_class: int = 8
+    suites: int = 64
+    seed: int = 0
+    steps: int | None = None
+
+
+def evaluate_parts(
+    model: EchoModel,
+    settings: PartsEvaluation = PartsEvaluation(),
+    shapes: ShapeSet | None = None,
+    progress: Told | None = None,
+) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
+    """Generate pieces of every class and suites of classes, and score both.
+
+    Arguments:
+        model: with a furniture branch. settings: how much, and the seed.
+        shapes: set to compare with as well, of real meshes for example.
+        progress: called with (what, done, all).
+
+    Returns:
+        `pieces` (how many, closed, loose, largest error of the box), `sets` against pieces of styles drawn anew (and
+        `shapes_sets` against the set), `style` within told suites and elsewhere, `diversity` within a class; and the
+        meshes by class.
+
+    Raises ValueError for weights without a furniture branch.
+    """
+    if not model.has_furniture:
+        raise ValueError(f"the weights ({model.hash}) hold no furniture branch; name weights with --model")
+    told = progress or (lambda what, done, total: None)
+    rng = np.random.default_rng([settings.seed, 2])
+    generator = torch.Generator().manual_seed(settings.seed)
+    meshes: dict[str, list[trimesh.Trimesh]] = {}
+    fresh: dict[str, list[trimesh.Trimesh]] = {}
+    counts = {"pieces": 0, "closed": 0, "loose": 0, "box_error": 0.0}
+    spread, distinct = [], 0
+    words = [category.name for category in vocabulary().categories]
+    for number, name in enumerate(words):
+        sizes = np.stack([sample_size(name, rng) for _ in range(settings.per_class)])
+        graph = GraphBatch.pack([GraphBatch.single([number])] * settings.per_class)
+        found = _sampled(model, graph, sizes, generator, settings.steps)
+        meshes[name], fresh[name] = [], []
+        for vector, size in zip(found.numpy(), sizes, strict=True):
+            parts = solids(name, *piece_of(vector), size)
+            mesh = mesh_of(parts, size)
+            counts["pieces"] += 1
+            counts["closed"] += bool(mesh.is_watertight and mesh.is_winding_consistent)
+            counts["loose"] += bool(loose_solids(parts))
+            counts["box_error"] = max(counts["box_error"], float(np.abs(mesh.extents - size).max()))
+            meshes[name].append(mesh)
+            fresh[name].append(mesh_of(solids(name, Style.draw(rng), Choices.draw(rng), size), size))
+        apart = style_distances(found)[~torch.eye(len(found), dtype=torch.bool)]
+        spread.append(float(apart.mean()) if len(apart) else 0.0)
+        distinct += len({tuple(np.round(vector, 2)) for vector in found.numpy()})
+        told("classes", number + 1, len(words))
+    ours = _clouds(meshes)
+    result: dict = {"model": model.hash, **asdict(settings), "pieces": counts, "sets": set_scores(ours, _clouds(fresh))}
+    if shapes is not None:
+        result["shapes_set"] = str(shapes.directory)
+        result["shapes_sets"] = set_scores(ours, _references(shapes, ours, rng))
+    result["style"] = style_scores(model, settings, generator)
+    result["diversity"] = {"style_distance": float(np.mean(spread)), "distinct": distinct}
+    return result, meshes
+
+
+def style_scores(model: EchoModel, settings: PartsEvaluation, generator: torch.Generator) -> dict[str, float]:
+    """Mean style distance of pieces of different classes: told to be of one style, nothing told, of other suites.
+
+    `ratio` is the first over the last.
+    """
+    classes = len(vocabulary().categories)
+    rng = np.random.default_rng([settings.seed, 4])
+    same = vocabulary().predicate_id("same_style_as")
+    every = [(i, same, j) for i in range(SUITE) for j in range(SUITE) if i != j]
+    out: dict[str, float] = {}
+    for name, triplets in (("told", every), ("untold", [])):
+        suites = [rng.permutation(classes)[:SUITE].tolist() for _ in range(settings.suites)]
+        graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in suites])
+        words = vocabulary().categories
+        sizes = np.stack([sample_size(words[number].name, rng) for suite in suites for number in suite])
+        distance = style_distances(_sampled(model, graph, sizes, generator, settings.steps))
+        scene, category = graph.scene, graph.category
+        other_class = category[:, None] != category
+        within = (scene[:, None] == scene) & other_class
+        out[name] = float(distance[within].mean())
+        if name == "told":
+            out["other"] = float(distance[(scene[:, None] != scene) & other_class].mean())
+    return {**out, "ratio": out["told"] / max(out["other"], 1e-12)}
+
+
+def style_distances(descriptions: Tensor) -> Tensor:
+    """(N, N) in [0, 1]: mean of the share of kinds that differ and of how far the proportions lie apart.
+
+    Arguments:
+        descriptions: (N, D).
+    """
+    words, start = [], 0
+    for size in GROUPS:
+        words.append(descriptions[:, start : start + size].argmax(1))
+        start += size
+    kinds = torch.stack(words, 1)
+    differ = (kinds[:, None] != kinds).float().mean(2)
+    numbers = descriptions[:, HOT:STYLE]
+    return (differ + (numbers[:, None] - numbers).abs().mean(2) / 2) / 2
+
+
+def _sampled(
+    model: EchoModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator, steps: int | None
+) -> Tensor:
+    count = graph.num_nodes
+    boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))
+    return model.sample_furniture(graph, boxes, generator=generator, steps=steps).float().cpu()
+
+
+def _clouds(meshes: dict[str, list[trimesh.Trimesh]]) -> dict[str, np.ndarray]:
+    """Points on the surfaces in the unit box, class -> (n, POINTS, 3)."""
+    return {name: np.stack([_cloud(mesh) for mesh in found]) for name, found in meshes.items() if found}
+
+
+def _cloud(mesh: trimesh.Trimesh) -> np.ndarray:
+    unit = trimesh.Trimesh((mesh.vertices - mesh.bounds[0]) / mesh.extents - 0.5, mesh.faces, process=False)
+    return surface_points(unit, POINTS)
+
+
+def _references(shapes: ShapeSet, ours: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Shapes of a set, as many per class as were generated where it has them."""
+    found: dict[str, np.ndarray] = {}
+    for name, made in ours.items():
+        members = np.flatnonzero(shapes.category == shapes.categories.index(name))
+        chosen = rng.permutation(members)[: len(made)]
+        if len(chosen):
+            found[name] = np.stack([_cloud(mesh_from_tsdf(shapes[int(i)])) for i in chosen])
+    return found
