@@ -9,6 +9,7 @@ from pathlib import Path
 
 PYTHON_CLIENTS = {
     "blender": ("bpy==5.0.1",),
+    "mujoco": ("mujoco-usd==4.0.0",),
     "nvidia": ("usd-validation-nvidia==1.22.0", "usd-core==26.11", "numpy>=2"),
     "usd2411": ("usd-core==24.11",),
     "usd2551": ("usd-core==25.5.1",),

@@ -11,7 +11,9 @@ import pytest
 from environments import python_of, run, three
 from pxr import Usd, UsdGeom, UsdShade
 
+import echousd
 from echousd.export import export
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.stage import read_graph
 
 pytestmark = pytest.mark.clients
@@ -153,3 +155,18 @@ def test_three_loads_the_package_for_the_web(rooms: list[Path], tmp_path: Path) 
         assert (np.array(there["high"]) >= np.array(box.GetMax()) - 1e-3).all()
         np.testing.assert_allclose(there["low"], list(box.GetMin()), atol=0.25)
         np.testing.assert_allclose(there["high"], list(box.GetMax()), atol=0.25)
+
+
+def test_drawers_and_doors_open_in_mujoco_and_stay_within_their_limits(tmp_path: Path) -> None:
+    nodes = [("wardrobe", "wardrobe", (1.6, 2.1, 0.6)), ("chest", "dresser", (0.9, 1.0, 0.45))]
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.0, 4.0)), tuple(Node(name, word, size=size) for name, word, size in nodes), ()
+    )
+    room = echousd.generate(graph, seed=1).save(tmp_path / "bedroom", preview=False)
+    found = json.loads(run(python_of("mujoco"), HERE / "mujoco_drawers.py", room, tmp_path / "flat.usdc"))
+    assert max(found["settled"].values()) < 0.01
+    assert {name.split("/")[3] for name in found["opened"]} == {"wardrobe", "chest"}
+    for name, joint in found["opened"].items():
+        low, high = joint["limit"]
+        assert low - 0.01 < joint["to"] < 1.05 * high + 0.01, name
+        assert joint["to"] > 0.8 * high, name

@@ -31,6 +31,7 @@ def front(
         glazed: a pane in a frame instead of a panel.
     """
     parts: list[Solid] = []
+    face = PANEL + 0.012 * (style.fronts == "framed" and not glazed)
     xs = np.linspace(low[0], high[0], columns + 1).tolist()
     ys = np.linspace(low[1], high[1], rows + 1).tolist()
     for i in range(columns):
@@ -38,7 +39,7 @@ def front(
             x0, x1 = xs[i] + style.gap / 2, xs[i + 1] - style.gap / 2
             y0, y1 = ys[j] + style.gap / 2, ys[j + 1] - style.gap / 2
             left = i % 2 == 0 if columns > 1 else style.contrast < 0.7
-            joint = _slide(z, depth) if kind == "drawer" else _hinge(x0 if left else x1, y0, z, left=left)
+            joint = _slide(z, depth) if kind == "drawer" else _hinge(x0 if left else x1, y0, z + face, left=left)
             made: list[Solid] = [box((x0, y0, z - 0.004), (x1, y1, z + PANEL), "accent", 0.002 * style.edge, kind)]
             if glazed:
                 made = _pane(x0, x1, y0, y1, z, kind)
@@ -93,7 +94,8 @@ def _slide(z: float, depth: float) -> Joint:
 
 
 def _hinge(x: float, y: float, z: float, *, left: bool) -> Joint:
-    return Joint("door", "revolute", (0.0, -1.0 if left else 1.0, 0.0), (x, y, z + PANEL / 2), OPEN)
+    # about the front edge, so that the door swings away from its neighbour
+    return Joint("door", "revolute", (0.0, -1.0 if left else 1.0, 0.0), (x, y, z), OPEN)
 
 
 def _drawer(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> list[Solid]:

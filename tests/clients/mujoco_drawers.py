@@ -1,0 +1,43 @@
+"""Load a room's furniture with its joints in MuJoCo, let it settle, pull every drawer and door; print one JSON object.
+
+python mujoco_drawers.py ROOM.usda FLAT.usdc
+"""
+
+import json
+import sys
+
+import mujoco
+import numpy as np
+from mujoco._usd import register_plugins
+from pxr import Usd
+
+PULL, SECONDS = 8.0, 2.0  # newtons or newton metres
+
+register_plugins()
+stage = Usd.Stage.Open(sys.argv[1])
+for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren():
+    sets = prim.GetVariantSets()
+    if "articulation" in sets.GetNames():
+        sets.SetSelection("articulation", "articulated")
+stage.Flatten().Export(sys.argv[2])
+model = mujoco.MjSpec.from_file(sys.argv[2]).compile()
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+before = data.xpos.copy()
+while data.time < SECONDS:
+    mujoco.mj_step(model, data)
+moved = np.linalg.norm(data.xpos - before, axis=1)
+names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, k) for k in range(model.nbody)]
+opened = {}
+for joint in range(model.njnt):
+    if model.jnt_type[joint] not in (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)):
+        continue
+    mujoco.mj_resetData(model, data)
+    while data.time < SECONDS:
+        data.qfrc_applied[model.jnt_dofadr[joint]] = PULL
+        mujoco.mj_step(model, data)
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+    place = float(data.qpos[model.jnt_qposadr[joint]])
+    opened[name] = {"to": place, "limit": model.jnt_range[joint].tolist()}
+settled = {name: float(far) for name, far in zip(names[1:], moved[1:], strict=True)}
+sys.stdout.write(json.dumps({"settled": settled, "opened": opened}))
