@@ -59,7 +59,7 @@ def evaluate_parts(
 
     Raises ValueError for weights without a furniture branch.
     """
-    if not model.has_furniture:
+    if "furniture" not in model.branches:
         raise ValueError(f"the weights ({model.hash}) hold no furniture branch; name weights with --model")
     told = progress or (lambda what, done, total: None)
     rng = np.random.default_rng([settings.seed, 2])
