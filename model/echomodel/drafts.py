@@ -14,6 +14,7 @@ from echomodel.data.rooms.floor import Floor
 from echomodel.data.rooms.outline import floor_of
 from echomodel.floors import known
 from echomodel.graph import GraphBatch
+from echomodel.randomness import Randomness, whole_numbers
 from echomodel.rules import measured, verdicts
 from echomodel.vocabulary import vocabulary
 
@@ -34,7 +35,7 @@ class _Candidate:
     placed: int
 
 
-def drafted(graph: GraphBatch, generator: torch.Generator, *, rules: str, draws: int = 16) -> tuple[Boxes, Tensor]:
+def drafted(graph: GraphBatch, generator: Randomness, *, rules: str, draws: int = 16) -> tuple[Boxes, Tensor]:
     """Arrange the furniture of S scenes by the groups of the room generator, on their floors.
 
     Arrangements are drawn, mirrored where they still fit the floor, and equal pieces dealt to their nodes in a few
@@ -52,10 +53,10 @@ def drafted(graph: GraphBatch, generator: torch.Generator, *, rules: str, draws:
     """
     if not bool(known(graph.floor).all()):
         raise ValueError("a scene without a floor cannot be arranged")
-    seed = int(torch.randint(2**62, (1,), generator=generator))
+    scenes = graph.to("cpu").unpack()
     drawn = [
-        _scene(scene, np.random.Generator(np.random.PCG64([seed, number])), rules, draws)
-        for number, scene in enumerate(graph.to("cpu").unpack())
+        _scene(scene, np.random.Generator(np.random.PCG64(list(seed))), rules, draws)
+        for scene, seed in zip(scenes, whole_numbers(generator, len(scenes)), strict=True)
     ]
     return Boxes.cat([boxes for boxes, _ in drawn]), torch.tensor([share for _, share in drawn])
 

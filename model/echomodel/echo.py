@@ -23,6 +23,7 @@ from echomodel.compact.wholeness import group_means, merit
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, StepListener, part_of, touched_nodes
+from echomodel.randomness import Randomness
 from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample
 
@@ -94,7 +95,7 @@ class EchoModel:
         self,
         graph: GraphBatch,
         *,
-        generator: torch.Generator,
+        generator: Randomness,
         steps: int | None = None,
         sampler: Sampler | None = None,
         known: Boxes | None = None,
@@ -111,7 +112,7 @@ class EchoModel:
 
         Arguments:
             graph: S scenes, N nodes.
-            generator: source of all randomness.
+            generator: source of all randomness, or one a scene.
             steps, sampler: None = the config's.
             known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
             edit: what was changed in the graph, None = nothing.

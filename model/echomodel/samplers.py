@@ -14,7 +14,8 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, drawn_noise, expand
+from echomodel.objectives import add_noise, expand
+from echomodel.randomness import Randomness, normal
 from echomodel.schedule import alpha_sigma, sampling_levels
 
 FEWEST = 4  # steps from a draft
@@ -36,7 +37,7 @@ def ddim(
     *,
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
-    generator: torch.Generator | None = None,
+    generator: Randomness | None = None,
     progress: Progress | None = None,
 ) -> Tensor:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
@@ -56,7 +57,7 @@ def ancestral(
     *,
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
-    generator: torch.Generator | None = None,
+    generator: Randomness | None = None,
     progress: Progress | None = None,
 ) -> Tensor:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
@@ -68,7 +69,7 @@ def ancestral(
         mean = (ratio * r * r * x + b * between * clean) / (s * s)
         if end == 0:
             return mean
-        noise = drawn_noise(x, generator)
+        noise = normal(x.shape, generator, x.device, x.dtype)
         return mean + math.sqrt(max(between, 0.0)) * r / s * noise
 
     return _march(step, predict, x, levels, known, known_mask, progress)
@@ -82,7 +83,7 @@ def dpm2m(
     *,
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
-    generator: torch.Generator | None = None,
+    generator: Randomness | None = None,
     progress: Progress | None = None,
 ) -> Tensor:
     """DPM-Solver++(2M) (Lu et al. 2022, Algorithm 2), first order in the first and the last step."""
@@ -114,7 +115,7 @@ def sample(
     *,
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
-    generator: torch.Generator | None = None,
+    generator: Randomness | None = None,
     progress: Progress | None = None,
     draft: Tensor | None = None,
     start: float = 1.0,

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
+from echomodel.randomness import Randomness, normal
 
 
 def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: torch.device) -> tuple[Any, Tensor | None]:
@@ -38,11 +39,11 @@ def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: tor
 
 
 def starting_noise(
-    shape: tuple[int, ...], generator: torch.Generator, noise: Tensor | None, device: torch.device
+    shape: tuple[int, ...], generator: Randomness, noise: Tensor | None, device: torch.device
 ) -> Tensor:
     """The noise that is given, checked, or the generator's, of that shape."""
     if noise is None:
-        return torch.randn(shape, generator=generator, device=generator.device).to(device)
+        return normal(shape, generator, device)
     if tuple(noise.shape) != shape:
         raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
     bad = ~torch.isfinite(noise).all(1)
