@@ -10,6 +10,7 @@ from echousd import plugin
 plugin.register()  # first act: a stage opened before the schema is registered never learns it
 
 if TYPE_CHECKING:
+    from echousd.batches.batch import batch, generate_many
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
     from echousd.room import Room, generate
     from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
@@ -29,7 +30,9 @@ _HOME = {
     "update_graph": "echousd.stage",
     "write_graph": "echousd.stage",
     "Room": "echousd.room",
+    "batch": "echousd.batches.batch",
     "generate": "echousd.room",
+    "generate_many": "echousd.batches.batch",
 }
 __all__ = [
     "GraphError",
@@ -38,7 +41,9 @@ __all__ = [
     "Room",
     "RoomSpec",
     "SceneGraph",
+    "batch",
     "generate",
+    "generate_many",
     "read_graph",
     "read_rooms",
     "relations_from_boxes",

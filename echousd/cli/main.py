@@ -28,6 +28,7 @@ app = typer.Typer(
 TOPICS: tuple[str, ...] = (
     "graph",
     "generate",
+    "batch",
     "edit",
     "render",
     "export",

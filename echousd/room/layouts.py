@@ -75,6 +75,7 @@ def best_boxes(
     drafts: int = 1,
     repair: bool = True,
     sized: Boxes | None = None,
+    drawn: Boxes | None = None,
     steps: int | None = None,
     timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:
@@ -84,6 +85,7 @@ def best_boxes(
 
     Arguments:
         drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
+        drawn: the first draft, where it was sampled already.
         others: as `sample_boxes` and `finished_boxes`.
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
@@ -91,8 +93,10 @@ def best_boxes(
     for start, count in ((0, 1), (DRAWN_LATER, drafts - 1)):
         if count < 1 or (best is not None and not any(worth)):
             break
-        for draft in sample_boxes(
-            model, graph, seed=seed, number=number + start, count=count, steps=steps, timer=timer
+        for draft in (
+            [drawn]
+            if drawn is not None and not start
+            else sample_boxes(model, graph, seed=seed, number=number + start, count=count, steps=steps, timer=timer)
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)

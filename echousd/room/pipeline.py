@@ -23,6 +23,7 @@ from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import judgement, warn_of_faults
 
 if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
     from echomodel.protocols import RoomModel
 
 MAX_OBJECTS = 400  # of one room: repair and the layout's echoes grow faster than their number
@@ -44,6 +45,7 @@ def generate(
     faces: int = FACES,
     options: RoomOptions | None = None,
     progress: Listener | None = None,
+    drawn: Boxes | None = None,
 ) -> Room:
     """Make a room from a scene graph.
 
@@ -68,6 +70,7 @@ def generate(
         faces: face budget of each mesh.
         options: how the room is written.
         progress: called with (stage, done, total).
+        drawn: the first draft of the first layout, where it was sampled already (`echousd.room.packed`).
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -106,7 +109,9 @@ def generate(
     free, graph = proposed is not graph, proposed
     styles = style_groups(graph)
     drafts = drafts or (DRAFTS if echo.preset == "compact" else 1)
-    boxes, notes = best_boxes(echo, graph, styles, seed=seed, drafts=drafts, repair=repair, steps=steps, timer=timer)
+    boxes, notes = best_boxes(
+        echo, graph, styles, seed=seed, drafts=drafts, repair=repair, drawn=drawn, steps=steps, timer=timer
+    )
     notes = (*echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):

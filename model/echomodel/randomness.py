@@ -50,6 +50,21 @@ def normal(
     return torch.cat(drawn, dim=1).reshape(shape[0], *rest)
 
 
+def for_scenes(source: Randomness, chosen: Tensor) -> Randomness:
+    """The generators of the scenes where `chosen` (S,) bool is true; a single generator serves all."""
+    if isinstance(source, torch.Generator):
+        return source
+    kept = [number for number, wanted in enumerate(chosen.tolist()) if wanted]
+    return SceneGenerators([source.each[k] for k in kept], [source.nodes[k] for k in kept])
+
+
+def uniform(scenes: int, source: Randomness) -> Tensor:
+    """(S,) float32 in [0, 1), one for each scene."""
+    if isinstance(source, torch.Generator):
+        return torch.rand(scenes, generator=source)
+    return torch.cat([torch.rand(1, generator=generator) for generator in source.each])
+
+
 def whole_numbers(source: Randomness, scenes: int) -> list[tuple[int, int]]:
     """A seed for each scene: its number within the draw of its generator, and that draw of up to 2^62."""
     if isinstance(source, torch.Generator):

@@ -20,6 +20,7 @@ from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit, StepListener
+from echomodel.randomness import Randomness, for_scenes, uniform
 from echomodel.samplers import Predict, guided, sample
 
 TRUST = 2.0  # a draft that keeps a share of what is told is begun on with this power of it as probability
@@ -31,7 +32,7 @@ Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
 class LayoutSampling:
     """How to sample and what is given; fields as the arguments of `EchoModel.sample_layout`."""
 
-    generator: torch.Generator
+    generator: Randomness
     rules: str
     steps: int | None = None
     sampler: Sampler | None = None
@@ -64,16 +65,18 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
     open_ = told <= MOST_TOLD
     if not bool(open_.any()):
         return _denoised(model, latent, graph, how, None, 1.0)
-    draft, share = drafted(_scenes(graph, open_).to("cpu"), how.generator, rules=how.rules)
+    some = for_scenes(how.generator, open_)
+    draft, share = drafted(_scenes(graph, open_).to("cpu"), some, rules=how.rules)
     trusted = open_.clone()
-    luck = torch.rand(len(share), generator=how.generator)
+    luck = uniform(len(share), some)
     trusted[open_] = (luck < share**TRUST).to(open_.device)
     draft = draft[trusted[open_].repeat_interleave(counts[open_]).cpu()].to(graph.category.device)
     out = torch.zeros(graph.num_nodes, 7, device=graph.category.device)
     for mask, level in ((trusted, begin), (~trusted, 1.0)):
         if bool(mask.any()):
             # the same steps again for the other scenes would be told twice
-            part = replace(how, progress=how.progress if bool(mask[0]) else None)
+            own = for_scenes(how.generator, mask)
+            part = replace(how, generator=own, progress=how.progress if bool(mask[0]) else None)
             scenes = graph if bool(mask.all()) else _scenes(graph, mask)
             boxes = _denoised(model, latent, scenes, part, draft if level < 1 else None, level)
             out[mask[graph.scene]] = torch.cat([boxes.size, boxes.position, boxes.yaw[:, None]], 1)

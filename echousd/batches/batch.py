@@ -1,0 +1,224 @@
+"""`echousd.batch`: many rooms from graphs, and `generate_many`, the same in one process without a folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from echousd.batches.executor import Executor, LocalWorkers
+from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
+from echousd.batches.options import BatchRequest, as_paths, request_of
+from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
+from echousd.batches.run import Progress, Run
+from echousd.room.folder import check_writable
+from echousd.room.lock import locked
+
+if TYPE_CHECKING:
+    from echousd.graph import SceneGraph
+    from echousd.room import Room
+
+MEMORY = 4096  # MiB that a worker may hold
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """What a run left.
+
+    Arguments:
+        folder: of the run. rooms: of the shard; done, failed: of them. seconds: of this run.
+        stopped: why it ended early, "" where it did not.
+    """
+
+    folder: Path
+    rooms: int
+    done: int
+    failed: int
+    seconds: float
+    stopped: str = ""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every room is there."""
+        return self.done == self.rooms
+
+
+def batch(
+    sources: str | Path | Sequence[str | Path] = (),
+    out: str | Path = "batch",
+    *,
+    sample: Mapping[str, int] | None = None,
+    count: int = 1,
+    seed: int = 0,
+    variations: Mapping[str, Sequence[Any]] | None = None,
+    workers: int | None = None,
+    shard: tuple[int, int] = (0, 1),
+    resume: bool = False,
+    max_failures: int | None = None,
+    timeout: float | None = None,
+    until: float | None = None,
+    memory: int | None = MEMORY,
+    executor: Executor | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    **options: Any,
+) -> BatchResult:
+    """Make many rooms in one folder, each whole or not at all; a run that was ended is gone on with (`resume`).
+
+    The rooms are the same bytes for any number of workers and shards, whatever died on the way.
+
+    Arguments:
+        sources: graph files, folders, globs, JSONL or Parquet files with a graph a line.
+        out: folder of the run.
+        sample: room type -> how many graphs are drawn from the room generator.
+        count, seed: rooms of each graph, the first with this seed, the next with one more.
+        variations: option -> values, whose combinations a graph's rooms take in turn.
+        workers: processes, None = one a core. shard: (i, n), the i-th of n parts of the plan.
+        resume: go on with the run in `out`: rooms that are complete and valid stay.
+        max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
+        memory: MiB a worker; a room that needs more fails.
+        executor: runs the tasks in place of local processes.
+        progress: called after every room.
+        options: fields of `echousd.batches.options.BatchOptions`.
+
+    Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
+    """
+    given = [sources] if isinstance(sources, str | Path) else list(sources)
+    raw = {
+        "sources": as_paths(given), "sample": dict(sample or {}), "count": count, "seed": seed,
+        "options": options, "variations": {key: list(values) for key, values in (variations or {}).items()},
+    }  # fmt: skip
+    return run_batch(
+        request_of(raw, "batch"), Path(out), workers=workers, shard=shard, resume=resume, max_failures=max_failures,
+        timeout=timeout, until=until, memory=memory, executor=executor, progress=progress,
+    )  # fmt: skip
+
+
+def run_batch(
+    request: BatchRequest,
+    out: Path,
+    *,
+    workers: int | None = None,
+    shard: tuple[int, int] = (0, 1),
+    resume: bool = False,
+    max_failures: int | None = None,
+    timeout: float | None = None,
+    until: float | None = None,
+    memory: int | None = MEMORY,
+    executor: Executor | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> BatchResult:
+    """`batch` for a checked request."""
+    if not 0 <= shard[0] < shard[1]:
+        raise ValueError(f"shard is {shard[0]}/{shard[1]}, allowed: i/n with i from 0 to n - 1")
+    workers = workers or len(
+        os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    )
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"{out}: is a file, the output must be a folder")
+    check_writable(out)
+    plan = make_plan(request, weights_hash(request.options.weights))
+    place = shard_folder(out, shard)
+    with locked(place):
+        _settle(plan, out, resume=resume or shard[1] > 1)
+        valid = _valid(plan, out, shard)
+        journal = Journal(place)
+        pool = executor or LocalWorkers(min(workers, max(len(plan.entries), 1)), timeout=timeout, memory=memory)
+        run = Run(
+            plan, plan.packs(shard), valid, out, journal, workers, max_failures=max_failures, until=until, tell=progress
+        )
+        try:
+            end = run.execute(pool)
+        finally:
+            pool.close()
+            journal.close()
+    return BatchResult(out, end.total, end.done, end.failed, end.seconds, run.stopped)
+
+
+def generate_many(
+    graphs: Iterable[SceneGraph], *, seed: int = 0, seeds: Sequence[int] | None = None, **options: Any
+) -> Iterator[Room]:
+    """Rooms of many graphs in one process, as `echousd.batch` of the same graphs makes them.
+
+    Arguments:
+        graphs: taken a few at a time. seed: of every room, or `seeds`, one each.
+        options: fields of `echousd.batches.options.BatchOptions`.
+
+    Raises ValueError for the first graph that no room can be made of.
+    """
+    from echomodel.loading import load_model
+    from echousd.batches.work import Job, generated, layouts
+    from echousd.room.room import RoomOptions
+
+    request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
+    asked = request.options
+    load_model(asked.weights or None, asked.preset)
+    waiting = iter(graphs)
+    number = 0
+    while pack := [graph for _, graph in zip(range(PACK), waiting)]:  # noqa: B905  # the last pack is shorter
+        own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
+        jobs = [Job("", "", s, asked, graph.to_json()) for s, graph in zip(own, pack, strict=True)]
+        for k, (job, (text, boxes, error)) in enumerate(zip(jobs, layouts(jobs), strict=True)):
+            if error:
+                raise ValueError(f"graph {number + k}: {error}")
+            look = RoomOptions(asked.up_axis, asked.walls, asked.atlas, asked.ceiling)
+            yield generated(replace(job, text=text, boxes=boxes), look)
+        number += len(pack)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def weights_hash(weights: str) -> str:
+    """Short hash of the weights files; raises ValueError where there are none."""
+    source = Path(weights) if weights else Path(str(resources.files("echomodel") / "weights"))
+    files = sorted(source.rglob("*")) if source.is_dir() else [source]
+    found, digest = [path for path in files if path.is_file()], hashlib.sha256()
+    if not found:
+        raise ValueError(f"{source}: no weights there")
+    for path in found:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _settle(plan: Plan, out: Path, *, resume: bool) -> None:
+    """Write the plan, or make sure that the one that lies there is the same."""
+    if not (out / STATE / "plan.jsonl").is_file():
+        others = sorted(entry.name for entry in out.iterdir() if entry.name != STATE)
+        if others:
+            raise ValueError(f"{out}: holds {', '.join(others[:3])} and no run of echousd batch; choose another folder")
+        save_plan(plan, out)
+        return
+    old = load_plan(out)
+    told = difference(old, plan)
+    if told:
+        raise ValueError(f"{out}: holds a run with another plan ({told}); choose another folder")
+    if not resume:
+        raise ValueError(f"{out}: holds a run of {len(old.entries)} rooms; go on with it (--resume) or choose another")
+
+
+def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
+    """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
+    rows = read_journals(out)
+    valid = set()
+    for entry in (entry for pack in plan.packs(shard) for entry in pack):
+        row = rows.get(entry.id)
+        folder = out / entry.path
+        if row is None or row["state"] != "done":
+            continue
+        if room_digest(folder) == row["sha256"]:
+            valid.add(entry.id)
+        elif folder.is_dir():
+            aside = out / STATE / "set_aside" / f"{entry.id}_{int(row['when'])}"
+            aside.parent.mkdir(parents=True, exist_ok=True)
+            number = 0
+            while aside.exists():
+                number += 1
+                aside = aside.with_name(f"{entry.id}_{int(row['when'])}_{number}")
+            folder.rename(aside)
+    return frozenset(valid)

@@ -1,0 +1,89 @@
+"""The journal of a shard: one JSON line for every room that was made or failed, only ever appended to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from echousd.batches.plan import STATE
+from echousd.room.journal import STAGING
+from echousd.room.lock import LOCK
+
+JOURNAL = "journal.jsonl"
+
+
+class Journal:
+    """Appends lines and has them on the disk before it goes on.
+
+    Arguments:
+        folder: of the shard (`shard_folder`).
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self.path = folder / JOURNAL
+        torn = self.path.is_file() and self.path.stat().st_size and not _ends_line(self.path)
+        self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        if torn:  # of a run that was killed while it wrote: its half line is no room
+            os.write(self._file, b"\n")
+
+    def append(self, row: dict[str, Any]) -> None:
+        """Add one line; raises OSError where the disk is full, after which no half line counts."""
+        content = (json.dumps(row, sort_keys=True) + "\n").encode()
+        written = os.write(self._file, content)
+        if written != len(content):
+            raise OSError(28, "No space left on device", str(self.path))
+        os.fsync(self._file)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        os.close(self._file)
+
+
+def shard_folder(folder: Path, shard: tuple[int, int]) -> Path:
+    """Where a shard keeps its journal and its lock."""
+    return folder / STATE / f"shard_{shard[0]}_of_{shard[1]}"
+
+
+def read_journals(folder: Path) -> dict[str, dict[str, Any]]:
+    """Room id -> its last line in the journals of all shards; a room that is done stays done."""
+    found: dict[str, dict[str, Any]] = {}
+    for path in sorted((folder / STATE).glob(f"shard_*/{JOURNAL}")):
+        for row in _rows(path):
+            before = found.get(row["room"])
+            if before is None or before["when"] <= row["when"]:
+                found[row["room"]] = row
+    return found
+
+
+def room_digest(folder: Path) -> str:
+    """SHA-256 of a room's files, their paths and their bytes; "" where there is none."""
+    if not folder.is_dir():
+        return ""
+    total = hashlib.sha256()
+    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+        name = path.relative_to(folder).as_posix()
+        if name != LOCK and not name.startswith(f"{STAGING}/"):
+            total.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return total.hexdigest()
+
+
+def _rows(path: Path) -> Iterator[dict[str, Any]]:
+    with path.open("rb") as file:
+        for line in file:
+            try:
+                row = json.loads(line)
+            except ValueError:
+                continue  # torn by a kill or a power cut
+            if isinstance(row, dict) and isinstance(row.get("room"), str) and isinstance(row.get("when"), int | float):
+                yield row
+
+
+def _ends_line(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read(1) == b"\n"

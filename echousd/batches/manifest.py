@@ -1,0 +1,93 @@
+"""The manifest of a run: one row a room as JSON lines, and as Parquet where pyarrow is installed; a summary."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from echomodel.files import whole_file
+from echousd.batches.journal import read_journals
+from echousd.batches.plan import Plan
+
+MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
+
+# column -> what it is where a room has none; the order is that of the manifest
+COLUMNS: dict[str, Any] = {
+    "id": "", "state": "missing", "source": "", "seed": 0, "type": "", "graph": "", "weights": "", "version": "",
+    "shapes": "", "root": "", "bounds": [], "objects": 0, "categories": {}, "relations_asked": 0,
+    "relations_kept": 0, "living_faults": [], "collisions": 0, "check": False, "faces": 0, "bytes": 0,
+    "licences": [], "sha256": "", "seconds": 0.0, "error": "",
+}  # fmt: skip
+
+
+def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
+    """One row for every room of the plan, whatever became of it; `root` is relative to the run's folder."""
+    journals = read_journals(folder)
+    for entry in plan.entries:
+        found = journals.get(entry.id, {})
+        row = {name: found.get(name, default) for name, default in COLUMNS.items()}
+        root = f"{entry.path}/{found['root']}" if found.get("root") else ""
+        given = {"id": entry.id, "source": entry.origin, "seed": entry.seed, "version": plan.head["version"]}
+        yield {**row, **given, "root": root}
+
+
+def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """The manifest in a few numbers."""
+    states, kinds, errors, sums = Counter[str](), Counter[str](), Counter[str](), Counter[str]()
+    for row in rows:
+        states[row["state"]] += 1
+        if row["state"] == "failed":
+            errors[row["error"][:120]] += 1
+        if row["state"] != "done":
+            continue
+        kinds[row["type"]] += 1
+        for name in ("objects", "relations_asked", "relations_kept", "collisions", "faces", "bytes", "seconds"):
+            sums[name] += row[name]
+        sums["living_faults"] += len(row["living_faults"])
+        sums["passed_check"] += row["check"]
+    return {
+        "rooms": sum(states.values()),
+        **{state: states[state] for state in ("done", "failed", "missing")},
+        "types": dict(sorted(kinds.items())),
+        **{name: round(value, 2) if isinstance(value, float) else value for name, value in sorted(sums.items())},
+        "errors": dict(errors.most_common(20)),
+    }
+
+
+def write_manifest(plan: Plan, folder: Path) -> dict[str, Any]:
+    """Write `manifest.jsonl`, `manifest.parquet` (extra `batch`) and `summary.json`, and return the summary.
+
+    Parquet holds categories as JSON text, so that every run has the same columns.
+    """
+    with whole_file(folder / MANIFEST) as beside, beside.open("w", encoding="utf-8") as file:
+        file.writelines(json.dumps(row) + "\n" for row in manifest_rows(plan, folder))
+    _write_table(plan, folder)
+    found = summary(manifest_rows(plan, folder))
+    with whole_file(folder / SUMMARY) as beside:
+        beside.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    return found
+
+
+def _write_table(plan: Plan, folder: Path) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet as parquet
+    except ImportError:
+        return
+    texts, numbers = pyarrow.list_(pyarrow.string()), pyarrow.list_(pyarrow.float64())
+    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
+    special = {"bounds": numbers, "categories": pyarrow.string(), "seed": pyarrow.int64()}
+    schema = pyarrow.schema(
+        [(name, special.get(name, kinds.get(type(value), texts))) for name, value in COLUMNS.items()]
+    )
+    with whole_file(folder / TABLE) as beside, parquet.ParquetWriter(beside, schema) as writer:
+        rows = []
+        for row in manifest_rows(plan, folder):
+            rows.append({**row, "categories": json.dumps(row["categories"])})
+            if len(rows) == 10000:
+                writer.write_table(pyarrow.Table.from_pylist(rows, schema))
+                rows = []
+        writer.write_table(pyarrow.Table.from_pylist(rows, schema))

@@ -1,0 +1,118 @@
+"""What a run of many rooms is asked: options of every room, variations, and the file `batch.toml` that holds it all."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from echousd.room.manifest import MAX_SEED
+
+
+class BatchOptions(BaseModel):
+    """Options of every room; those of `echousd.generate` and `RoomOptions`, and how rooms are drawn and shown.
+
+    Arguments:
+        relations: relations an object that are told of a room drawn from the room generator (`sample`).
+        preview: draw a picture of every room (needs the extra `render`).
+        weights: weights file or folder, "" for those that ship.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    shapes: str | None = None
+    preset: str | None = None
+    weights: str = ""
+    repair: bool = True
+    layouts: Annotated[int, Field(ge=1, le=1000)] = 1
+    drafts: Annotated[int, Field(ge=1, le=64)] | None = None
+    steps: Annotated[int, Field(ge=1)] | None = None
+    faces: Annotated[int, Field(ge=100)] = 5000
+    up_axis: str = "Y"
+    walls: bool = True
+    ceiling: bool = False
+    atlas: bool = False
+    preview: bool = True
+    relations: Annotated[float, Field(ge=0, le=20)] = 1.5
+
+
+class BatchRequest(BaseModel):
+    """One run: what `batch.toml` holds, field by field.
+
+    Arguments:
+        sources: graph files, folders, globs, JSONL or Parquet files of graphs.
+        sample: room type -> how many graphs of that type are drawn from the room generator.
+        count: rooms of every graph of the sources; seed: of the first, the next one's is one more.
+        options: of every room. variations: option -> values; a graph's rooms take the combinations in turn.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    sources: list[str] = []
+    sample: dict[str, Annotated[int, Field(ge=1)]] = {}
+    count: Annotated[int, Field(ge=1)] = 1
+    seed: Annotated[int, Field(ge=0, le=MAX_SEED)] = 0
+    options: BatchOptions = BatchOptions()
+    variations: dict[str, list[Any]] = {}
+
+    def chosen(self, copy: int) -> BatchOptions:
+        """The options of the room number `copy` of a graph."""
+        combinations = list(itertools.product(*self.variations.values()))
+        values = combinations[copy % len(combinations)]
+        return BatchOptions(**{**self.options.model_dump(), **dict(zip(self.variations, values, strict=True))})
+
+
+def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
+    """A checked request; raises ValueError that names `where`, the field, what was found and what is allowed."""
+    try:
+        request = BatchRequest.model_validate(dict(raw))
+        if not all(request.variations.values()):
+            raise ValueError(f"{where}: variations: an empty list, allowed: at least one value of each option")
+        for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):
+            request.chosen(copy)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in first["loc"])
+        allowed = first["msg"]
+        if first["type"] == "extra_forbidden":
+            known = BatchOptions if field.startswith(("options.", *BatchOptions.model_fields)) else BatchRequest
+            allowed = f"unknown field, allowed: {', '.join(known.model_fields)}"
+        raise ValueError(f"{where}: {field} is {first['input']!r:.80} ({allowed})") from None
+    if not request.sources and not request.sample:
+        raise ValueError(f"{where}: neither sources nor a sample; name graph files, or --sample bedroom:20")
+    return request
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The fields of a `batch.toml`; its sources are relative to it. Raises ValueError naming the file."""
+    try:
+        raw = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read as TOML ({error})") from None
+    sources = raw.get("sources", [])
+    if isinstance(sources, list) and all(isinstance(source, str) for source in sources):
+        raw["sources"] = [str(path.parent / source) for source in sources]
+    return raw
+
+
+def parse_sample(text: str) -> dict[str, int]:
+    """`bedroom:500,living_room:300` as counts; raises ValueError."""
+    from echomodel.vocabulary import vocabulary
+
+    found: dict[str, int] = {}
+    for part in filter(None, text.split(",")):
+        word, _, number = part.partition(":")
+        if not number.isascii() or not number.isdigit() or not 0 < int(number) <= 10**7:
+            raise ValueError(f"--sample is {part!r}, allowed: a room type and a count, such as bedroom:500")
+        kind = vocabulary().room_type(word.strip()).name
+        found[kind] = found.get(kind, 0) + int(number)
+    return found
+
+
+def as_paths(sources: Sequence[str | Path]) -> list[str]:
+    """Sources as texts with forward slashes."""
+    return [Path(source).as_posix() for source in sources]

@@ -1,0 +1,175 @@
+"""The plan of a run: every room's id, graph, seed and options, written down before the first room is made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import echousd
+from echomodel.files import whole_file
+from echousd.batches.options import BatchOptions, BatchRequest
+from echousd.batches.sources import find_graphs
+
+STATE = ".batch"  # folder of plan and journals
+PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
+PACK = 8  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
+SHELF = 1000  # rooms in one folder
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One room of the plan.
+
+    Arguments:
+        number: from 0; id: name of its folder and root layer.
+        origin: where its graph comes from; graph: digest of the graph's text, "" for one that is drawn.
+        draw: (room type, seed, number) of a graph from the room generator, or None.
+        seed: of the room. options: which of the plan's sets of options it takes.
+        error: why its graph cannot be read.
+    """
+
+    number: int
+    id: str
+    origin: str
+    graph: str
+    seed: int
+    options: int = 0
+    draw: tuple[str, int, int] | None = None
+    error: str = ""
+
+    @property
+    def path(self) -> str:
+        """Folder of the room below that of the run."""
+        return f"rooms/{self.number // SHELF:04d}/{self.id}"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All rooms of a run.
+
+    Arguments:
+        head: version, hash of the weights, the request: what must be equal for a run to be gone on with.
+        options: the sets of options. entries: the rooms. graphs: digest -> canonical JSON of a graph.
+    """
+
+    head: dict[str, Any]
+    options: tuple[BatchOptions, ...]
+    entries: tuple[Entry, ...]
+    graphs: dict[str, str]
+
+    @cached_property
+    def digest(self) -> str:
+        """Hash of all of it."""
+        found = hashlib.sha256()
+        for line in self.lines():
+            found.update(line.encode())
+        return found.hexdigest()[:16]
+
+    def lines(self) -> Iterator[str]:
+        """The plan as JSON lines, the head first."""
+        head = {**self.head, "sets": [options.model_dump() for options in self.options]}
+        yield json.dumps(head, sort_keys=True) + "\n"
+        for entry in self.entries:
+            yield json.dumps(asdict(entry)) + "\n"
+
+    def packs(self, shard: tuple[int, int] = (0, 1)) -> list[tuple[Entry, ...]]:
+        """Rooms whose layouts are sampled together; shard i of n takes every n-th pack from number i on."""
+        groups = [self.entries[start : start + PACK] for start in range(0, len(self.entries), PACK)]
+        return groups[shard[0] :: shard[1]]
+
+
+def make_plan(request: BatchRequest, weights: str) -> Plan:
+    """The plan of a request; the same for the same request, files and weights."""
+    sets: dict[BatchOptions, int] = {}
+    entries: list[Entry] = []
+    graphs: dict[str, str] = {}
+
+    def add(name: str, origin: str, digest: str, copy: int, draw: Any = None, error: str = "") -> None:
+        number = len(entries)
+        chosen = sets.setdefault(request.chosen(copy), len(sets))
+        seed = request.seed + copy
+        entries.append(Entry(number, f"{_word(name)}_{number:06d}", origin, digest, seed, chosen, draw, error))
+
+    for found in find_graphs(request.sources):
+        digest = hashlib.sha256(found.text.encode()).hexdigest()[:16] if found.text else ""
+        if digest:
+            graphs[digest] = found.text
+        for copy in range(request.count):
+            add(found.name, found.origin, digest, copy, error=found.error)
+    for kind, count in request.sample.items():
+        for copy in range(count):
+            add(kind, f"sample:{kind}:{copy}", "", copy, (kind, request.seed, copy))
+    head = {
+        "echousd_batch": 1,
+        "version": echousd.__version__,
+        "weights": weights,
+        "pack": PACK,
+        "rooms": len(entries),
+        "request": request.model_dump(),
+    }
+    return Plan(head, tuple(sets), tuple(entries), graphs)
+
+
+def save_plan(plan: Plan, folder: Path) -> None:
+    """Write the plan and its graphs, each whole or not at all; the plan last."""
+    state = folder / STATE
+    state.mkdir(parents=True, exist_ok=True)
+    with whole_file(state / GRAPHS) as beside, beside.open("w", encoding="utf-8") as file:
+        file.writelines(json.dumps({"graph": key, "text": text}) + "\n" for key, text in plan.graphs.items())
+    with whole_file(state / PLAN) as beside, beside.open("w", encoding="utf-8") as file:
+        file.writelines(plan.lines())
+
+
+def load_plan(folder: Path) -> Plan:
+    """The plan of the run in `folder`; raises ValueError where there is none or it cannot be read."""
+    path = folder / STATE / PLAN
+    if not path.is_file():
+        raise ValueError(f"{folder}: no run of echousd batch (no {STATE}/{PLAN})")
+    try:
+        with path.open(encoding="utf-8") as file:
+            head = json.loads(next(file))
+            sets = tuple(BatchOptions(**raw) for raw in head.pop("sets"))
+            entries = tuple(_entry(json.loads(line)) for line in file)
+        with (folder / STATE / GRAPHS).open(encoding="utf-8") as file:
+            graphs = {row["graph"]: row["text"] for row in map(json.loads, file)}
+        if head["echousd_batch"] != 1 or head["rooms"] != len(entries):
+            raise ValueError("it is not whole")
+    except (OSError, StopIteration, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: not a plan of this version ({error})") from None
+    return Plan(head, sets, entries, graphs)
+
+
+def difference(old: Plan, new: Plan) -> str:
+    """What the new plan says otherwise, in one line; "" where both are equal."""
+    if old.digest == new.digest:
+        return ""
+    told = [f"{key} was {a}, now {b}" for key, a, b in _unequal(old.head, new.head)]
+    if not told:
+        changed = [(a, b) for a, b in zip(old.entries, new.entries, strict=False) if a != b]
+        told = [f"{len(changed)} graphs changed, the first of {changed[0][0].origin}" if changed else "other rooms"]
+    return "; ".join(told[:4])
+
+
+def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in sorted(old.keys() | new.keys(), key=str):
+            yield from _unequal(old.get(key), new.get(key), f"{where}.{key}" if where else str(key))
+    elif old != new:
+        yield where.removeprefix("request."), json.dumps(old), json.dumps(new)
+
+
+def _entry(raw: dict[str, Any]) -> Entry:
+    draw = raw.pop("draw")
+    return Entry(**raw, draw=tuple(draw) if draw else None)
+
+
+def _word(name: str) -> str:
+    """A file's name as the beginning of an identifier of bounded length."""
+    from echousd.room.save import identifier
+
+    return identifier(name)[:60]

@@ -1,0 +1,182 @@
+"""A run: the plan's packs through the network, the rooms through the workers, a line in the journal for each."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from echousd.batches import work
+from echousd.batches.executor import Executor, Outcome, Task
+from echousd.batches.journal import Journal
+from echousd.batches.plan import PACK, Entry, Plan
+
+TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
+FULL = "No space left on device"
+
+
+@dataclass
+class Progress:
+    """How far a run is.
+
+    Arguments:
+        total: rooms of the shard; done, failed: of them, earlier runs included.
+        seconds: since this run began; made: rooms that it made. megabytes: of the workers.
+        room, error: the one that just ended.
+    """
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    made: int = 0
+    seconds: float = 0.0
+    megabytes: float = 0.0
+    room: str = ""
+    error: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Rooms a second of this run."""
+        return (self.made + self.failed) / self.seconds if self.seconds > 0 else 0.0
+
+    @property
+    def left(self) -> float | None:
+        """Seconds to go, None while nobody knows."""
+        rest = self.total - self.done - self.failed
+        return rest / self.rate if self.rate > 0 else None
+
+
+@dataclass
+class Run:
+    """One shard of a plan on an executor.
+
+    Arguments:
+        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid.
+        folder: of the run. journal: of the shard.
+        max_failures: failed rooms after which the run stops, None = never. until: `time.time()` at which it does.
+    """
+
+    plan: Plan
+    packs: list[tuple[Entry, ...]]
+    skip: frozenset[str]
+    folder: Path
+    journal: Journal
+    workers: int
+    max_failures: int | None = None
+    until: float | None = None
+    tell: Callable[[Progress], None] | None = None
+    stopped: str = ""
+    _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
+    _tries: dict[str, int] = field(default_factory=dict)
+    _asked: dict[str, Any] = field(default_factory=dict)
+
+    def execute(self, executor: Executor) -> Progress:
+        """Do all that is left, until it is done or something stops the run; `stopped` says what."""
+        began = time.monotonic()
+        progress = Progress(sum(map(len, self.packs)), done=len(self.skip))
+        waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
+        layouts_out = 0
+        while waiting or self._ready or self._asked:
+            self._check_stop(progress)
+            while executor.free and not self.stopped:
+                if waiting and len(self._ready) + PACK * layouts_out < 2 * self.workers:
+                    layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
+                elif self._ready:
+                    entry, job = self._ready.popleft()
+                    self._submit(executor, Task(f"room {entry.id}", work.room, job), entry)
+                else:
+                    break
+            if self.stopped and not self._asked:
+                break
+            for outcome in executor.outcomes(1.0):
+                asked = self._asked.pop(outcome.task.key)
+                if outcome.fate == "died" and self._again(outcome.task.key):
+                    self._submit(executor, outcome.task, asked)
+                elif isinstance(asked, Entry):
+                    self._ended(asked, outcome, progress)
+                else:
+                    layouts_out -= 1
+                    self._drawn(asked, outcome, progress)
+            progress.seconds, progress.megabytes = time.monotonic() - began, executor.megabytes
+            if self.tell is not None:
+                self.tell(progress)
+        return progress
+
+    def _check_stop(self, progress: Progress) -> None:
+        if self.stopped:
+            return
+        if self.max_failures is not None and progress.failed > self.max_failures:
+            self.stopped = f"{progress.failed} rooms failed, allowed: {self.max_failures}"
+        elif self.until is not None and time.time() >= self.until:
+            self.stopped = "the time is over"
+
+    def _submit_layouts(self, executor: Executor, pack: tuple[Entry, ...], progress: Progress) -> int:
+        """Begin a pack's layouts, of all its rooms, as what is sampled together is part of the plan."""
+        good = tuple(entry for entry in pack if not entry.error)
+        for entry in pack:
+            if entry.error and entry.id not in self.skip:
+                self._fail(entry, entry.error, progress)
+        if all(entry.id in self.skip for entry in good):
+            return 0
+        jobs = [self._job(entry) for entry in good]
+        self._submit(executor, Task(f"layouts {pack[0].number}", work.layouts, jobs), good)
+        return 1
+
+    def _submit(self, executor: Executor, task: Task, asked: Any) -> None:
+        self._asked[task.key] = asked
+        executor.submit(task)
+
+    def _again(self, key: str) -> bool:
+        self._tries[key] = self._tries.get(key, 1) + 1
+        return self._tries[key] <= TRIES and not self.stopped
+
+    def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: Progress) -> None:
+        """Rooms whose layouts were sampled are ready; if the pack was too much for a worker, each is tried alone."""
+        alone: list[tuple[str, Any, str]] = [("", None, "")] * len(pack)
+        found = outcome.value if outcome.fate == "done" else alone
+        for entry, (text, boxes, error) in zip(pack, found, strict=True):
+            if entry.id in self.skip:
+                continue
+            if error:
+                self._fail(entry, error, progress)
+                continue
+            self._ready.append((entry, self._job(entry, text, boxes)))
+
+    def _ended(self, entry: Entry, outcome: Outcome, progress: Progress) -> None:
+        if outcome.fate != "done":
+            if FULL in outcome.error:
+                self.stopped = f"{self.folder}: {FULL.lower()}; make room and go on with --resume"
+            self._fail(entry, outcome.error, progress)
+            return
+        row = {"room": entry.id, "state": "done", "when": round(time.time(), 3), **outcome.value}
+        if self._write(row):
+            progress.done, progress.made = progress.done + 1, progress.made + 1
+            progress.room, progress.error = entry.id, ""
+
+    def _fail(self, entry: Entry, error: str, progress: Progress) -> None:
+        row = {"room": entry.id, "state": "failed", "when": round(time.time(), 3), "error": error[:2000]}
+        if self._write(row):
+            progress.failed += 1
+            progress.room, progress.error = entry.id, error
+
+    def _write(self, row: dict[str, Any]) -> bool:
+        try:
+            self.journal.append(row)
+        except OSError as error:
+            self.stopped = f"{self.journal.path}: {(error.strerror or str(error)).lower()}; go on with --resume"
+            return False
+        return True
+
+    def _job(self, entry: Entry, text: str = "", boxes: Any = None) -> work.Job:
+        return work.Job(
+            entry.id,
+            str(self.folder / entry.path),
+            entry.seed,
+            self.plan.options[entry.options],
+            text or self.plan.graphs.get(entry.graph, ""),
+            entry.draw,
+            boxes,
+        )

@@ -1,0 +1,156 @@
+"""Graphs from files, folders, globs, JSONL, Parquet and the room generator; what cannot be read is told, not raised."""
+
+from __future__ import annotations
+
+import glob
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from echousd.graph import GraphError, SceneGraph
+from echousd.graph.files import STAGE_FORMS, TEXT_FORMS, load_graph
+
+MANY = (".jsonl", ".parquet")
+FORMS = (*TEXT_FORMS, *STAGE_FORMS)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A graph of the sources, or why there is none.
+
+    Arguments:
+        origin: file, and for many in one the line or row, or room.
+        name: what its rooms are called after.
+        text: canonical JSON of the graph, "" where it could not be read.
+        error: why not.
+    """
+
+    origin: str
+    name: str
+    text: str = ""
+    error: str = ""
+
+
+def find_graphs(sources: Sequence[str]) -> Iterator[Found]:
+    """All graphs of the sources in their order; raises ValueError for a source that matches nothing."""
+    for source in sources:
+        paths = _files(source)
+        if not paths:
+            raise ValueError(f"{source}: no graphs there; allowed: {', '.join((*FORMS, *MANY))} files, folders, globs")
+        for path in paths:
+            if path.suffix.lower() == ".jsonl":
+                yield from _lines(path)
+            elif path.suffix.lower() == ".parquet":
+                yield from _rows(path)
+            else:
+                yield from _file(path)
+
+
+def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> SceneGraph:
+    """Graph number `number` of a type from the room generator: its furniture, floor and doors, and what is told of it.
+
+    Arguments:
+        relations: relations an object, the ones that a person would write first.
+    """
+    import numpy as np
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.data.rooms import generate_room
+    from echomodel.data.rooms.generator import MIX
+    from echomodel.rules import label_relations
+    from echomodel.rules.telling import told_relations
+    from echomodel.vocabulary import vocabulary
+    from echousd.graph import Node, Relation, RoomSpec
+
+    if room_type not in MIX:
+        raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(MIX)}")
+    kind = list(MIX).index(room_type)
+    room = generate_room(np.random.Generator(np.random.PCG64([seed, kind, number])), room_type)
+    words, times = vocabulary(), dict.fromkeys(room.categories, 0)
+    names = []
+    for category in room.categories:
+        times[category] += 1
+        names.append(f"{category}_{times[category]}" if room.categories.count(category) > 1 else category)
+    nodes = tuple(
+        Node(name, category, style=f"style_{style}" if style >= 0 else None)
+        for name, category, style in zip(names, room.categories, room.styles or [-1] * len(room), strict=True)
+    )
+    edges = told_relations(
+        torch.from_numpy(label_relations(room)), Boxes.from_room(room), relations, torch.Generator().manual_seed(number)
+    ).tolist()
+    told = tuple(Relation(names[s], words.predicates[p].name, names[o]) for s, p, o in edges)
+    floor = tuple((round(float(x), 4), round(float(z), 4)) for x, z in room.floor_polygon)
+    spec = RoomSpec(room_type, floor_polygon=floor, height=round(room.height, 4), openings=room.openings)
+    return SceneGraph(spec, nodes, told)
+
+
+def _files(source: str) -> list[Path]:
+    path = Path(source)
+    if path.is_file():
+        return [path]
+    if path.is_dir():
+        return sorted(p for p in path.iterdir() if p.suffix.lower() in (*FORMS, *MANY) and p.is_file())
+    return sorted(Path(p) for p in glob.glob(source, recursive=True) if Path(p).is_file())  # noqa: PTH207
+
+
+def _file(path: Path) -> Iterator[Found]:
+    try:
+        yield Found(path.as_posix(), path.stem, load_graph(path).to_json())
+    except ValueError as error:
+        rooms = _rooms_of(path)
+        if len(rooms) < 2:
+            yield Found(path.as_posix(), path.stem, error=str(error))
+        for room in rooms if len(rooms) > 1 else ():
+            try:
+                yield Found(f"{path.as_posix()}<{room}>", path.stem, load_graph(path, room=room).to_json())
+            except ValueError as wrong:
+                yield Found(f"{path.as_posix()}<{room}>", path.stem, error=str(wrong))
+
+
+def _rooms_of(path: Path) -> list[str]:
+    """Prim paths of the rooms on a stage, none where it cannot be read."""
+    if path.suffix.lower() not in STAGE_FORMS:
+        return []
+    from echousd.stage.files import opened
+    from echousd.stage.read import find_rooms
+
+    try:
+        return [str(prims.room.GetPath()) for prims in find_rooms(opened(path))]
+    except ValueError:
+        return []
+
+
+def _lines(path: Path) -> Iterator[Found]:
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            for number, line in enumerate(file, 1):
+                if line.strip():
+                    yield _text(line, f"{path.as_posix()}:{number}", path.stem)
+    except OSError as error:
+        raise ValueError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+
+
+def _rows(path: Path) -> Iterator[Found]:
+    try:
+        import pyarrow.parquet as parquet
+    except ImportError:
+        raise ValueError(f"{path}: reading Parquet needs pyarrow (pip install 'echousd[batch]')") from None
+    try:
+        table = parquet.read_table(path, columns=["graph"])
+    except (OSError, ValueError, KeyError) as error:
+        raise ValueError(f"{path}: no Parquet file with a column 'graph' ({error})") from None
+    for number, text in enumerate(table.column("graph").to_pylist(), 1):
+        yield _text(text or "", f"{path.as_posix()}:{number}", path.stem)
+
+
+def _text(text: str, origin: str, name: str) -> Found:
+    try:
+        raw = json.loads(text)
+        inner = raw.get("graph") if isinstance(raw, dict) else None
+        if isinstance(inner, dict | str):  # a record around the graph, such as a room's manifest
+            text = inner if isinstance(inner, str) else json.dumps(inner)
+        return Found(origin, name, SceneGraph.from_json(text).to_json())
+    except (GraphError, ValueError, RecursionError) as error:
+        return Found(origin, name, error=f"{origin}: {error}")

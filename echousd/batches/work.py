@@ -1,0 +1,164 @@
+"""What workers do: layouts of a pack of rooms in one pass of the network, and one room from its boxes to its folder."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import warnings
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from echousd.batches.journal import room_digest
+from echousd.batches.options import BatchOptions
+from echousd.batches.sources import sampled_graph
+
+Rows = list[list[float]]  # of one scene: seven numbers a box
+
+
+@dataclass(frozen=True)
+class Job:
+    """One room as a worker needs it.
+
+    Arguments:
+        id: its name; folder: where it goes.
+        text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
+        seed, options: as in the plan. boxes: of its first layout, or None to sample them alone.
+    """
+
+    id: str
+    folder: str
+    seed: int
+    options: BatchOptions
+    text: str = ""
+    draw: tuple[str, int, int] | None = None
+    boxes: Rows | None = None
+
+
+def layouts(jobs: list[Job]) -> list[tuple[str, Rows | None, str]]:
+    """Text of the graph, boxes and error of every room of a pack; a room with an error has no boxes.
+
+    A graph that the network refuses does not cost the others theirs: all are sampled alone then.
+    """
+    from echomodel.loading import load_model
+    from echousd.room.packed import sample_many
+
+    graphs: dict[int, Any] = {}
+    errors: dict[int, str] = {}
+    for i, job in enumerate(jobs):
+        try:
+            graphs[i] = _checked(job)
+        except ValueError as error:
+            errors[i] = str(error)
+    rows: dict[int, Rows] = {}
+    asked = {i: (jobs[i].options.weights, jobs[i].options.preset, jobs[i].options.steps) for i in graphs}
+    for weights, preset, steps in dict.fromkeys(asked.values()):
+        same = [i for i in graphs if asked[i] == (weights, preset, steps)]
+        model = load_model(weights or None, preset)
+        try:
+            found = sample_many(model, [graphs[i] for i in same], [jobs[i].seed for i in same], steps=steps)
+            rows |= {i: _rows(boxes) for i, boxes in zip(same, found, strict=True)}
+        except ValueError:
+            for i in same:
+                try:
+                    (boxes,) = sample_many(model, [graphs[i]], [jobs[i].seed], steps=steps)
+                    rows[i] = _rows(boxes)
+                except ValueError as error:
+                    errors[i] = str(error)
+    texts = [graphs[i].to_json() if i in graphs else "" for i in range(len(jobs))]
+    return [(texts[i], rows.get(i), errors.get(i, "")) for i in range(len(jobs))]
+
+
+def room(job: Job) -> dict[str, Any]:
+    """Make, save and judge one room, and return its row of the manifest.
+
+    Raises ValueError as `generate` and `Room.save` do.
+    """
+    from echousd.room.room import RoomOptions
+
+    started = time.perf_counter()
+    made = generated(job, RoomOptions(job.options.up_axis, job.options.walls, job.options.atlas, job.options.ceiling))
+    folder = Path(job.folder)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        root = made.save(folder, preview=job.options.preview, wait=True)
+    facts = _facts(made, root)
+    facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
+    facts["seconds"] = round(time.perf_counter() - started, 3)
+    return facts
+
+
+def generated(job: Job, options: Any) -> Any:
+    """The room (`Room`) of a job."""
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echousd.room.pipeline import generate
+
+    drawn = None
+    if job.boxes is not None:
+        numbers = torch.tensor(job.boxes, dtype=torch.float32)
+        drawn = Boxes(numbers[:, :3].contiguous(), numbers[:, 3:6].contiguous(), numbers[:, 6].contiguous())
+    asked = job.options
+    return generate(
+        _checked(job), seed=job.seed, shapes=asked.shapes, model=asked.weights or None, preset=asked.preset,
+        repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
+        options=options, drawn=drawn,
+    )  # fmt: skip
+
+
+def _checked(job: Job) -> Any:
+    """The graph, if a room can be made of it; raises ValueError."""
+    from echousd.graph import SceneGraph
+    from echousd.graph.doors import check_doors
+    from echousd.graph.floors import check_space
+    from echousd.room.pipeline import MAX_OBJECTS
+
+    if job.draw is not None and not job.text:
+        graph = sampled_graph(*job.draw, job.options.relations)
+    else:
+        graph = SceneGraph.from_json(job.text)
+    if len(graph.nodes) > MAX_OBJECTS:
+        raise ValueError(f"{len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
+    check_doors(graph)
+    check_space(graph)
+    return graph
+
+
+def _rows(boxes: Any) -> Rows:
+    """float32 as the nearest Python floats, which give the same float32 again."""
+    fields = (boxes.size.tolist(), boxes.position.tolist(), boxes.yaw.tolist())
+    return [[*size, *position, yaw] for size, position, yaw in zip(*fields, strict=True)]
+
+
+def _facts(made: Any, root: Path) -> dict[str, Any]:
+    from echousd.check import check_room
+    from echousd.room.living import living_faults
+
+    report = check_room(root)
+    floor, geometry = made.floor, made.geometry
+    states = Counter(verdict.state for verdict in made.verdicts)
+    users = made.asset_users
+    low, high = floor.min(0), floor.max(0)
+    text = made.graph.to_json()
+    return {
+        "graph": hashlib.sha256(text.encode()).hexdigest()[:16],
+        "weights": made.provenance.model,
+        "shapes": made.provenance.shapes,
+        "type": made.graph.room.type,
+        "root": root.name,
+        "bounds": [round(float(v), 4) for v in (low[0], 0.0, low[1], high[0], made.height, high[1])],
+        "objects": len(made.names),
+        "categories": dict(sorted(Counter(node.category for node in made.graph.nodes).items())),
+        "relations_asked": states["kept"] + states["broken"],
+        "relations_kept": states["kept"],
+        "living_faults": [fault.sentence(made.names) for fault in living_faults(made.graph, made.boxes, floor)],
+        "collisions": len(report.collisions),
+        "check": report.ok,
+        "check_errors": [f"{fault.rule} <{fault.prim}>: {fault.message}"[:300] for fault in report.errors][:10],
+        "faces": sum(geometry[name].faces for name in users.values()),
+        "licences": sorted({geometry[name].origin.licence for name in users.values()} - {""}),
+        "bytes": sum(path.stat().st_size for path in root.parent.rglob("*") if path.is_file()),
+        "sha256": room_digest(root.parent),
+    }

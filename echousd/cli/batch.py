@@ -1,0 +1,185 @@
+"""`echousd batch`: many rooms from graphs; `status` and `verify` of such a run."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from echousd.cli.output import one_line, plain_json, say
+
+if TYPE_CHECKING:
+    from echousd.batches.run import Progress
+
+
+class _RunByDefault(TyperGroup):
+    """`echousd batch SOURCES` is `echousd batch run SOURCES`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in (*self.commands, "--help"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+batch_app = typer.Typer(cls=_RunByDefault, no_args_is_help=True)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the topic."""
+    app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
+
+
+@batch_app.command("run", epilog="Example: echousd batch samples/*.yaml -o out/night --count 20 --workers 4")
+def run(
+    sources: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Graph files, folders, globs, JSONL or Parquet of graphs, a batch.toml.", show_default=False
+        ),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the run.")] = Path("batch"),
+    sample: Annotated[str, typer.Option(help="Draw graphs, such as bedroom:500,living_room:300.")] = "",
+    count: Annotated[int | None, typer.Option(help="Rooms of each graph; default 1.", min=1)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of each graph's first room; default 0.", min=0)] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.", min=1)] = None,
+    shard: Annotated[str, typer.Option(help="Part i of n, for job arrays, such as 0/8.")] = "0/1",
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
+    max_failures: Annotated[int | None, typer.Option(help="Stop after more failed rooms than this.", min=0)] = None,
+    timeout: Annotated[float | None, typer.Option(help="Seconds a room may take.", min=0.1)] = None,
+    until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.")] = "",
+    memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", min=256)] = 4096,
+    shapes: Annotated[str | None, typer.Option(help="parts, sdf or boxes; default: the best of the model.")] = None,
+    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
+    walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
+) -> None:
+    """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
+    from echousd.batches.batch import run_batch
+    from echousd.batches.options import parse_sample, read_toml, request_of
+    from echousd.batches.verify import finish
+
+    words = list(sources or [])
+    files = [word for word in words if word.endswith(".toml")]
+    raw = read_toml(Path(files[0])) if files else {}
+    if len(files) > 1:
+        raise ValueError(f"{len(files)} .toml files, allowed: one")
+    raw["sources"] = [*raw.get("sources", []), *(word for word in words if word not in files)]
+    raw["sample"] = {**raw.get("sample", {}), **parse_sample(sample)}
+    raw |= {key: value for key, value in (("count", count), ("seed", seed)) if value is not None}
+    told = {"shapes": shapes, "weights": str(weights) if weights else None, "preview": preview, "walls": walls}
+    raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
+    request = request_of(raw, files[0] if files else "batch")
+    with _shown(json) as tell:
+        result = run_batch(
+            request, output, workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures,
+            timeout=timeout, until=_clock(until), memory=memory, progress=tell,
+        )  # fmt: skip
+    found = finish(output)
+    say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
+    say(f"run      {output}: {found['done']} of {found['rooms']} rooms; see {output / 'index.html'}", err=json)
+    if result.stopped:
+        say(f"stopped  {result.stopped}", err=json)
+    if result.failed or result.stopped:
+        raise typer.Exit(1)
+
+
+@batch_app.command("status")
+def status(
+    folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
+    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> None:
+    """How far a run is, of all its shards."""
+    from echousd.batches.verify import status as found_status
+
+    found = found_status(folder)
+    if json:
+        import json as text
+
+        typer.echo(text.dumps(plain_json(found), indent=1, allow_nan=False))
+        return
+    say(f"rooms    {found['done']} of {found['rooms']} done, {found['failed']} failed, {found['missing']} to go")
+    for error, times in found["errors"].items():
+        say(f"failed   {times} x {one_line(error)}")
+
+
+@batch_app.command("verify")
+def verify(
+    folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
+    check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
+) -> None:
+    """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
+    from echousd.batches.verify import verify as found_wrong
+
+    wrong = 0
+    for fault in found_wrong(folder, check=check):
+        wrong += 1
+        say(f"{fault.room}: {one_line(fault.problem)}")
+    if wrong:
+        raise typer.Exit(1)
+    say("every room is there and as it was made")
+
+
+def _shard(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text, re.ASCII)
+    if not found:
+        raise ValueError(f"--shard is {text!r}, allowed: i/n, such as 0/8")
+    return int(found[1]), int(found[2])
+
+
+def _clock(text: str) -> float | None:
+    """The next time that a clock shows `text`, as `time.time()` counts."""
+    if not text:
+        return None
+    found = re.fullmatch(r"(\d{1,2}):(\d\d)", text, re.ASCII)
+    if not found or int(found[1]) > 23 or int(found[2]) > 59:
+        raise ValueError(f"--until is {text!r}, allowed: a time, such as 06:30")
+    now = time.localtime()
+    seconds = (int(found[1]) - now.tm_hour) * 3600 + (int(found[2]) - now.tm_min) * 60 - now.tm_sec
+    return time.time() + (seconds if seconds > 0 else seconds + 24 * 3600)
+
+
+@contextmanager
+def _shown(json: bool) -> Iterator[Callable[[Progress], None]]:
+    """A live line on a terminal, plain lines in a log (a failure at once, else every 30 s), JSON lines if wanted."""
+    import json as text
+
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False)
+    last: dict[str, Any] = {"room": "", "when": 0.0}
+
+    def line(progress: Progress) -> str:
+        left = "" if progress.left is None else f", {progress.left / 60:.0f} min left"
+        return (
+            f"{progress.done} of {progress.total} rooms, {progress.rate:.2f} a second{left}, "
+            f"{progress.failed} failed, {progress.megabytes:.0f} MiB"
+        )
+
+    def tell(progress: Progress) -> None:
+        new = progress.room != last["room"]
+        last["room"] = progress.room
+        if json and new:
+            fields = {"room": progress.room, "error": progress.error, "done": progress.done, "failed": progress.failed}
+            rest = {"total": progress.total, "seconds": round(progress.seconds, 1), "rate": round(progress.rate, 3)}
+            typer.echo(text.dumps({**fields, **rest, "megabytes": round(progress.megabytes)}))
+        elif new and progress.error:
+            say(f"failed   {progress.room}: {one_line(progress.error)}", err=True)
+        if live is not None:
+            live.update(line(progress))
+        elif not json and time.monotonic() - last["when"] > 30:
+            last["when"] = time.monotonic()
+            say(line(progress), err=True)
+
+    live: Any = None
+    if console.is_terminal and not json:
+        with console.status("starting") as live:
+            yield tell
+        return
+    yield tell

@@ -1,0 +1,73 @@
+"""Layouts of many graphs in one pass of the network: each scene draws from its own seed, as it would alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.echo import EchoModel
+from echomodel.graph import GraphBatch
+from echomodel.randomness import SceneGenerators
+from echousd.graph import SceneGraph
+from echousd.graph.floors import with_floor
+from echousd.room.layouts import sample_boxes
+from echousd.room.progress import StageTimer
+from echousd.room.reproducible import one_thread, rounded_boxes
+from echousd.room.tensors import floor_centre, graph_batch, seeded
+
+if TYPE_CHECKING:
+    from echomodel.protocols import RoomModel
+
+NODES = 256  # of one pass of the network: larger products, bounded memory
+
+
+def sample_many(
+    model: RoomModel, graphs: Sequence[SceneGraph], seeds: Sequence[int], *, steps: int | None = None
+) -> list[Boxes]:
+    """The first draft of the first layout of every graph, as `generate` takes it (`drawn`).
+
+    A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
+    `reproducible.LENGTH`, and exactly the same for the same list of graphs and seeds.
+
+    Arguments:
+        model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
+        graphs, seeds: as many of each. steps: sampling steps, None for the model's own.
+    """
+    found: dict[int, Boxes] = {}
+    with_floors = [with_floor(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
+    together = [i for i, graph in enumerate(with_floors) if isinstance(model, EchoModel) and not _given(graph)]
+    for pack in packs(together, [len(graph.nodes) for graph in with_floors]):
+        batches = [graph_batch(with_floors[i]) for i in pack]
+        generator = SceneGenerators([seeded(seeds[i], "layout") for i in pack], [b.num_nodes for b in batches])
+        with one_thread():
+            assert isinstance(model, EchoModel)
+            drawn = model.sample_layout(GraphBatch.pack(batches), generator=generator, steps=steps)
+        rows = torch.tensor([batch.num_nodes for batch in batches]).tolist()
+        fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
+        for i, size, position, yaw in zip(pack, *fields, strict=True):
+            graph = with_floors[i]
+            found[i] = rounded_boxes(graph, Boxes(size, position + floor_centre(graph), yaw))
+    for i, graph in enumerate(with_floors):
+        if i not in found:
+            (found[i],) = sample_boxes(model, graph, seed=seeds[i], number=0, steps=steps, timer=StageTimer())
+    return [found[i] for i in range(len(graphs))]
+
+
+def packs(numbers: Iterable[int], nodes: Sequence[int], most: int = NODES) -> list[list[int]]:
+    """The numbers in their order, in groups whose nodes are at most `most` together; a larger one stands alone."""
+    out: list[list[int]] = []
+    held = 0
+    for number in numbers:
+        if not out or held + nodes[number] > most:
+            out.append([])
+            held = 0
+        out[-1].append(number)
+        held += nodes[number]
+    return out
+
+
+def _given(graph: SceneGraph) -> bool:
+    return any(None not in (node.size, node.position, node.yaw) for node in graph.nodes)

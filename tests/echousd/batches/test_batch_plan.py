@@ -1,0 +1,127 @@
+"""Plans: equal for equal requests, different in words for others; graphs from every kind of source."""
+
+import itertools
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
+from echousd.batches.options import parse_sample, read_toml, request_of
+from echousd.batches.plan import difference, load_plan, make_plan, save_plan
+from echousd.batches.sources import find_graphs, sampled_graph
+
+SAMPLES = Path(__file__).parents[3] / "samples"
+
+
+def plan_of(**raw):
+    return make_plan(request_of(raw, "test"), "abc")
+
+
+def test_a_plan_is_the_same_every_time_and_comes_back_from_the_disk(tmp_path):
+    raw = {"sources": [str(SAMPLES / "*.yaml")], "count": 2, "sample": {"bedroom": 3}}
+    plan = plan_of(**raw)
+    assert len(plan.entries) == 2 * len(list(SAMPLES.glob("*.yaml"))) + 3
+    assert len({entry.id for entry in plan.entries}) == len(plan.entries)
+    assert plan.entries[1].seed == 1
+    save_plan(plan, tmp_path)
+    assert difference(load_plan(tmp_path), plan_of(**raw)) == ""
+
+
+def test_shards_share_the_plan_out():
+    plan = plan_of(sample={"bedroom": 50})
+    parts = [[e.id for pack in plan.packs((i, 3)) for e in pack] for i in range(3)]
+    assert sorted(itertools.chain(*parts)) == sorted(entry.id for entry in plan.entries)
+
+
+def test_a_difference_is_told():
+    old, new = plan_of(sample={"bedroom": 2}), plan_of(sample={"bedroom": 2}, options={"walls": False})
+    assert difference(old, new) == "options.walls was true, now false"
+    assert "seed was 0, now 3" in difference(old, plan_of(sample={"bedroom": 2}, seed=3))
+    changed = replace(old, entries=(replace(old.entries[0], graph="beef"), *old.entries[1:]))
+    assert difference(old, changed) == "1 graphs changed, the first of sample:bedroom:0"
+
+
+def test_variations_are_taken_in_turn():
+    plan = plan_of(sample={"bedroom": 4}, variations={"walls": [True, False], "ceiling": [True, False]})
+    chosen = [plan.options[entry.options] for entry in plan.entries]
+    assert [(o.walls, o.ceiling) for o in chosen] == [(True, True), (True, False), (False, True), (False, False)]
+
+
+@pytest.mark.parametrize(
+    ("raw", "said"),
+    [
+        ({}, "neither sources nor a sample"),
+        ({"sample": {"bedroom": 0}}, "sample.bedroom is 0"),
+        ({"sample": {"bedroom": 1}, "options": {"colour": 1}}, "unknown field, allowed: shapes"),
+        ({"sample": {"bedroom": 1}, "variations": {"walls": []}}, "an empty list"),
+        ({"sample": {"bedroom": 1}, "variations": {"wall": [True]}}, "unknown field"),
+    ],
+)
+def test_a_wrong_request_is_told(raw, said):
+    with pytest.raises(ValueError, match=said):
+        request_of(raw, "batch.toml")
+
+
+def test_toml_holds_a_request(tmp_path):
+    path = tmp_path / "batch.toml"
+    path.write_text('sources = ["graphs"]\ncount = 2\n[sample]\nbedroom = 4\n[options]\nshapes = "boxes"\n')
+    request = request_of(read_toml(path), str(path))
+    assert (request.sources, request.count, request.options.shapes) == ([str(tmp_path / "graphs")], 2, "boxes")
+    path.write_text("count = ")
+    with pytest.raises(ValueError, match="cannot be read as TOML"):
+        read_toml(path)
+
+
+def test_samples_are_parsed():
+    assert parse_sample("bedroom:5,living_room:3") == {"bedroom": 5, "living_room": 3}
+    with pytest.raises(ValueError, match="--sample is 'bedroom', allowed: a room type and a count"):
+        parse_sample("bedroom")
+
+
+def test_a_poisonous_graph_is_told_and_the_others_are_read(tmp_path):
+    good = json.loads(next(find_graphs([str(SAMPLES / "bedroom.yaml")])).text)
+    path = tmp_path / "many.jsonl"
+    path.write_text("\n".join([json.dumps(good), '{"room":', json.dumps({"graph": good}), ""]))
+    first, second, third = find_graphs([str(path)])
+    assert first.text == third.text != ""
+    assert second.text == ""
+    assert f"{path}:2" in second.error
+    with pytest.raises(ValueError, match=r"no graphs there; allowed: \.yaml"):
+        list(find_graphs([str(tmp_path / "*.usda")]))
+
+
+def test_a_sampled_graph_is_a_function_of_its_numbers():
+    one = sampled_graph("bedroom", 3, 7, 1.5)
+    assert one == sampled_graph("bedroom", 3, 7, 1.5) != sampled_graph("bedroom", 3, 8, 1.5)
+    assert one.relations
+    assert one.room.floor_polygon
+    assert all(node.position is None for node in one.nodes)
+    with pytest.raises(ValueError, match="allowed: bedroom"):
+        sampled_graph("cellar", 0, 0, 1)
+
+
+def test_a_torn_line_is_no_room(tmp_path):
+    place = shard_folder(tmp_path, (0, 1))
+    journal = Journal(place)
+    journal.append({"room": "a", "when": 1, "state": "done"})
+    journal.close()
+    with (place / "journal.jsonl").open("a") as file:
+        file.write('{"room": "b", "wh')
+    journal = Journal(place)
+    journal.append({"room": "c", "when": 2, "state": "failed"})
+    journal.close()
+    assert {name: row["state"] for name, row in read_journals(tmp_path).items()} == {"a": "done", "c": "failed"}
+
+
+def test_a_room_s_digest_is_of_its_files(tmp_path):
+    room = tmp_path / "room"
+    (room / "layers").mkdir(parents=True)
+    (room / "layers" / "a.usda").write_text("a")
+    before = room_digest(room)
+    (room / ".echousd.lock").write_text("x")
+    assert room_digest(room) == before
+    (room / "layers" / "a.usda").write_text("b")
+    assert room_digest(room) != before
+    assert room_digest(tmp_path / "none") == ""
