@@ -151,7 +151,6 @@ def generate_many(
     """
     from echomodel.loading import load_model
     from echousd.batches.work import Job, generated, layouts
-    from echousd.room.room import RoomOptions
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
@@ -164,8 +163,7 @@ def generate_many(
         for k, (job, (text, boxes, error)) in enumerate(zip(jobs, layouts(jobs), strict=True)):
             if error:
                 raise ValueError(f"graph {number + k}: {error}")
-            look = RoomOptions(asked.up_axis, asked.walls, asked.atlas, asked.ceiling)
-            yield generated(replace(job, text=text, boxes=boxes), look)
+            yield generated(replace(job, text=text, boxes=boxes))
         number += len(pack)
 
 

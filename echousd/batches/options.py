@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echousd.room.manifest import MAX_SEED
+from echousd.room.room import RoomOptions
 
 
 class BatchOptions(BaseModel):
@@ -36,8 +37,14 @@ class BatchOptions(BaseModel):
     walls: bool = True
     ceiling: bool = False
     atlas: bool = False
+    dress: str = "none"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5
+
+    @property
+    def look(self) -> RoomOptions:
+        """How a room is written; raises ValueError for a word that is not allowed."""
+        return RoomOptions(self.up_axis, self.walls, self.atlas, self.ceiling, self.dress)
 
 
 class BatchRequest(BaseModel):
@@ -73,7 +80,7 @@ def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
         if not all(request.variations.values()):
             raise ValueError(f"{where}: variations: an empty list, allowed: at least one value of each option")
         for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):
-            request.chosen(copy)
+            _ = request.chosen(copy).look
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in first["loc"])

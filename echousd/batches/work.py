@@ -75,13 +75,11 @@ def room(job: Job) -> dict[str, Any]:
 
     Raises ValueError as `generate` and `Room.save` do.
     """
-    from echousd.room.room import RoomOptions
-
     started = time.perf_counter()
-    made = generated(job, RoomOptions(job.options.up_axis, job.options.walls, job.options.atlas, job.options.ceiling))
     folder = Path(job.folder)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
+        made = generated(job)
         root = made.save(folder, preview=job.options.preview, wait=True)
     facts = _facts(made, root)
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
@@ -89,7 +87,7 @@ def room(job: Job) -> dict[str, Any]:
     return facts
 
 
-def generated(job: Job, options: Any) -> Any:
+def generated(job: Job) -> Any:
     """The room (`Room`) of a job."""
     import torch
 
@@ -104,7 +102,7 @@ def generated(job: Job, options: Any) -> Any:
     return generate(
         _checked(job), seed=job.seed, shapes=asked.shapes, model=asked.weights or None, preset=asked.preset,
         repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
-        options=options, drawn=drawn,
+        options=asked.look, drawn=drawn,
     )  # fmt: skip
 
 
