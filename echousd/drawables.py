@@ -18,7 +18,8 @@ from echousd.textures import TextureError, read_image
 
 @dataclass(frozen=True)
 class Paint:
-    """A UsdPreviewSurface in short: linear colours; the colour's texture as resolved path, its shader's prim path."""
+    """A UsdPreviewSurface in short: linear colours; the colour's texture as resolved path, its shader's prim
+    path and what it is multiplied with."""
 
     name: str = "grey"
     color: tuple[float, float, float] = (0.55, 0.55, 0.55)
@@ -27,6 +28,7 @@ class Paint:
     metallic: float = 0.0
     texture: str = ""
     image: str = ""
+    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,6 +210,7 @@ def _surface(material: UsdShade.Material) -> Paint:
         return Paint()
     found: dict[str, Usd.Attribute] = {}
     texture = shown = ""
+    tint = (1.0, 1.0, 1.0)
     for name in ("diffuseColor", "emissiveColor", "roughness", "metallic"):
         source = shader.GetInput(name)
         if not source:
@@ -218,6 +221,8 @@ def _surface(material: UsdShade.Material) -> Paint:
             file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
             texture = str(file.resolvedPath) if file else ""
             shown = str(image.GetPath()) if texture else ""
+            if texture and image.GetInput("scale"):
+                tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
         elif not connected:
             found[name] = source.GetAttr()
     return Paint(
@@ -228,6 +233,7 @@ def _surface(material: UsdShade.Material) -> Paint:
         values.number(found.get("metallic"), 0.0),
         texture,
         shown,
+        tint,
     )
 
 

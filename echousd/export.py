@@ -140,7 +140,7 @@ def _pbr(paint: Paint) -> Any:
     textured = Image.open(io.BytesIO(_png(paint_image(paint)))) if paint.texture else None
     return trimesh.visual.material.PBRMaterial(
         name=paint.name,
-        baseColorFactor=[1.0, 1.0, 1.0, 1.0] if textured else [*paint.color, 1.0],
+        baseColorFactor=[*(min(c, 1.0) for c in paint.tint), 1.0] if textured else [*paint.color, 1.0],
         baseColorTexture=textured,
         metallicFactor=paint.metallic,
         roughnessFactor=paint.roughness,

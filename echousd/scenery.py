@@ -101,7 +101,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     Raises ValueError when there is no mesh to see.
     """
     parts: list[dict[str, np.ndarray]] = []
-    images: dict[str, tuple[int, np.ndarray]] = {}
+    images: dict[tuple, tuple[int, np.ndarray]] = {}
     boxes = []
     hung: list[int] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
@@ -128,10 +128,11 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
             part["texture"][faces] = -1
             if paint.texture:
-                if paint.texture not in images:
+                key = (paint.texture, paint.tint)
+                if key not in images:
                     linear = (paint_image(paint).astype(np.float32) / 255) ** 2.2
-                    images[paint.texture] = (len(images), linear)
-                part["texture"][faces] = images[paint.texture][0]
+                    images[key] = (len(images), linear * np.array(paint.tint, np.float32))
+                part["texture"][faces] = images[key][0]
         parts.append(part)
         if mesh.category not in (*SHELL, *HUNG, "rug"):
             boxes.append(_box(mesh))

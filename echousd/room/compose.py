@@ -48,19 +48,21 @@ def room_files(room: RoomData) -> dict[str, bytes]:
     for asset in small.values():
         files.update(asset.files)
     built = structure.shell_prims(room)
-    palette = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
-    files["textures/floor.png"] = materials.planks(looks.floor_color(palette), seed=room.provenance.seed)
+    harmony = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
+    slots = {slot for asset in small.values() for slot in _slots(asset)}
+    table, bindings = room_looks(room, made, built, slots, harmony)
+    files |= materials.texture_files(table, harmony)
     layers = {
         "geometry": geometry_layer(room, built),
         "graph": graph_layer(room),
         "layout": layout_layer(room),
         "physics": physics_layer(room, built),
-        "materials": materials_layer(room, made, built, {slot for asset in small.values() for slot in _slots(asset)}),
+        "materials": materials_layer(room, made, built, small, bindings, harmony),
     }
     if room.options.dress != "none":
-        looks_of = {slot: f"{ROOM_STYLE}_{slot}" for asset in small.values() for slot in _slots(asset)}
-        slots = {name: asset.slots for name, asset in small.items()}
-        layers["dressing"] = dressing_layer(dressing, slots, looks_of, layer_data(room, f"{room.name}_dressing"))
+        looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
+        parts = {name: asset.slots for name, asset in small.items()}
+        layers["dressing"] = dressing_layer(dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"))
     for name, layer in layers.items():
         files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
     files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
@@ -137,30 +139,51 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
     return stage.GetRootLayer()
 
 
-def materials_layer(
-    room: RoomData, made: Mapping[str, Asset], built: Sequence[structure.ShellPrim], small: Collection[str] = ()
-) -> Sdf.Layer:
-    """`layers/materials.usda`; `small` are the material slots of the dressing, which its own layer binds."""
-    stage = _room_stage(room, "materials")
-    stage.OverridePrim("/Room")
+def room_looks(
+    room: RoomData,
+    made: Mapping[str, Asset],
+    built: Sequence[structure.ShellPrim],
+    small: Collection[str],
+    harmony: str,
+) -> tuple[dict[str, looks.Look], dict[str, str]]:
+    """Material name -> look in a harmony, and prim path -> material name; the dressing binds its own.
+
+    Arguments:
+        made: the furniture. built: the shell. small: material slots of the dressing. harmony: of the whole room.
+    """
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}
-
+    voices = {ROOM_STYLE: 0}
     for node in room.graph.nodes:
         asset, style = room.assets[node.name], room.styles[node.name]
         slug = "".join(c if c.isalnum() else "_" for c in style)
-        palette = looks.palette_for(f"{style} {room.provenance.seed}")
+        voice = voices.setdefault(style, len(voices))
         for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", made[asset].slots).items():
             name = f"{slug}_{slot}" if slug[0].isalpha() else f"style_{slug}_{slot}"
-            table[name] = looks.look(palette, slot)
+            table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
-    own = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
-    table |= {f"{ROOM_STYLE}_{slot}": looks.look(own, slot) for slot in small}
-    boards = looks.floor_color(own)
-    table["floor"] = looks.Look(boards, 0.55, texture="../textures/floor.png")
-    table |= structure.LOOKS
+    table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
+    table |= {"floor": looks.look(harmony, "floor"), **structure.LOOKS, "wall": looks.look(harmony, "wall")}
     bindings |= {mesh.path: mesh.look for part in built for mesh in part.meshes}
-    materials.write_looks(stage, table, bindings, also=[f"{ROOM_STYLE}_{slot}" for slot in small])
+    used = {*bindings.values(), *(f"{ROOM_STYLE}_{slot}" for slot in small)}
+    return {name: look for name, look in table.items() if name in used}, bindings
+
+
+def materials_layer(
+    room: RoomData,
+    made: Mapping[str, Asset],
+    built: Sequence[structure.ShellPrim],
+    small: Mapping[str, Asset],
+    bindings: Mapping[str, str],
+    harmony: str,
+) -> Sdf.Layer:
+    """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
+    stage = _room_stage(room, "materials")
+    stage.OverridePrim("/Room")
+    slots = {slot for asset in small.values() for slot in _slots(asset)}
+    tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
+    materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
+    materials.write_palettes(stage, harmony, tables)
     return stage.GetRootLayer()
 
 

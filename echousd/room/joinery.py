@@ -16,7 +16,8 @@ SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they 
 DENSITY = {
     "wood": 600.0, "accent": 650.0, "fabric": 70.0, "metal": 2600.0, "glass": 2500.0, "ceramic": 900.0, "leaf": 120.0,
     "soil": 900.0, "shade": 150.0, "screen": 900.0, "cushion": 50.0, "linen": 60.0, "blanket": 60.0, "mirror": 2500.0,
-    "book": 650.0, "stem": 500.0, "rug": 250.0, "curtain": 120.0, "accent_cloth": 60.0, "picture": 300.0,
+    "book": 650.0, "stem": 500.0, "rug": 250.0, "curtain": 120.0, "accent_cloth": 60.0, "picture_0": 300.0,
+    "picture_1": 300.0, "picture_2": 300.0, "rug_striped": 250.0, "rug_lattice": 250.0, "accent_plain": 60.0,
     "frame": 600.0,
     "paper": 700.0, "book_a": 650.0, "book_b": 650.0, "book_c": 650.0, "book_d": 650.0, "petal": 120.0, "fruit": 800.0,
     "wax": 900.0, "wicker": 150.0, "leather": 300.0,

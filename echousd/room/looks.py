@@ -11,84 +11,40 @@ import numpy as np
 import trimesh
 
 from echomodel.vocabulary import vocabulary
+from echousd.room.finishes.harmonies import HARMONIES, Color, linear, mixed
+from echousd.room.finishes.slots import SECOND, SLOTS
 
 
 @dataclass(frozen=True)
 class Look:
-    """One UsdPreviewSurface: colours are linear RGB in [0, 1]; `texture` names an image that replaces the colour."""
+    """One UsdPreviewSurface: colours are linear RGB in [0, 1]; the pattern, if there is one, carries the colour."""
 
-    color: tuple[float, float, float]
+    color: Color
     roughness: float = 0.6
     metallic: float = 0.0
     opacity: float = 1.0
-    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    texture: str = ""
+    emissive: Color = (0.0, 0.0, 0.0)
+    pattern: str = ""
+    metres: float = 1.0
 
 
-# Colours that go together, as sRGB hex: wood, painted fronts, upholstery, bed linen, blanket, metal, ceramic.
-PALETTES: Mapping[str, tuple[str, str, str, str, str, str, str]] = {
-    "oak": ("b98f5f", "e7e1d6", "6f7f86", "ece7dd", "8c9ba0", "33353a", "d9d3c7"),
-    "walnut": ("77502f", "8a6240", "b9803a", "efe8da", "b06a43", "b08d57", "b9623f"),
-    "ash": ("d3b88f", "f0ece3", "a9b39c", "f3efe7", "8fa08a", "d0cfca", "8d9a92"),
-    "smoke": ("7d6b5b", "9a8c7f", "5d7088", "dfdcd6", "3f4f66", "9ea3a8", "3c4046"),
-    "cherry": ("83523a", "9a6446", "c9b594", "f0e9de", "93443a", "c2a15f", "e4ddd0"),
-    "birch": ("dcc39a", "cfd8d3", "c48f85", "f5f0ea", "d5a79c", "8e9498", "c9b8a6"),
-}
-
-
-def linear(hexadecimal: str) -> tuple[float, float, float]:
-    """`b98f5f` (sRGB) -> linear RGB."""
-    value = np.array([int(hexadecimal[i : i + 2], 16) for i in (0, 2, 4)]) / 255
-    value = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    red, green, blue = (round(float(v), 5) for v in value)
-    return red, green, blue
+PALETTES = HARMONIES
+GLOW = tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))  # of a lamp's shade
 
 
 @cache
-def look(palette: str, group: str) -> Look:
-    """The look of a material group in a palette; raises KeyError for unknown words."""
-    wood, front, fabric, linen, blanket, metal, ceramic = PALETTES[palette]
-    upholstery = np.array(linear(fabric))
-    cushion = tuple(round(float(c), 5) for c in 0.75 * upholstery + 0.25 * np.array(linear("f0e8da")))
-    return {
-        "wood": Look(linear(wood), 0.55),
-        "front": Look(linear(front), 0.5),
-        "fabric": Look(linear(fabric), 0.92),
-        "cushion": Look((cushion[0], cushion[1], cushion[2]), 0.92),
-        "linen": Look(linear(linen), 0.9),
-        "blanket": Look(linear(blanket), 0.95),
-        "metal": Look(linear(metal), 0.35, metallic=0.85),
-        "ceramic": Look(linear(ceramic), 0.4),
-        "leaf": Look(linear("4f7d3c"), 0.7),
-        "soil": Look(linear("4a3a2c"), 0.95),
-        "shade": Look(linear("f6e7c8"), 0.8, emissive=tuple(round(0.55 * c, 5) for c in linear("ffe2ae"))),  # type: ignore[arg-type]
-        "screen": Look(linear("15171b"), 0.12),
-        "glass": Look(linear("dfeae8"), 0.08, opacity=0.35),
-        "mirror": Look(linear("c9d2d4"), 0.05, metallic=1.0),
-        "book": Look(linear("7a4a40"), 0.8),
-        "stem": Look(linear("6b5436"), 0.85),
-        "rug": Look(linear("d9d0c0"), 0.95),
-        "curtain": Look(linear("ebe5da"), 0.9),
-        "accent_cloth": Look(linear(blanket), 0.95),
-        "picture": Look(linear("a9b0a8"), 0.8),
-        "frame": Look(linear(wood), 0.5),
-        "paper": Look(linear("f1ede4"), 0.9),
-        "book_a": Look(linear(blanket), 0.7),
-        "book_b": Look(linear("e4dccb"), 0.7),
-        "book_c": Look(linear("2f3b45"), 0.7),
-        "book_d": Look(linear("8f5a3c"), 0.7),
-        "petal": Look(linear("f0dfd5"), 0.8),
-        "fruit": Look(linear("c9862e"), 0.5),
-        "wax": Look(linear("f3eadb"), 0.5),
-        "wicker": Look(linear("b08a58"), 0.9),
-        "leather": Look(linear("5a3d2b"), 0.5),
-    }[group]
+def look(palette: str, slot: str, voice: int = 0) -> Look:
+    """The look of a material slot in a palette; raises KeyError for unknown words.
 
-
-def floor_color(palette: str) -> tuple[float, float, float]:
-    """Linear colour of floor boards that set the palette's furniture off: light below dark wood, dark below light."""
-    wood = np.array(look(palette, "wood").color)
-    return linear("c2a27c") if wood.mean() < 0.2 else linear("8d6c4d")
+    Arguments:
+        palette: a word of `HARMONIES`. slot: a word of `SLOTS`.
+        voice: odd ones take the second wood and cloth of the harmony, so that style groups can be told apart.
+    """
+    harmony, made = HARMONIES[palette], SLOTS[slot]
+    word = SECOND.get(made.color, made.color) if voice % 2 else made.color
+    color = mixed(getattr(harmony, word, word), *made.mix)
+    emissive = (GLOW[0], GLOW[1], GLOW[2]) if slot == "shade" else (0.0, 0.0, 0.0)
+    return Look(color, made.roughness, made.metallic, made.opacity, emissive, made.pattern, made.metres)
 
 
 def palette_for(key: str) -> str:

@@ -2,41 +2,66 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
-import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
+from echousd.room.finishes import baking
 from echousd.room.looks import Look
 
 LOOKS = "/Room/Looks"
+IMAGES = {"diffuseColor": "image", "normal": "normal", "roughness": "roughness"}  # input -> its image's prim
 
 
-def define_material(stage: Usd.Stage, path: str, look: Look) -> UsdShade.Material:
-    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`."""
+def texture_files(looks: Mapping[str, Look], harmony: str) -> dict[str, bytes]:
+    """Path in the room's folder -> image, for all patterns of some looks; equal ones are one file."""
+    files: dict[str, bytes] = {}
+    for look in looks.values():
+        for path, content in _images(look, harmony).values():
+            files[path] = content
+    return files
+
+
+def _images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
+    """Input of the surface -> (path, image) of a look with a pattern."""
+    if not look.pattern:
+        return {}
+    tint = harmony if look.pattern.startswith("painting_") else baking.hexadecimal(look.color)
+    found = {"diffuseColor": (f"{look.pattern}_{tint}", baking.color_image(look.pattern, look.color, harmony))}
+    normal, rough = baking.normal_image(look.pattern, look.metres), baking.rough_image(look.pattern, look.roughness)
+    if normal is not None:
+        found["normal"] = (f"{look.pattern}_{look.metres * 100:.0f}cm_normal", normal)
+    if rough is not None:
+        found["roughness"] = (f"{look.pattern}_{look.roughness * 100:.0f}_roughness", rough)
+    return {name: (f"textures/{path}.jpg", content) for name, (path, content) in found.items()}
+
+
+def define_material(
+    stage: Usd.Stage, path: str, look: Look, harmony: str = "", *, tinted: bool = False
+) -> UsdShade.Material:
+    """Author a UsdPreviewSurface material; a textured one reads `primvars:st`.
+
+    Arguments:
+        stage: receives the material. path: where. look: what it looks like.
+        harmony: whose colours its images have; "" = without images, for an asset that stands for itself.
+        tinted: leave colours to `tint_material`, which a variant calls.
+    """
     material = UsdShade.Material.Define(stage, path)
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
-    color = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
-    if look.texture:
+    images = _images(look, harmony) if harmony else {}
+    if images:
         reader = UsdShade.Shader.Define(stage, f"{path}/st")
         reader.CreateIdAttr("UsdPrimvarReader_float2")
         reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-        image = UsdShade.Shader.Define(stage, f"{path}/image")
-        image.CreateIdAttr("UsdUVTexture")
-        image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath(look.texture))
-        image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
-        image.CreateInput("fallback", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*look.color, 1.0))
-        for axis in ("wrapS", "wrapT"):
-            image.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("repeat")
-        image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
-            reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-        )
-        color.ConnectToSource(image.CreateOutput("rgb", Sdf.ValueTypeNames.Float3))
-    else:
+        coordinates = reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        for name, (file, _) in images.items():
+            _connect(stage, f"{path}/{IMAGES[name]}", file, shader, name, coordinates, look)
+    color = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+    if not images and not tinted:
         color.Set(Gf.Vec3f(*look.color))
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(look.roughness)
+    if "roughness" not in images:
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(look.roughness)
     shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(look.metallic)
     if look.opacity < 1:
         shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).Set(look.opacity)
@@ -46,12 +71,50 @@ def define_material(stage: Usd.Stage, path: str, look: Look) -> UsdShade.Materia
     return material
 
 
+def _connect(
+    stage: Usd.Stage, path: str, file: str, shader: UsdShade.Shader, name: str, st: UsdShade.Output, look: Look
+) -> None:
+    """An image that feeds one input of a surface."""
+    kinds = {"diffuseColor": Sdf.ValueTypeNames.Color3f, "normal": Sdf.ValueTypeNames.Normal3f}
+    image = UsdShade.Shader.Define(stage, path)
+    image.CreateIdAttr("UsdUVTexture")
+    image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath(f"../{file}"))
+    colored = name == "diffuseColor"
+    image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB" if colored else "raw")
+    fallback = {"diffuseColor": look.color, "normal": (0.5, 0.5, 1.0)}.get(name, (look.roughness,) * 3)
+    image.CreateInput("fallback", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*fallback, 1.0))
+    if name == "normal":
+        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(2, 2, 2, 1))
+        image.CreateInput("bias", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
+    for axis in ("wrapS", "wrapT"):
+        image.CreateInput(axis, Sdf.ValueTypeNames.Token).Set("repeat")
+    image.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(st)
+    channel, kind = ("r", Sdf.ValueTypeNames.Float) if name == "roughness" else ("rgb", Sdf.ValueTypeNames.Float3)
+    output = image.CreateOutput(channel, kind)
+    shader.CreateInput(name, kinds.get(name, Sdf.ValueTypeNames.Float)).ConnectToSource(output)
+
+
+def tint_material(stage: Usd.Stage, path: str, base: Look, look: Look) -> None:
+    """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`."""
+    if base.pattern.startswith("painting_"):
+        return
+    if base.pattern:
+        image = UsdShade.Shader(stage.OverridePrim(f"{path}/{IMAGES['diffuseColor']}"))
+        ratio = [round(b / max(a, 1e-4), 4) for a, b in zip(base.color, look.color, strict=True)]
+        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*ratio, 1.0))
+        return
+    shader = UsdShade.Shader(stage.OverridePrim(f"{path}/surface"))
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*look.color))
+
+
 def write_looks(
     stage: Usd.Stage,
     looks: Mapping[str, Look],
     bindings: Mapping[str, str],
     scope: str = LOOKS,
     also: Iterable[str] = (),
+    harmony: str = "",
+    tinted: bool = False,
 ) -> None:
     """Define every look that is bound, and bind it.
 
@@ -61,54 +124,30 @@ def write_looks(
         bindings: prim path of a mesh or subset -> material name.
         scope: path of the prim that the materials stand below.
         also: names of looks that are defined, too, though another layer binds them.
+        harmony, tinted: see `define_material`.
     """
     UsdGeom.Scope.Define(stage, scope)
     for name in sorted({*bindings.values(), *also}):
-        define_material(stage, f"{scope}/{name}", looks[name])
+        define_material(stage, f"{scope}/{name}", looks[name], harmony, tinted=tinted)
     for path, name in bindings.items():
         prim = stage.OverridePrim(path)
         # `Bind` writes an uncustom relationship; three.js's parser loses a `custom rel`.
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(UsdShade.Material(stage.GetPrimAtPath(f"{scope}/{name}")))
 
 
-def planks(color: Sequence[float], *, seed: int = 0, size: int = 512, rows: int = 8) -> bytes:
-    """A tileable picture of floor boards as PNG bytes, the same for the same arguments.
+def write_palettes(stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[str, Look]]) -> None:
+    """The variant set `palette` on `/Room`: what each harmony makes of the materials.
 
     Arguments:
-        color: linear RGB of the wood.
-        seed: of the pattern.
-        size: pixels on each side; the picture is meant for about 1.6 m of floor.
-        rows: boards across.
+        stage: of the materials' layer, whose materials are defined and have no colours yet.
+        chosen: the harmony that the images are in.
+        looks: harmony -> material name -> look.
     """
-    from PIL import Image
-
-    rng = np.random.default_rng(seed)
-    board = size // rows
-    tone = np.ones((size, size, 1))
-    for row in range(rows):
-        start = int(rng.integers(size))
-        ends = [start, start + size // 2 + int(rng.integers(-size // 12, size // 12))]
-        base = rng.normal(1.0, 0.055, 2)
-        x = (np.arange(size) - start) % size
-        band = np.where(x < ends[1] - ends[0], base[0], base[1])[None, :]
-        grain = _waves(rng, board, size, 0.028)
-        tone[row * board : (row + 1) * board, :, 0] = band + grain
-        tone[row * board, :, 0] *= 0.72  # the joint between two rows
-        for end in ends:
-            tone[row * board : (row + 1) * board, end % size, 0] *= 0.72
-    value = np.clip(np.asarray(color) * tone, 0, 1)
-    srgb = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
-    out = io.BytesIO()
-    Image.fromarray((srgb * 255 + 0.5).astype(np.uint8)).save(out, "PNG", optimize=False)
-    return out.getvalue()
-
-
-def _waves(rng: np.random.Generator, height: int, width: int, strength: float) -> np.ndarray:
-    """Fibres along x, periodic in x."""
-    x = np.arange(width) / width
-    fibres = np.zeros((height, width))
-    for octave in (1, 2, 5):
-        phase = rng.random(height)[:, None]
-        smooth = np.convolve(rng.normal(size=height + 4), np.ones(5) / 5, "valid")[:, None]
-        fibres += smooth * (1 + 0.5 * np.sin(2 * np.pi * (octave * x[None] + phase)))
-    return strength * fibres
+    variants = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("palette")
+    for harmony, table in looks.items():
+        variants.AddVariant(harmony)
+        variants.SetVariantSelection(harmony)
+        with variants.GetVariantEditContext():
+            for name, look in table.items():
+                tint_material(stage, f"{LOOKS}/{name}", looks[chosen][name], look)
+    variants.SetVariantSelection(chosen)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from pxr import Gf, Kind, Usd, UsdGeom, UsdSemantics
 
 from echousd.room import assets
-from echousd.room.looks import Look, linear
+from echousd.room.finishes.harmonies import linear
+from echousd.room.looks import Look
 from echousd.room.paths import SHELL
 from echousd.room.room import RoomData
 from echousd.room.shell import floor_mesh
@@ -17,9 +18,7 @@ from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
 from echousd.room.walls import Piece, ShellPart, ceiling, walls
 
-BOARDS = 1.6  # metres of floor that one picture of boards covers
 LOOKS = {
-    "wall": Look(linear("ece8e1"), 0.9),
     "ceiling": Look(linear("f6f4f0"), 0.95),
     "trim": Look(linear("f7f5f1"), 0.4),
     "leaf": Look(linear("efebe3"), 0.4),
@@ -86,6 +85,4 @@ def _prims(part: ShellPart, above: str, kind: str) -> Iterator[ShellPrim]:
 
 def _mesh(piece: Piece, above: str) -> ShellMesh:
     form = surface(piece.mesh, {piece.look: np.arange(len(piece.mesh.faces))})
-    if piece.look == "floor":
-        form = replace(form, st=(form.st / BOARDS).astype(np.float32))
     return ShellMesh(f"{above}/{piece.name}", piece.look, form, piece.solid)

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from echousd.room.finishes.slots import metres_of
 
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
 
@@ -46,11 +50,11 @@ def surface(
         mesh: triangles in metres.
         groups: material group -> face numbers.
         atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
-            axes, where one unit of texture space is one metre.
+            axes, see `laid_out`.
         crease: neighbours that fold more sharply than this keep a hard edge, radians.
     """
     normals, normal_index = creased_normals(mesh, crease)
-    st, st_index = atlas_unwrap(mesh) if atlas else box_projection(mesh)
+    st, st_index = atlas_unwrap(mesh) if atlas else laid_out(mesh, groups)
     return Surface(
         points=np.asarray(mesh.vertices, np.float32),
         faces=np.asarray(mesh.faces, np.int32),
@@ -90,16 +94,62 @@ def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.n
     return _indexed(total, 4)
 
 
-def box_projection(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Texture coordinates in metres along the axis that each face looks at most: ((t, 2) float32, (3 f) int32)."""
-    triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates for the patterns of our material slots: ((t, 2) float32, (3 f) int32).
+
+    Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
+    the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
+    is of the whole thing get all of it on the side that they show.
+    """
+    st = box_projection(mesh)
+    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    board = _boards(faces, len(points))
+    low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
+    np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
+    np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
+    axis = facing_axis(points[faces])[0]
+    extent = (high - low)[board]
+    rows = np.arange(len(faces))
+    across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
+    turned = extent[rows, along] > 1.05 * extent[rows, across]
+    st[turned] = np.stack([st[turned][..., 1], -st[turned][..., 0]], -1)
+    st += (np.stack([0.37 * board, 0.61 * board], 1) % 1.0)[:, None]
+    for slot, members in groups.items():
+        metres = metres_of(slot)
+        if metres:
+            st[members] /= metres
+        elif len(members):
+            shown = points[faces[members]]
+            first, last = shown.reshape(-1, 3).min(0), shown.reshape(-1, 3).max(0)
+            upward = int(np.argmin(last - first) == 1)  # what lies shows its upper side, what hangs its front
+            share = (shown - first) / np.maximum(last - first, 1e-9)
+            st[members] = np.stack([share[..., 0], 1 - share[..., 2] if upward else share[..., 1]], -1)
+    return _indexed(st.reshape(-1, 2), 5)
+
+
+def _boards(faces: np.ndarray, points: int) -> np.ndarray:
+    """(f,) int, the connected piece that each face belongs to."""
+    pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
+    links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(points, points))
+    return np.unique(connected_components(links, directed=False)[1][faces[:, 0]], return_inverse=True)[1]
+
+
+def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(f,) int, the axis that each triangle (f, 3, 3) looks at most, and (f,) float, 1 or -1: which way."""
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     axis = np.abs(normal).argmax(1)
-    facing = np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)[:, None]
+    return axis, np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)
+
+
+def box_projection(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(f, 3, 2) float: texture coordinates in metres along the axis that each face looks at most."""
+    triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    axis, way = facing_axis(triangles)
+    facing = way[:, None]
     x, y, z = triangles[..., 0], triangles[..., 1], triangles[..., 2]
     u = np.choose(axis[:, None], [-z * facing, x, x * facing])
     v = np.choose(axis[:, None], [y, -z * facing, y])
-    return _indexed(np.stack([u, v], -1).reshape(-1, 2), 5)
+    return np.stack([u, v], -1)
 
 
 def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

@@ -44,7 +44,8 @@ def test_usdz_knows_no_clock(root, tmp_path, arkit):
 def test_usdz_for_the_web_is_one_flat_text_layer(root, tmp_path):
     path = export(root, tmp_path / "room.usdz")
     with zipfile.ZipFile(path) as package:
-        assert package.namelist() == ["bedroom.usda", "textures/floor.png"]
+        assert package.namelist()[0] == "bedroom.usda"
+        assert all(name.startswith("textures/") and name.endswith(".jpg") for name in package.namelist()[1:])
         text = package.read("bedroom.usda").decode()
     assert "double3 xformOp" not in text
     assert str(root.parent) not in text
@@ -95,7 +96,7 @@ def test_glb_has_every_object_in_its_place(root, room, tmp_path):
     tree = json.loads(content[20 : 20 + length])
     assert set(OBJECTS) <= {node["name"] for node in tree["nodes"]}
     assert "room_wood" in {material["name"] for material in tree["materials"]}
-    assert len(tree["images"]) == 1
+    assert len(tree["images"]) >= 1
     scene = trimesh.load(path)
     for number, name in enumerate(room.names):
         parts = [node for node in scene.graph.nodes_geometry if scene.graph.transforms.parents.get(node) == name]

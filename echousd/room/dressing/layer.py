@@ -67,8 +67,10 @@ def _write(
         xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
         xform.AddRotateYOp().Set(round(float(np.degrees(thing.yaw)), 4) + 0.0)
         for where, slot in assets.slot_paths(path, slots[asset]).items():
-            bound = UsdShade.MaterialBindingAPI.Apply(stage.OverridePrim(where))
-            bound.GetDirectBindingRel().SetTargets([Sdf.Path(f"{LOOKS}/{looks[slot]}")])
+            over = stage.OverridePrim(where)
+            UsdShade.MaterialBindingAPI.Apply(over)
+            target = Sdf.Path(f"{LOOKS}/{looks[slot]}")  # another layer defines it
+            over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])
 
 
 def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:

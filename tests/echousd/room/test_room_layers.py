@@ -32,7 +32,9 @@ def test_files_are_those_of_the_design(root):
     layers = {f"layers/{name}.usda" for name in ("materials", "physics", "layout", "graph", "geometry")}
     names = set(OBJECTS) - {"nightstand_left", "nightstand_right"} | {"nightstand"}
     assets = {f"assets/{n}/{n}{end}" for n in names for end in (".usda", "_geo.usdc")}
-    assert found == {"bedroom.usda", "bedroom.json", "textures/floor.png"} | layers | assets
+    images = {path for path in found if path.startswith("textures/") and path.endswith(".jpg")}
+    assert any(path.startswith("textures/planks_") for path in images)
+    assert found == {"bedroom.usda", "bedroom.json"} | images | layers | assets
 
 
 def test_stage_opens_whole_and_carries_its_graph(stage, room):

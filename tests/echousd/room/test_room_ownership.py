@@ -102,7 +102,7 @@ def test_edited_asset_that_was_taken_along_is_still_the_artists(root, told):
 
 def test_forced_into_somebodys_folder_all_their_files_are_kept(tmp_path, told):
     folder = tmp_path / "bedroom"
-    theirs = ["bedroom.usda", "bedroom.json", "layers/graph.usda", "textures/floor.png", "notes.txt"]
+    theirs = ["bedroom.usda", "bedroom.json", "layers/graph.usda", "layers/layout.usda", "notes.txt"]
     for path in theirs:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(f"their {path}")

@@ -3,6 +3,7 @@ import pytest
 import trimesh
 
 from echomodel.vocabulary import vocabulary
+from echousd.room.finishes.slots import metres_of
 from echousd.room.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
 from echousd.room.meshing import box_mesh
 from echousd.room.surface import creased_normals, surface
@@ -50,8 +51,9 @@ def test_texture_coordinates_for_every_corner(atlas):
     if atlas:
         assert form.st.min() >= 0
         assert form.st.max() <= 1
-    else:  # one unit of texture is one metre
-        np.testing.assert_allclose(areas, trimesh.creation.box((1, 2, 3)).area_faces, rtol=1e-5)
+    else:  # one picture of wood covers so many metres
+        wanted = trimesh.creation.box((1, 2, 3)).area_faces / metres_of("wood") ** 2
+        np.testing.assert_allclose(areas, wanted, rtol=1e-4)
 
 
 def test_box_projection_is_upright_and_not_mirrored():

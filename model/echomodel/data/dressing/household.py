@@ -18,8 +18,12 @@ def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
     parts = _frame(w, h, d, bar)
     parts.append(box((-x + bar / 2, bar / 2, back), (x - bar / 2, h - bar / 2, front - 0.012), "paper"))
     inset = bar + mount
-    parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), "picture"))
+    parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), _painting(rng)))
     return parts
+
+
+def _painting(rng: np.random.Generator) -> str:
+    return f"picture_{int(rng.integers(3))}"
 
 
 def _frame(w: float, h: float, d: float, bar: float) -> list[Solid]:
@@ -61,7 +65,7 @@ def photo(size: Size, rng: np.random.Generator) -> list[Solid]:
         ((-w / 2, h - bar, 0), (w / 2, h, thick), "frame"),
         ((-w / 2, 0, 0), (-w / 2 + bar, h, thick), "frame"),
         ((w / 2 - bar, 0, 0), (w / 2, h, thick), "frame"),
-        ((-w / 2 + bar / 2, bar / 2, 0), (w / 2 - bar / 2, h - bar / 2, thick * 0.6), "picture"),
+        ((-w / 2 + bar / 2, bar / 2, 0), (w / 2 - bar / 2, h - bar / 2, thick * 0.6), _painting(rng)),
     ):
         block = box(low, high, material)
         parts.append(Block(centre=lean @ block.centre, half=block.half, turn=lean, material=material))

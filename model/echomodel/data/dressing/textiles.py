@@ -8,13 +8,14 @@ from echomodel.data.dressing.solids import Sheet
 from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.solids import Ball, Solid, Turned
 
+RUGS = ("rug", "rug_striped", "rug_lattice")  # what is woven into them
 FOLD = 0.14  # metres of curtain from one fold to the next
 
 
 def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A rectangle of pile."""
     w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), "rug", h * 0.45)]
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), str(rng.choice(RUGS)), h * 0.45)]
 
 
 def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -44,7 +45,8 @@ def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     half = np.array([w / 2, h / 2, d / 2])
     # A pillow is thick in the middle and thin at its seams: a flat superellipsoid, drawn in at the sides.
-    return [Ball(centre=np.array([0, h / 2, 0]), half=half, power=3.2, material="accent_cloth")]
+    material = str(rng.choice(("accent_cloth", "accent_plain")))
+    return [Ball(centre=np.array([0, h / 2, 0]), half=half, power=3.2, material=material)]
 
 
 def throw(size: Size, rng: np.random.Generator) -> list[Solid]:

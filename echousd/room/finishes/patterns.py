@@ -1,0 +1,196 @@
+"""Patterns of surfaces as tileable arrays: how light or dark, how high and how rough each point is; numpy alone.
+
+Every pattern is the same in every run and on every machine; colour comes later, as one tint for the whole picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+SIZE = 512  # pixels on each side
+
+
+@dataclass(frozen=True, eq=False)
+class Relief:
+    """One pattern.
+
+    Arguments:
+        tone: (SIZE, SIZE) or (SIZE, SIZE, 3) float, what the tint is multiplied with, 1 in the mean.
+        height: (SIZE, SIZE) float, metres above the mean, None for what is flat.
+        rough: (SIZE, SIZE) float, added to the roughness, None where it is even.
+    """
+
+    tone: np.ndarray
+    height: np.ndarray | None = None
+    rough: np.ndarray | None = None
+
+
+def noise(seed: int, along: float, across: float, power: float = 2.0) -> np.ndarray:
+    """(SIZE, SIZE) periodic noise of deviation 1; features are about `SIZE / along` x `SIZE / across` pixels."""
+    rng = np.random.default_rng(seed)
+    v, u = np.meshgrid(np.fft.fftfreq(SIZE) * SIZE, np.fft.rfftfreq(SIZE) * SIZE, indexing="ij")
+    radius = np.sqrt((u / along) ** 2 + (v / across) ** 2)
+    weight = 1 / (1 + radius**power)
+    weight[0, 0] = 0
+    out = np.fft.irfft2(np.fft.rfft2(rng.normal(size=(SIZE, SIZE))) * weight, s=(SIZE, SIZE))
+    return np.asarray(out / out.std())
+
+
+def _grid() -> tuple[np.ndarray, np.ndarray]:
+    """Columns u and rows v as shares of the picture."""
+    axis = np.arange(SIZE) / SIZE
+    return axis[None, :], axis[:, None]
+
+
+def wood(seed: int = 1, rings: int = 14, contrast: float = 1.0) -> Relief:
+    """Sawn wood, its fibres along u: bands of early and late wood, streaks, pores."""
+    _, v = _grid()
+    bands = np.sin(2 * np.pi * (rings * v + 0.55 * noise(seed, 1.2, 3.0, 3.0)))
+    streaks, pores = noise(seed + 1, 2.0, 60.0), noise(seed + 2, 12.0, 160.0)
+    tone = 1 + contrast * (0.05 * bands + 0.045 * streaks - 0.10 * np.clip(pores - 1.1, 0, 1))
+    return Relief(tone / tone.mean(), None, 0.05 * streaks)
+
+
+def veneer() -> Relief:
+    """Fine even wood."""
+    return wood(11, 24, 0.55)
+
+
+def planks(rows: int = 8) -> Relief:
+    """Boards along u with joints, each of a tone of its own."""
+    rng = np.random.default_rng(5)
+    base, board = wood(21, 6, 0.9).tone, SIZE // rows
+    tone, gap = np.ones((SIZE, SIZE)), np.zeros((SIZE, SIZE))
+    for row in range(rows):
+        rowed = slice(row * board, (row + 1) * board)
+        start = int(rng.integers(SIZE))
+        ends = (start, start + SIZE // 2 + int(rng.integers(-SIZE // 12, SIZE // 12)))
+        piece = np.roll(base, int(rng.integers(SIZE)), axis=1)[rowed] * rng.normal(1.0, 0.05)
+        other = np.roll(base, int(rng.integers(SIZE)), axis=1)[rowed] * rng.normal(1.0, 0.05)
+        first = (np.arange(SIZE) - start) % SIZE < ends[1] - ends[0]
+        tone[rowed] = np.where(first[None], piece, other)
+        gap[row * board] = 1
+        for end in ends:
+            gap[rowed, end % SIZE] = 1
+    tone = tone * (1 - 0.35 * gap)
+    return Relief(tone / tone.mean(), -0.0006 * gap, 0.06 * noise(23, 3.0, 40.0) + 0.2 * gap)
+
+
+def woven(threads: int = 64) -> Relief:
+    """Plain weave, flecked."""
+    u, v = _grid()
+    warp, weft = np.sin(2 * np.pi * threads * u), np.sin(2 * np.pi * threads * v)
+    over = np.sign(np.sin(np.pi * threads * u) * np.sin(np.pi * threads * v))
+    height = np.where(over > 0, np.abs(warp), np.abs(weft))
+    fleck = 0.6 * noise(31, 20.0, 120.0) + 0.6 * noise(32, 120.0, 20.0)
+    tone = 1 + 0.16 * (height - 0.6) + 0.045 * fleck
+    return Relief(tone / tone.mean(), 0.0004 * height)
+
+
+def knitted(stitches: int = 32) -> Relief:
+    """Rows of stitches, V beside V."""
+    u, v = _grid()
+    slant = np.abs((u * stitches) % 1.0 - 0.5)
+    height = np.abs(np.sin(np.pi * (v * stitches + slant))) * (1 - (2 * slant - 0.5) ** 2)
+    tone = 1 + 0.32 * (height - height.mean()) + 0.03 * noise(41, 30.0, 30.0)
+    return Relief(tone / tone.mean(), 0.002 * height)
+
+
+def linen() -> Relief:
+    """Fine cloth with thick threads here and there and soft creases."""
+    slubs = 0.6 * noise(51, 6.0, 170.0) + 0.6 * noise(52, 170.0, 6.0)
+    crease = noise(53, 4.0, 4.0, 3.0)
+    return Relief(1 + 0.028 * slubs + 0.012 * crease, 0.0002 * slubs + 0.002 * crease)
+
+
+def leather() -> Relief:
+    """Grain of small cells."""
+    rng = np.random.default_rng(61)
+    points = rng.random((1400, 2)) * SIZE
+    tiled = np.concatenate([points + np.array([i, j]) * SIZE for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    where = np.stack(np.meshgrid(np.arange(SIZE), np.arange(SIZE), indexing="ij"), -1).reshape(-1, 2)
+    near = cKDTree(tiled).query(where, k=2)[0]
+    height = np.clip((near[:, 1] - near[:, 0]) / 6, 0, 1).reshape(SIZE, SIZE)
+    tone = 1 + 0.14 * (height - height.mean()) + 0.05 * noise(62, 5.0, 5.0)
+    return Relief(tone, 0.0004 * height)
+
+
+def plaster() -> Relief:
+    """Smooth plaster under matt paint."""
+    soft = noise(71, 12.0, 12.0, 2.5)
+    return Relief(1 + 0.010 * soft, 0.0006 * soft)
+
+
+def pile() -> Relief:
+    """Short pile."""
+    fine = noise(81, 160.0, 160.0, 4.0)
+    return Relief(1 + 0.05 * fine + 0.03 * noise(82, 8.0, 8.0), 0.003 * fine)
+
+
+def bordered() -> Relief:
+    """A rug with a border, whole."""
+    u, v = _grid()
+    edge = np.minimum(np.minimum(u, 1 - u), np.minimum(v, 1 - v))
+    line = ((edge > 0.045) & (edge < 0.06)) | ((edge > 0.075) & (edge < 0.12))
+    return _rug(np.where(line, 0.72, 1.0))
+
+
+def striped() -> Relief:
+    """A rug with broad and narrow stripes, whole."""
+    _, v = _grid()
+    wave = np.sin(2 * np.pi * 5 * v)
+    return _rug(np.where(wave > 0.75, 0.7, np.where(wave < -0.9, 0.85, 1.0)) * np.ones((SIZE, SIZE)))
+
+
+def latticed() -> Relief:
+    """A rug with a lattice of lozenges, whole."""
+    u, v = _grid()
+    a, b = np.abs((4 * u + 4 * v) % 1.0 - 0.5), np.abs((4 * u - 4 * v) % 1.0 - 0.5)
+    return _rug(np.where((a < 0.035) | (b < 0.035), 0.62, 1.0))
+
+
+def _rug(drawn: np.ndarray) -> Relief:
+    relief = pile()
+    tone = drawn * relief.tone
+    return Relief(tone / np.median(tone))
+
+
+def wicker(strands: int = 24) -> Relief:
+    """Basketwork."""
+    u, v = _grid()
+    over = np.sign(np.sin(np.pi * strands * u)) * np.sign(np.sin(np.pi * strands * v))
+    height = np.where(over > 0, np.abs(np.sin(np.pi * strands * v)), 0.7 * np.abs(np.sin(np.pi * strands * u)))
+    tone = 0.6 + 0.55 * height + 0.05 * noise(91, 20.0, 20.0)
+    return Relief(tone / tone.mean(), 0.003 * height)
+
+
+def leaf() -> Relief:
+    """Green of two depths."""
+    tone = 1 + 0.14 * noise(95, 6.0, 6.0) + 0.05 * noise(96, 60.0, 60.0)
+    return Relief(np.clip(tone, 0.5, 1.6))
+
+
+def stone() -> Relief:
+    """Glazed clay with specks."""
+    specks = np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1)
+    return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * specks)
+
+
+PATTERNS: Mapping[str, Callable[[], Relief]] = {
+    made.__name__: made
+    for made in (
+        wood, veneer, planks, woven, knitted, linen, leather, plaster, pile, bordered, striped, latticed, wicker, leaf,
+        stone,
+    )
+}  # fmt: skip
+
+
+@cache
+def relief(name: str) -> Relief:
+    """The pattern of that name; raises KeyError for unknown ones."""
+    return PATTERNS[name]()

@@ -1,0 +1,75 @@
+"""Material slots of furniture, small things and shell: the colour of a harmony that each takes, pattern and gloss."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Slot:
+    """How one kind of material looks.
+
+    Arguments:
+        color: a field of `Harmony`, or an sRGB hex of its own.
+        roughness, metallic, opacity: of a UsdPreviewSurface.
+        pattern: a word of `patterns.PATTERNS`, "" = plain; `painting_0` ... are pictures.
+        metres: of surface that one picture of the pattern covers; 0 = the whole of it fits the thing.
+        mix: an sRGB hex and how much of it is mixed in.
+    """
+
+    color: str
+    roughness: float
+    pattern: str = ""
+    metres: float = 1.0
+    metallic: float = 0.0
+    opacity: float = 1.0
+    mix: tuple[str, float] = ("ffffff", 0.0)
+
+
+SLOTS: Mapping[str, Slot] = {
+    "wood": Slot("wood", 0.5, "wood", 0.7),
+    "front": Slot("front", 0.45, "veneer", 0.9),
+    "fabric": Slot("cloth", 0.92, "woven", 0.22),
+    "cushion": Slot("cloth", 0.92, "woven", 0.22, mix=("f0e8da", 0.25)),
+    "linen": Slot("linen", 0.9, "linen", 0.6),
+    "blanket": Slot("blanket", 0.95, "linen", 0.6),
+    "metal": Slot("metal", 0.35, metallic=0.85),
+    "ceramic": Slot("ceramic", 0.35, "stone", 0.35),
+    "leaf": Slot("4f7d3c", 0.6, "leaf", 0.3),
+    "soil": Slot("4a3a2c", 0.95),
+    "shade": Slot("f6e7c8", 0.8),
+    "screen": Slot("15171b", 0.12),
+    "glass": Slot("dfeae8", 0.08, opacity=0.35),
+    "mirror": Slot("c9d2d4", 0.05, metallic=1.0),
+    "book": Slot("7a4a40", 0.8),
+    "stem": Slot("6b5436", 0.85),
+    "rug": Slot("rug", 0.97, "bordered", 0.0),
+    "rug_striped": Slot("rug", 0.97, "striped", 0.0),
+    "rug_lattice": Slot("rug", 0.97, "latticed", 0.0),
+    "curtain": Slot("curtain", 0.92, "linen", 0.6),
+    "accent_cloth": Slot("accent", 0.95, "knitted", 0.3),
+    "accent_plain": Slot("accent", 0.92, "woven", 0.22),
+    "picture_0": Slot("ffffff", 0.7, "painting_0", 0.0),
+    "picture_1": Slot("ffffff", 0.7, "painting_1", 0.0),
+    "picture_2": Slot("ffffff", 0.7, "painting_2", 0.0),
+    "frame": Slot("wood", 0.45, "wood", 0.7),
+    "paper": Slot("f1ede4", 0.9),
+    "book_a": Slot("accent", 0.7),
+    "book_b": Slot("ceramic", 0.7),
+    "book_c": Slot("2f3b45", 0.7),
+    "book_d": Slot("cloth", 0.7),
+    "petal": Slot("f0dfd5", 0.8),
+    "fruit": Slot("c9862e", 0.5),
+    "wax": Slot("f3eadb", 0.5),
+    "wicker": Slot("b08a58", 0.9, "wicker", 0.3),
+    "leather": Slot("5a3d2b", 0.5, "leather", 0.25),
+    "floor": Slot("floor", 0.5, "planks", 1.6),
+    "wall": Slot("wall", 0.92, "plaster", 1.4),
+}
+SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket"}  # what every other style group takes instead
+
+
+def metres_of(slot: str) -> float:
+    """Metres that one picture covers on a slot, 0 where it fits the whole; 1 for what has none."""
+    return SLOTS[slot].metres if slot in SLOTS else 1.0
