@@ -65,6 +65,9 @@ def register(app: typer.Typer) -> None:
         drafts: Annotated[
             int | None, typer.Option(help="Layouts to choose the best from; default: 8.", min=1, max=64)
         ] = None,
+        fit: Annotated[
+            str, typer.Option(help="keep: all that is asked for; drop: leave out what has no place.")
+        ] = "keep",
         steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
         faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
         up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
@@ -117,7 +120,7 @@ def register(app: typer.Typer) -> None:
                 made = make(
                     graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
                     samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
-                    options=options, progress=listen,
+                    options=options, fit=fit, progress=listen,
                 )  # fmt: skip
                 with took(spent, "write", listen):
                     root = save_flat(made, folder, force=force) if flat else save_layers(made, folder, force=force)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from echomodel.boxes import Boxes
 from echomodel.loading import check_preset, load_model
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
 from echousd.room.finished import Room
+from echousd.room.fitting import FITS, fitted, with_space
 from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
@@ -41,6 +43,7 @@ def generate(
     samples: int = 1,
     drafts: int | None = None,
     earlier: Path | None = None,
+    fit: str = "keep",
     steps: int | None = None,
     faces: int = FACES,
     options: RoomOptions | None = None,
@@ -66,6 +69,7 @@ def generate(
         drafts: layouts that are drawn at most for each of them, the best by relations and living rules is kept; None =
             `DRAFTS`, or 1 for the published models, which take a thousand steps; without repair it is always 1.
         earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
+        fit: `keep` everything and say what collides, or `drop` what finds no place, and say it (`Room.notes`).
         steps: sampling steps, None for the model's own.
         faces: face budget of each mesh.
         options: how the room is written.
@@ -83,6 +87,8 @@ def generate(
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
     if drafts is not None and not 1 <= drafts <= 64:
         raise ValueError(f"drafts is {drafts}, allowed: 1 to 64")
+    if fit not in FITS:
+        raise ValueError(f"fit is {fit!r}, allowed: {', '.join(FITS)}")
     check_seed(seed)
     check_preset(model, preset)
     timer = StageTimer(progress)
@@ -104,15 +110,26 @@ def generate(
         source = source or shape_source(shapes)
         source.check(echo)
     check_doors(graph)
+    graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
     crowded = check_space(graph)
     proposed = with_floor(graph, seed)
     free, graph = proposed is not graph, proposed
-    styles = style_groups(graph)
     drafts = drafts or (DRAFTS if echo.preset == "compact" else 1)
-    boxes, notes = best_boxes(
-        echo, graph, styles, seed=seed, drafts=drafts, repair=repair, drawn=drawn, steps=steps, timer=timer
-    )
-    notes = (*echo.unlearned(graph_batch(graph)), *notes)
+
+    def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
+        styles = style_groups(graph)
+        first = drawn if drawn is not None and len(drawn) == len(graph.nodes) else None  # none of them left out
+        return best_boxes(
+            echo, graph, styles, seed=seed, drafts=drafts, repair=repair, drawn=first, steps=steps, timer=timer
+        )
+
+    if fit == "drop":
+        graph, (boxes, notes), more = fitted(graph, arranged)
+        left_out = (*left_out, *more)
+    else:
+        boxes, notes = arranged(graph)
+    styles = style_groups(graph)
+    notes = (*left_out, *echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
         found, _ = best_boxes(

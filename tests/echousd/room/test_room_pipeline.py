@@ -165,3 +165,20 @@ def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -
     assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
     homeless = echousd.generate(locked, seed=9, shapes="boxes")
     assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes
+
+
+def test_what_cannot_fit_is_said_or_left_out() -> None:
+    nodes = tuple(Node(f"wardrobe_{i}", "wardrobe", size=(1.4, 2.0, 0.5)) for i in range(8))
+    nodes += (Node("bed", "double_bed", size=(1.8, 1.0, 2.1)),)
+    graph = SceneGraph(RoomSpec("bedroom", size=(2.6, 2.9)), nodes)
+    with pytest.raises(ValueError, match="too small for its furniture"):
+        echousd.generate(graph, model=StandIn(), shapes="boxes")
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", fit="drop")
+    assert not room.faults
+    assert "bed" in room.names
+    gone = sorted(set(graph.names) - set(room.names))
+    assert gone
+    said = sorted(note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out"))
+    assert said == gone
+    with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep, drop"):
+        echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze")
