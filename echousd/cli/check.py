@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from echousd.check import CheckReport
     from echousd.check.check import LayoutReport
+    from echousd.settle import SettleReport
 
 
 def register(app: typer.Typer) -> None:
@@ -28,18 +30,32 @@ def register(app: typer.Typer) -> None:
         rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
         layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
         strict: Annotated[bool, typer.Option("--strict", help="Broken living rules fail the check, too.")] = False,
+        settle: Annotated[
+            bool, typer.Option("--settle", help="Simulate two seconds as well: everything must rest (extra: sim).")
+        ] = False,
     ) -> None:
         """Check a room: relations, collisions, placement, living rules in all its layouts, and its USD."""
         from echousd.check import check_room
 
         report = check_room(room, rules=rules, layout=layout)
+        settled: tuple[SettleReport, ...] = ()
+        if settle:
+            from echousd.settle import settle_layouts
+
+            settled = settle_layouts(room, layout=layout)
+        rests = all(found.ok for found in settled)
         if json:
             import json as text
 
-            typer.echo(text.dumps(plain_json(report.to_json()), indent=2, allow_nan=False))
+            told = report.to_json()
+            if settle:
+                told["settle"] = [found.to_json() for found in settled]
+                told["ok"] = told["ok"] and rests
+            typer.echo(text.dumps(plain_json(told), indent=2, allow_nan=False))
         else:
             _show(report, strict)
-        if not report.ok or (strict and report.living):
+            _show_settled(settled)
+        if not report.ok or not rests or (strict and report.living):
             raise typer.Exit(1)
 
 
@@ -73,6 +89,22 @@ def _show(report: CheckReport, strict: bool) -> None:
             console.print(
                 f"  [{color}]{name}[/] {escape(safe(f'{fault.rule} <{fault.prim}>: {fault.message}'))}", highlight=False
             )
+
+
+def _show_settled(reports: Sequence[SettleReport]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+
+    console = Console(soft_wrap=True)
+    for report in reports:
+        which = f"{report.layout} " if report.layout else ""
+        mark = "[green]ok[/]" if report.ok else "[red]no[/]"
+        rest = len(report.motions) - len(report.restless)
+        found = f"{rest} of {len(report.motions)} pieces rest for {report.seconds:g} s"
+        console.print(f"{mark}  {which}settle  {found}", highlight=False)
+        for motion in report.restless:
+            told = f"{motion.name} moves {motion.shift:.3f} m and {motion.turn:.1f} degrees: {motion.why}"
+            console.print(f"  [red]restless[/]  {escape(safe(told))}", highlight=False)
 
 
 def _show_faults(console: Console, layout: LayoutReport, strict: bool) -> None:

@@ -13,6 +13,7 @@ import typer
 # Optional extra of the distribution, the modules it brings, what needs it.
 EXTRAS = (
     ("render", ("embreex",), "fast ray casting for pictures"),
+    ("sim", ("mujoco",), "simulating rooms (check --settle)"),
     ("texture", ("xatlas",), "texture coordinates"),
     ("validate", ("usd_validation_nvidia",), "NVIDIA's rules in `echousd check`"),
     ("ray", ("ray",), "`echousd batch --ray`"),

@@ -1,0 +1,5 @@
+"""Whether a room rests: its physics, simulated for a while (extra `sim`)."""
+
+from echousd.settle.settle import Motion, SettleReport, SettleUnavailable, settle, settle_layouts
+
+__all__ = ["Motion", "SettleReport", "SettleUnavailable", "settle", "settle_layouts"]
