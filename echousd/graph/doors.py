@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.openings import swing_area
+from echomodel.roomboxes import footprints
 from echousd.graph.consistency import GraphError
 
 if TYPE_CHECKING:
@@ -34,10 +35,8 @@ def check_doors(graph: SceneGraph) -> None:
             assert node.yaw is not None
             if node.position[1] > opening.height:
                 continue
-            half = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * (node.size[0] / 2, node.size[2] / 2)
-            cos, sin = np.cos(node.yaw), np.sin(node.yaw)
-            turned = np.stack([cos * half[:, 0] + sin * half[:, 1], cos * half[:, 1] - sin * half[:, 0]], 1)
-            met = area.intersection(shapely.Polygon(turned + np.array(node.position)[[0, 2]])).area
+            plan = footprints(np.array([node.size]), np.array([node.position]), np.array([node.yaw]))[0]
+            met = area.intersection(shapely.Polygon(plan)).area
             if met > ALLOWED:
                 raise GraphError(
                     f"door {opening.name!r} opens into the locked object {node.name!r} "

@@ -11,6 +11,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
+from echomodel.roomboxes import footprints
 from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
@@ -213,7 +214,7 @@ def root_layer(room: RoomData) -> Sdf.Layer:
 def room_points(room: RoomData) -> np.ndarray:
     """(n, 3) float, metres: corners of the floor (and the walls) and of all boxes, in the frame of `/Room`."""
     size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
-    plan = shell.box_corners(size, position, np.asarray(room.boxes.yaw, float))
+    plan = footprints(size, position, np.asarray(room.boxes.yaw, float)).reshape(-1, 2)
     low, high = np.repeat(position[:, 1], 4), np.repeat(position[:, 1] + size[:, 1], 4)
     points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
     points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]

@@ -10,10 +10,11 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
+from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
-from echousd.room.shell import box_corners, floor_polygon
+from echousd.room.shell import floor_polygon
 from echousd.room.styles import equal_sizes
 from echousd.room.tensors import floor_centre, graph_batch, seeded
 from echousd.room.verdicts import judgement
@@ -158,7 +159,7 @@ def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
 
 def room_floor(graph: SceneGraph, layouts: Sequence[Boxes]) -> np.ndarray:
     """(k, 2) float: corners of the floor, from the graph or around the furniture of all layouts."""
-    plan = [box_corners(*(np.asarray(v, float) for v in (b.size, b.position, b.yaw))) for b in layouts]
+    plan = [footprints(*(np.asarray(v, float) for v in (b.size, b.position, b.yaw))).reshape(-1, 2) for b in layouts]
     return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
 
 

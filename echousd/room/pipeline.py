@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from echomodel.boxes import Boxes
 from echomodel.loading import check_preset, load_model
+from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
@@ -17,7 +18,6 @@ from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
 from echousd.room.progress import Listener, StageTimer
 from echousd.room.room import Provenance, RoomOptions
-from echousd.room.shell import box_corners
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
@@ -139,7 +139,7 @@ def generate(
         layouts.append(found)
     plan = plan_boxes(layouts)
     if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
-        graph = with_wider_floor(graph, box_corners(*plan))
+        graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     graph = with_placed_openings(graph, plan, seed)
     made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
     made_room = Room(

@@ -50,17 +50,6 @@ def floor_mesh(polygon: np.ndarray) -> trimesh.Trimesh:
     return slab
 
 
-def box_corners(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(4 n, 2) float: x and z of the corners of oriented boxes."""
-    half = size[:, [0, 2]] / 2
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
-    local = signs[None] * half[:, None]
-    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-    x = c * local[..., 0] + s * local[..., 1] + position[:, None, 0]
-    z = -s * local[..., 0] + c * local[..., 1] + position[:, None, 2]
-    return np.stack([x, z], -1).reshape(-1, 2)
-
-
 def _turns_left(corners: np.ndarray) -> bool:
     x, z = corners[:, 0], -corners[:, 1]
     return bool((x * np.roll(z, -1) - z * np.roll(x, -1)).sum() > 0)

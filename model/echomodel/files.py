@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator
@@ -29,6 +30,12 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def write_json(path: Path, content: object) -> None:
+    """Write something as indented JSON; the file appears whole."""
+    with whole_file(path) as beside:
+        beside.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
 
 
 def flush(path: Path) -> None:

@@ -40,7 +40,7 @@ def relation_guided(
             unknown.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
-    wanted = triplets[torch.isin(triplets[:, 1], known.to(triplets.device))]
+    wanted = triplets[torch.isin(triplets[:, 1], known)]
     if not len(wanted) and floor is None:
         return predict
     weights = [entry.emphasis for entry in vocabulary().predicates]

@@ -20,6 +20,7 @@ from echomodel.openings import (
     overlap,
     signed_area,
 )
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 
 # Share of the floor that furniture covers in real rooms: median of each type (300 rooms), the rest like the last.
@@ -185,11 +186,8 @@ def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> list:
     if boxes is None:
         return []
     out = []
-    for size, position, yaw in zip(*boxes, strict=True):
+    for size, position, plan in zip(*boxes[:2], footprints(*map(np.asarray, boxes)), strict=True):
         if position[1] >= USUAL["door"]["height"] - 0.05:
             continue
-        half = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * (size[0] / 2, size[2] / 2)
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        plan = np.stack([cos * half[:, 0] + sin * half[:, 1], cos * half[:, 1] - sin * half[:, 0]], 1)
-        out.append((shapely.Polygon(plan + np.asarray(position)[[0, 2]]), float(position[1] + size[1])))
+        out.append((shapely.Polygon(plan), float(position[1] + size[1])))
     return out

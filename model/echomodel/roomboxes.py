@@ -127,3 +127,17 @@ def write_rooms(path: str | os.PathLike[str], rooms: Iterable[RoomBoxes]) -> Non
     lines = ",\n".join(json.dumps(room.to_json(), separators=(",", ":")) for room in rooms)
     text = f'{{"convention": {json.dumps(CONVENTION)}, "rooms": [\n{lines}\n]}}\n'
     Path(path).write_text(text, "utf-8")
+
+
+def footprints(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """(n, 4, 2) float: x and z of the corners of boxes in plan, in order around each.
+
+    Arguments:
+        size, position: (n, 3) float, metres, as in `RoomBoxes`. yaw: (n,) float, radians.
+    """
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    local = signs[None] * (size[:, None, [0, 2]] / 2)
+    cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    x = cos * local[..., 0] + sin * local[..., 1]
+    z = cos * local[..., 1] - sin * local[..., 0]
+    return np.stack([x, z], -1) + position[:, None, [0, 2]]

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.metrics.room_figures import footprints
 from echomodel.openings import segment, swing_area
-from echomodel.roomboxes import RoomBoxes
+from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.vocabulary import UnknownWord, vocabulary
 
 CELL = 2.8  # inches
@@ -51,7 +50,7 @@ def plot_rooms(
             axes.plot(*segment(room.floor_polygon, opening).T, color=shade, linewidth=3)
             if len(swing := swing_area(room.floor_polygon, opening)):
                 axes.plot(*np.vstack([swing, swing[:1]]).T, color=shade, linewidth=0.6)
-        corners = footprints(room)
+        corners = footprints(room.size, room.position, room.yaw)
         for i in np.argsort(room.position[:, 1] if len(room) else []):
             coarse = _coarse(room.categories[i])
             colour = palette(words.index(coarse) % 20) if coarse else "grey"

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.data.folders import claim
 from echomodel.data.rooms import generate_rooms, untidied
+from echomodel.files import whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
@@ -76,7 +78,7 @@ def build_rooms(
     words = [category.name for category in vocabulary().categories]
     plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
     plan["untidy"] = untidy
-    _claim(folder, plan)
+    claim(folder, plan)
     for number, first in enumerate(range(0, count, ROOMS_PER_SHARD)):
         path = folder / f"rooms-{number:04d}.bin"
         last = min(first + ROOMS_PER_SHARD, count)
@@ -92,7 +94,7 @@ def build_rooms(
             write_shard(path, rooms, first, shaken)
         elif progress:
             progress(last, count)
-    _write_json(folder / "rooms.json", plan)
+    write_json(folder / "rooms.json", plan)
     return RoomSet(folder)
 
 
@@ -127,12 +129,10 @@ def write_shard(
         tables["openings"].append(np.array([_entry(opening) for opening in room.openings], OPENING))
         tables["pairs"].append(pairs)
     joined = [np.ascontiguousarray(np.concatenate(tables[name])).astype(dtype.base) for name, dtype in TABLES]
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
+    with whole_file(path) as beside, beside.open("wb") as file:
         file.write(MAGIC + np.array([len(table) for table in joined], "<u8").tobytes())
         for table in joined:
             file.write(table.tobytes())
-    part.replace(path)
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,22 +329,3 @@ def _tables(path: Path) -> dict[str, np.ndarray]:
         out[name] = out[name].reshape(int(number), *dtype.shape)
         start += int(number) * dtype.itemsize
     return out
-
-
-def _claim(folder: Path, plan: dict) -> None:
-    """Remember what the folder is being filled with; refuse a folder that was begun with something else."""
-    note = folder / "plan.json"
-    if not note.exists():
-        _write_json(note, plan)
-        return
-    found = json.loads(note.read_text("utf-8"))
-    wrong = [key for key in plan if found.get(key) != plan[key]]
-    if wrong:
-        told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
-        raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
-
-
-def _write_json(path: Path, content: dict) -> None:
-    part = path.with_suffix(path.suffix + ".part")
-    part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
-    part.replace(path)

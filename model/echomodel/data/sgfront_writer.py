@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from echomodel.data.sgfront import FLOOR, IN, SPLITS, small_mapping
-from echomodel.metrics.room_figures import footprints
-from echomodel.roomboxes import RoomBoxes
+from echomodel.files import whole_file
+from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
@@ -91,7 +91,7 @@ def _boxes(room: RoomBoxes, shift: np.ndarray) -> tuple[dict, np.ndarray]:
     # The scan's centre is the middle of its floor, as in the published boxes.
     extent = [high[0] - low[0], 0.0, high[1] - low[1], middle[0] + shift[0], shift[1], middle[1] + shift[2], 0.0]
     params = np.concatenate([params, [extent]])
-    corners = footprints(room)
+    corners = footprints(room.size, room.position, room.yaw)
     out: dict = {}
     for k, row in enumerate(params):
         if k < len(room):
@@ -119,6 +119,5 @@ def _bounds(rows: np.ndarray) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    part = path.with_suffix(path.suffix + ".part")
-    part.write_text(text, "utf-8")
-    part.replace(path)
+    with whole_file(path) as beside:
+        beside.write_text(text, "utf-8")

@@ -16,9 +16,11 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
+from echomodel.data.folders import claim
 from echomodel.data.furniture import Choices, Style, sample_size, solids, tsdf_of
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.tsdf import RESOLUTION, TRUNCATION
+from echomodel.files import whole_file, write_json
 from echomodel.vocabulary import vocabulary
 
 # Magnitudes of the 16 levels in voxels: finest about the surface, where the zero crossing is read off.
@@ -89,7 +91,7 @@ def build_shapes(
     folder.mkdir(parents=True, exist_ok=True)
     names = [category.name for category in vocabulary().categories]
     plan = {"kind": "parametric", "seed": seed, "styles": styles, "categories": names}
-    _claim(folder, plan)
+    claim(folder, plan)
     total = styles * len(names)
     for number, first in enumerate(range(0, styles, STYLES_PER_SHARD)):
         chunk = range(first, min(first + STYLES_PER_SHARD, styles))
@@ -105,7 +107,7 @@ def finish_set(folder: Path, info: dict, count: int) -> ShapeSet:
     """Write `shapes.json`, which makes the shards of a folder a set, and open it."""
     categories = [category.name for category in vocabulary().categories]
     grid = {"resolution": RESOLUTION, "truncation": TRUNCATION}
-    _write_json(folder / "shapes.json", {"categories": categories, **info, "count": count, **grid})
+    write_json(folder / "shapes.json", {"categories": categories, **info, "count": count, **grid})
     return ShapeSet(folder)
 
 
@@ -115,25 +117,6 @@ def _records(styles: range, names: list[str], seed: int, done: Callable[[int], o
             _, size, parts = piece(seed, style, name)
             yield ShapeRecord(tsdf_of(parts), category, style, size, style % HELD_OUT_EVERY == HELD_OUT_EVERY - 1)
         done((style + 1) * len(names))
-
-
-def _claim(folder: Path, plan: dict) -> None:
-    """Remember what the folder is being filled with; refuse a folder that was begun with something else."""
-    note = folder / "plan.json"
-    if note.exists():
-        found = json.loads(note.read_text("utf-8"))
-        wrong = [key for key in plan if found.get(key) != plan[key]]
-        if wrong:
-            told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
-            raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
-    else:
-        _write_json(note, plan)
-
-
-def _write_json(path: Path, content: dict) -> None:
-    part = path.with_suffix(path.suffix + ".part")
-    part.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
-    part.replace(path)
 
 
 def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) -> int:
@@ -147,11 +130,9 @@ def write_shard(path: str | os.PathLike[str], records: Iterable[ShapeRecord]) ->
         blobs.append(blob)
         offset += len(blob)
     table = np.array(entries, ENTRY)
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
+    with whole_file(path) as beside, beside.open("wb") as file:
         file.write(MAGIC + np.array([len(table)], "<u8").tobytes() + table.tobytes())
         file.writelines(blobs)
-    part.replace(path)
     return len(table)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from echomodel.roomboxes import RoomBoxes
+from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import UnknownWord, vocabulary
 
@@ -255,7 +255,7 @@ def _overlap(rooms: Iterable[RoomBoxes]) -> dict[str, float]:
     meets = pairs = outside = objects = 0
     for room in rooms:
         floor = Polygon(room.floor_polygon)
-        prints = [Polygon(corners) for corners in footprints(room)]
+        prints = [Polygon(corners) for corners in footprints(np.maximum(room.size, 1e-6), room.position, room.yaw)]
         low = room.position[:, 1] < 0.05
         for i in np.flatnonzero(low):
             objects += 1
@@ -264,16 +264,6 @@ def _overlap(rooms: Iterable[RoomBoxes]) -> dict[str, float]:
                 pairs += 1
                 meets += prints[i].intersection(prints[j]).area > 0.01
     return {"floor_pairs": meets / max(pairs, 1), "outside_floor": outside / max(objects, 1)}
-
-
-def footprints(room: RoomBoxes) -> np.ndarray:
-    """(n, 4, 2) corners of the boxes in plan, x and z in metres."""
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
-    local = signs[None] * np.maximum(room.size[:, None, [0, 2]], 1e-6)
-    cos, sin = np.cos(room.yaw)[:, None], np.sin(room.yaw)[:, None]
-    x = cos * local[..., 0] + sin * local[..., 1]
-    z = cos * local[..., 1] - sin * local[..., 0]
-    return np.stack([x, z], -1) + room.position[:, None, [0, 2]]
 
 
 def _percentiles(values: Iterable[float], at: tuple[int, ...]) -> list[float]:
