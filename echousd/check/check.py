@@ -10,11 +10,11 @@ from pxr import Usd
 
 from echousd.check.collisions import Collision, find_collisions
 from echousd.check.living import find_living
-from echousd.check.objects import RoomContents, read_contents
 from echousd.check.placement import Misplacement, find_misplaced
 from echousd.check.relations import Judged, judge
 from echousd.check.validity import Fault, find_faults
 from echousd.repair.living import LivingFault
+from echousd.stage.contents import RoomContents, read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import layout_names, showing_layout

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from echousd.check.objects import RoomObject
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import axes, pair_indices, separation
+from echousd.stage.contents import RoomObject
 
 TOUCH = 0.01  # metres: boxes that overlap less than this only touch
 DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echousd.check.objects import RoomContents
 from echousd.graph import SceneGraph
 from echousd.graph.consistency import GraphError
 from echousd.repair.living import LivingFault, living_faults
+from echousd.stage.contents import RoomContents
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
 from echousd.check.findings import Finding, Rule
-from echousd.check.objects import read_contents, room_frame
 from echousd.stage import encoding as usd
+from echousd.stage.contents import read_contents, room_frame
 from echousd.stage.encoding import StageError
 from echousd.stage.foreign import known_category
 from echousd.stage.read import RoomPrims, find_rooms, value

@@ -8,7 +8,7 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.check.findings import Finding, Rule, is_guide, prims
-from echousd.check.objects import triangulated
+from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import array, matrix

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.check.objects import RoomContents, RoomObject
 from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, inside
 from echousd.repair.repair import DEFAULT_HEIGHT, floor_of_room
+from echousd.stage.contents import RoomContents, RoomObject
 
 OUTSIDE = 0.03  # metres beyond the floor's edge
 FLOATING = 0.03  # metres of air below, or depth below the floor

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.check.objects import RoomContents
 from echousd.graph import Relation
 from echousd.repair.repair import floor_of_room
+from echousd.stage.contents import RoomContents
 
 
 @dataclass(frozen=True)

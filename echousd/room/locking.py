@@ -39,7 +39,7 @@ def _stage_of(file: Path) -> Path | None:
 
 
 def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
-    from echousd.check.objects import read_contents
+    from echousd.stage.contents import read_contents
     from echousd.stage.files import opened
     from echousd.stage.read import find_rooms
 

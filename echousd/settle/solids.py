@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echousd.check.objects import triangulated
 from echousd.room.geometry import Mass
 from echousd.room.masses import read_mass
+from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import array, matrix

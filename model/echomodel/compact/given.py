@@ -38,9 +38,7 @@ def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: tor
     return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
 
 
-def starting_noise(
-    shape: tuple[int, ...], generator: Randomness, noise: Tensor | None, device: torch.device
-) -> Tensor:
+def starting_noise(shape: tuple[int, ...], generator: Randomness, noise: Tensor | None, device: torch.device) -> Tensor:
     """The noise that is given, checked, or the generator's, of that shape."""
     if noise is None:
         return normal(shape, generator, device)

@@ -13,9 +13,9 @@ from pxr import Gf, Usd, UsdGeom, UsdValidation
 from echousd.check import RULES, check_room, register
 from echousd.check.collisions import find_collisions, mesh_depth, winding_number
 from echousd.check.living import find_living
-from echousd.check.objects import RoomContents, RoomObject
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec
+from echousd.stage.contents import RoomContents, RoomObject
 
 BAD = Path(__file__).parent.parent / "bad"
 

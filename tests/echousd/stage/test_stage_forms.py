@@ -7,8 +7,8 @@ from pxr import Gf, Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.check.objects import read_contents
 from echousd.drawables import read_drawables
+from echousd.stage.contents import read_contents
 from echousd.stage.forms import SkippedForms, polygons
 from echousd.stage.read import find_rooms
 from echousd.stage.subdivision import refined
