@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from echousd.cli.output import say
+
+if TYPE_CHECKING:
+    from echousd.graph import SceneGraph
 
 
 def register(app: typer.Typer) -> None:
@@ -20,9 +24,18 @@ def register(app: typer.Typer) -> None:
         room: Annotated[Path, typer.Argument(help="Root layer of a room that generate made.", show_default=False)],
         add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
         remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
-        relabel: Annotated[list[str] | None, typer.Option(help="Other category, as name:category.")] = None,
+        relabel: Annotated[list[str] | None, typer.Option(help="Other category in its place, name:category.")] = None,
         relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
         unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
+        lock: Annotated[list[str] | None, typer.Option(help="Object that stays as it stands.")] = None,
+        unlock: Annotated[list[str] | None, typer.Option(help="Object that may move and change again.")] = None,
+        move: Annotated[list[str] | None, typer.Option(help="Where to, name:x,z or name:x,y,z, metres.")] = None,
+        turn: Annotated[list[str] | None, typer.Option(help="Heading, name:degrees; 0 looks along +Z.")] = None,
+        resize: Annotated[list[str] | None, typer.Option(help="Size at heading 0, name:x,y,z, metres.")] = None,
+        restyle: Annotated[list[str] | None, typer.Option(help="Style, name:style.")] = None,
+        dry_run: Annotated[
+            bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
+        ] = False,
         output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
         seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
         shapes: Annotated[
@@ -35,47 +48,87 @@ def register(app: typer.Typer) -> None:
         force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
         wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
     ) -> None:
-        """Change what a room holds; objects that the change does not touch stay byte for byte."""
-        from echousd.cli.generate import check_output, end, progress_bar, report, telling_faults, writing
-        from echousd.graph.text import relation_from_text
-        from echousd.room.edit import edit as change
+        """Change what a room holds; objects that the change does not touch stay byte for byte.
+
+        Every option may be given several times.
+        """
         from echousd.room.reading import read_room
-        from echousd.room.save import save_layers, write_preview, write_sheet
+        from echousd.room.wishes import Wishes, wished
 
-        folder = output or room.parent
-        check_output(folder, flat=False, force=force)
-        with writing(folder, flat=False, force=force, wait=wait):
-            old = graph = read_room(room).graph
-            for name in remove or ():
-                graph = graph.remove_node(name)
-            for text in unrelate or ():
-                gone = relation_from_text(text)
-                graph = graph.unrelate(gone.subject, gone.predicate, gone.object)
-            for text in relabel or ():
-                graph = graph.relabel_node(*_named(text))
-            for text in add or ():
-                graph = graph.add_node(*_named(text))
-            for text in relate or ():
-                new = relation_from_text(text)
-                graph = graph.relate(new.subject, new.predicate, new.object)
-            steps = old.diff(graph).lines()
-            if not steps:
-                raise ValueError("nothing to change; use --add, --remove, --relabel, --relate or --unrelate")
-            with telling_faults(), progress_bar() as listen:
-                made = change(
-                    room, graph, seed=seed, shapes=shapes, model=weights, repair=repair, progress=listen,
-                )  # fmt: skip
-                listen("write", 0, 1)
-                root = save_layers(made, folder, force=force)
-                listen("write", 1, 1)
-                preview = write_preview(root)
-                preview = write_sheet(root) or preview
-        for step in steps:
-            say(step)
-        report(made, root, preview)
-        end([(made, root, preview)])
+        wishes = Wishes(
+            remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
+            turn or (), resize or (), restyle or (),
+        )  # fmt: skip
+        options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair}
+        nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
+        _change(
+            room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
+            dry_run=dry_run, force=force, wait=wait,
+        )  # fmt: skip
+
+    @app.command(epilog="Example: echousd update out/bedroom/mine.usda")
+    def update(
+        layer: Annotated[Path, typer.Argument(help="Your layer over a room that generate made.", show_default=False)],
+        seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
+        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+        dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
+        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    ) -> None:
+        """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
+
+        What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
+        """
+        from echousd.room.wishes import artists_wishes
+
+        def wanted() -> tuple[Path, SceneGraph]:
+            own, graph, moved = artists_wishes(layer)
+            for name in moved:
+                say(f"locked   {name}, where {layer.name} puts it")
+            return own, graph
+
+        options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
+        nothing = f"{layer}: changes nothing about the room"
+        _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait)
 
 
-def _named(text: str) -> tuple[str, str]:
-    name, _, category = text.partition(":")
-    return name, category or name
+def _change(
+    room: Path,
+    wanted: Callable[[], tuple[Path, SceneGraph]],
+    folder: Path,
+    options: dict[str, Any],
+    nothing: str,
+    *,
+    dry_run: bool,
+    force: bool,
+    wait: bool,
+) -> None:
+    """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen."""
+    from echousd.cli.generate import check_output, end, progress_bar, report, telling_faults, writing
+    from echousd.room.edit import edit as change
+    from echousd.room.edit import touched
+    from echousd.room.reading import read_room
+    from echousd.room.save import save_layers, write_preview, write_sheet
+
+    check_output(folder, flat=False, force=force)
+    with writing(folder, flat=False, force=force, wait=wait):
+        root, graph = wanted()
+        old = read_room(root).graph
+        steps = old.diff(graph).lines()
+        if not steps:
+            raise ValueError(nothing)
+        if dry_run:
+            fresh, moving = touched(old, graph)
+            for step in (*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))):
+                say(step)
+            return
+        with telling_faults(), progress_bar() as listen:
+            made = change(root, graph, progress=listen, **options)
+            listen("write", 0, 1)
+            written = save_layers(made, folder, force=force)
+            listen("write", 1, 1)
+            preview = write_preview(written)
+            preview = write_sheet(written) or preview
+    for step in steps:
+        say(step)
+    report(made, written, preview)
+    end([(made, written, preview)])

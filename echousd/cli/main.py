@@ -88,7 +88,11 @@ def run(arguments: Sequence[str]) -> int:
     except (typer.Abort, KeyboardInterrupt):
         return _complain("interrupted", INTERRUPTED, debug)
     except Exception as error:
-        return _complain(*_explained(error), debug)
+        message, code = _explained(error)
+        lines = message.splitlines() if type(error).__name__ == "GraphError" else [message]
+        for line in lines:  # all faults of a graph's file
+            _complain(line, code, debug and line == lines[-1])
+        return code
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from echomodel.vocabulary import vocabulary
 
@@ -13,12 +13,14 @@ Triple = tuple[str, str, str]
 class GraphError(ValueError):
     """A scene graph or a file that holds one is not valid; one line says what was found, where and what is allowed.
 
-    `about` leads to the fault: field names and positions, such as ("relations", 3) or ("nodes", 0, "size").
+    `about` leads to the fault: field names and positions, such as ("relations", 3) or ("nodes", 0, "size"). `others`
+    are further faults of the same text; a file's message has a line for each.
     """
 
     def __init__(self, message: str, about: tuple[str | int, ...] = ()) -> None:
         super().__init__(message)
         self.about = about
+        self.others: tuple[GraphError, ...] = ()
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
@@ -28,16 +30,13 @@ def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
     orders that the vocabulary defines (left and right are one order along the room's z axis, bigger, smaller and `in`
     are one order of volumes ...), of which "A left B, B left A" and "A bigger B, A smaller B" are the shortest cases.
     """
-    known, stated = set(names), dict[Triple, int]()
+    stated = dict[Triple, int]()
+    wrong = unknown_ends(triples, set(names))
+    if wrong:
+        wrong[0].others = tuple(wrong[1:])
+        raise wrong[0]
     for position, (subject, predicate, object_) in enumerate(triples):
         here = ("relations", position)
-        for role, name in (("subject", subject), ("object", object_)):
-            if name not in known:
-                raise GraphError(
-                    f"relation '{subject} {predicate} {object_}': {role} {name!r} is no object of this graph, "
-                    f"allowed: {listed(sorted(known))}",
-                    here,
-                )
         if subject == object_:
             raise GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself", here)
         if (subject, predicate, object_) in stated:
@@ -52,6 +51,21 @@ def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
                 raise GraphError(f"{said[0]} contradicts {said[1]} ({order} order)", here)
             together = f"{', '.join(said[:-1])} and {said[-1]}"
             raise GraphError(f"{together} contradict each other: a cycle in the {order} order", here)
+
+
+def unknown_ends(triples: Sequence[Triple | None], known: Collection[str]) -> list[GraphError]:
+    """An error for every relation whose subject or object is not among the names `known`; None is passed over."""
+    return [
+        GraphError(
+            f"relation '{' '.join(triple)}': {role} {name!r} is no object of this graph, "
+            f"allowed: {listed(sorted(known))}",
+            ("relations", position),
+        )
+        for position, triple in enumerate(triples)
+        if triple is not None
+        for role, name in (("subject", triple[0]), ("object", triple[2]))
+        if name not in known
+    ]
 
 
 def ordered_edges(triples: Iterable[Triple]) -> dict[str, dict[tuple[str, str], Triple]]:

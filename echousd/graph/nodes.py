@@ -32,7 +32,9 @@ class PlainModel(BaseModel):
         if first["type"] == "extra_forbidden":
             message = f"unknown field, allowed: {', '.join(cls.model_fields)}"
         about = (*first["loc"], *getattr(cause, "about", ()))
-        return GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
+        found = GraphError(f"{cls._title(fields)}{where + ': ' if where else ''}{message}", about)
+        found.others = getattr(cause, "others", ())
+        return found
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:

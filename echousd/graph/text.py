@@ -11,14 +11,14 @@ from __future__ import annotations
 import difflib
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
 import yaml
 
 from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph.consistency import GraphError
+from echousd.graph.consistency import GraphError, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
@@ -27,6 +27,7 @@ from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
 
+MAX_ERRORS = 20  # of one file that are told
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
@@ -42,11 +43,14 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
     try:
         return graph_from_plain(kind, located.data)
     except GraphError as error:
-        path, line = _written(located, error.about), None
-        if path:
-            line = located.line(path)
-        where = f"line {line}: " if line else ""
-        raise GraphError(_with_source(source, where + str(error)), error.about) from None
+        said = [_with_source(source, _with_line(located, each)) for each in (error, *error.others)]
+        raise GraphError("\n".join(said), error.about) from None
+
+
+def _with_line(located: Located, error: GraphError) -> str:
+    path = _written(located, error.about)
+    line = located.line(path) if path else None
+    return f"line {line}: {error}" if line else str(error)
 
 
 def _with_source(source: str, message: str) -> str:
@@ -78,10 +82,13 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
         types = ", ".join(kind.name for kind in vocabulary().room_types)
         raise GraphError(f"room is missing, allowed: one of {types}, or a mapping with type")
     key = "nodes" if "nodes" in data else "objects"
-    room = _room(data)
+    errors: list[GraphError] = []
+    at = ("relations",)
+    room = _tried(errors, lambda: _room(data))
+    entries = list(enumerate(_objects(data.get(key), key)))
     nodes = [
-        _built(Node, _in_radians(fields, ("nodes", i)), ("nodes", i))
-        for i, fields in enumerate(_objects(data.get(key), key))
+        _tried(errors, lambda i=i, fields=fields: _built(Node, _in_radians(fields, ("nodes", i)), ("nodes", i)))
+        for i, fields in entries
     ]
     stated = data.get("relations")
     if not isinstance(stated, list | None):
@@ -89,9 +96,24 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
             f"relations: found {shown(stated)}, allowed: a list such as [bed left wardrobe]", ("relations",)
         )
     relations = [
-        _built(Relation, _relation(entry, ("relations", i)), ("relations", i)) for i, entry in enumerate(stated or ())
+        _tried(errors, lambda i=i, entry=entry: _built(Relation, _relation(entry, (*at, i)), (*at, i)))
+        for i, entry in enumerate(stated or ())
     ]
+    if errors:
+        named = {str(fields["name"]) for _, fields in entries if "name" in fields}
+        errors += unknown_ends([None if r is None else r.triple for r in relations], named)
+        errors[0].others = tuple(errors[1:MAX_ERRORS])
+        raise errors[0]
     return kind(room, tuple(nodes), tuple(relations))
+
+
+def _tried(errors: list[GraphError], build: Callable[[], Any]) -> Any:
+    """What a function builds; its `GraphError` is added to `errors`, so that all of a file are told at once."""
+    try:
+        return build()
+    except GraphError as error:
+        errors.append(error)
+        return None
 
 
 def _room(data: Mapping[str, Any]) -> RoomSpec:
@@ -208,7 +230,11 @@ def _relation(entry: Any, about: Path) -> dict[str, Any]:
         raise GraphError(
             f"relation {shown(entry)}: allowed: subject predicate object, such as bed left wardrobe", about
         )
-    return {"subject": words[0], "predicate": " ".join(words[1:-1]), "object": words[-1]}
+    subject, predicate, object_ = words[0], " ".join(words[1:-1]), words[-1]
+    turned = vocabulary().swapped(predicate)  # "table under lamp" is "lamp above table"
+    if turned is not None:
+        subject, predicate, object_ = object_, turned.name, subject
+    return {"subject": subject, "predicate": predicate, "object": object_}
 
 
 def plain(graph: SceneGraph) -> dict[str, Any]:

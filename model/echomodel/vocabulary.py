@@ -12,6 +12,7 @@ from functools import cache, cached_property
 from importlib import resources
 from typing import Any, Literal
 
+TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet
 SUPPORTS = ("floor", "table", "wall", "ceiling")
 MEASURES = ("place", "size", None)
 UNITES = ("style", "shape")
@@ -155,6 +156,7 @@ class Vocabulary:
     predicates: tuple[Predicate, ...]
     room_types: tuple[RoomType, ...]
     unsupported: tuple[str, ...]
+    meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -185,6 +187,10 @@ class Vocabulary:
     def sgfront_predicates(self) -> dict[int, str]:
         """Id and spelling of SG-FRONT's predicates, `in` (0) among them."""
         return {entry.id: entry.sgfront for entry in self.predicates if entry.sgfront is not None}
+
+    def swapped(self, word: str) -> Predicate | None:
+        """The predicate that `word` means with subject and object exchanged, such as above for under."""
+        return next((entry for entry in self.predicates if normalised(word) in entry.swapped), None)
 
     def uniting(self, what: str) -> tuple[int, ...]:
         """Ids of the predicates whose objects have `what` (one of `UNITES`) in common."""
@@ -246,7 +252,11 @@ class Vocabulary:
                 if key in predicate.swapped:
                     raise UnknownWord(f"unknown predicate {word!r}: swap the two objects and say {predicate.name}")
         unsupported = kind == "category" and key in self.unsupported
-        close = [] if unsupported else difflib.get_close_matches(key, index, n=3)
+        meant = self.meant.get(kind, {}).get(key)
+        if meant is not None:
+            hint = f"nearest by meaning: {', '.join(meant)}" if meant else f"allowed: {', '.join(self._names(kind))}"
+            raise UnknownWord(f"unknown {kind} {word!r} (not supported): {hint}")
+        close = [] if unsupported else difflib.get_close_matches(key, index, n=3, cutoff=TYPO)
         close = [match for match in close if _alike(key, match) > _alike(key, close[0]) - 0.1]
         near = list(dict.fromkeys(self._name(kind, index[match]) for match in close))
         hint = f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(self._names(kind))}"
@@ -316,4 +326,5 @@ def _shipped() -> Vocabulary:
         predicates=tuple(Predicate(**frozen(entry)) for entry in raw["predicates"]),
         room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
         unsupported=tuple(raw["unsupported"]),
+        meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},
     )

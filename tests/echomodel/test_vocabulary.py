@@ -41,8 +41,9 @@ REAL_ROOM_CATEGORIES = (
 
 
 def test_predicates_are_sgfronts_by_id():
-    assert tuple(predicate.sgfront for predicate in WORDS.predicates) == SGFRONT_RELATIONS
-    assert [predicate.id for predicate in WORDS.predicates] == list(range(16))
+    assert tuple(predicate.sgfront for predicate in WORDS.predicates[:16]) == SGFRONT_RELATIONS
+    assert [predicate.id for predicate in WORDS.predicates] == list(range(20))
+    assert not any(predicate.sgfront for predicate in WORDS.predicates[16:])
 
 
 def test_the_first_34_categories_are_sgfronts_and_twelve_more_follow():
@@ -135,7 +136,7 @@ def test_what_people_type(word, name):
 
 
 def test_sgfront_spelling_of_a_predicate_is_understood():
-    for predicate in WORDS.predicates:
+    for predicate in WORDS.predicates[:16]:
         assert WORDS.predicate(predicate.sgfront) is predicate
         assert WORDS.predicate_id(predicate.sgfront) == predicate.id
 
@@ -175,8 +176,8 @@ def test_room_types_of_real_rooms():
         (WORDS.predicate, "standing_no", "unknown predicate 'standing_no': did you mean standing_on?"),
         (WORDS.predicate, "below", "unknown predicate 'below': swap the two objects and say above"),
         (WORDS.room_type, "bedrom", "unknown room type 'bedrom': did you mean bedroom?"),
-        (WORDS.room_type, "garage", "unknown room type 'garage': allowed: bedroom, living_room, dining_room, "
-         "living_dining_room, study"),
+        (WORDS.room_type, "garage", "unknown room type 'garage' (not supported): allowed: bedroom, living_room, "
+         "dining_room, living_dining_room, study"),
     ],
 )  # fmt: skip
 def test_unknown_words_name_the_nearest(ask, word, text):

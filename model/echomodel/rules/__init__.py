@@ -3,15 +3,20 @@
 from echomodel.rules.labels import label_relations, label_rooms
 from echomodel.rules.margins import margins, measured, verdicts
 from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, rule, rule_set
+from echomodel.rules.turned import aligned, centred, facing, opposite  # registers them
 
 __all__ = [
     "RULE_SETS",
     "Rule",
     "RuleSet",
+    "aligned",
+    "centred",
+    "facing",
     "label_relations",
     "label_rooms",
     "margins",
     "measured",
+    "opposite",
     "rule",
     "rule_set",
     "verdicts",

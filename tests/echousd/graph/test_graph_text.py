@@ -281,3 +281,28 @@ def test_angles_that_cannot_be_meant(written, said):
     with pytest.raises(GraphError) as caught:
         SceneGraph.from_yaml(f"room: bedroom\nobjects: {{bed: {{category: bed, {written}}}}}\n")
     assert str(caught.value) == said
+
+
+def test_all_faults_of_a_file_are_told_at_once(tmp_path, echousd_command):
+    path = tmp_path / "x.yaml"
+    path.write_text(
+        "room: bathroom\nobjects:\n  a: bedd\n  b: desk\nrelations:\n  - a left b\n  - a lefft b\n  - a left c\n"
+    )
+    done = echousd_command("new", tmp_path / "out.usda", "--from", path)
+    assert done.code == 2
+    told = [line.removeprefix(f"error: {path}:") for line in done.err.splitlines()]
+    assert [line.split(":")[0] for line in told] == ["1", "3", "7", "8"]
+    assert told[3] == "8: relation 'a left c': object 'c' is no object of this graph, allowed: a, b"
+    assert not (tmp_path / "out.usda").exists()
+    path.write_text("room: study\nobjects: {a: bed, b: desk}\nrelations: [a left c, b left d, a left b]\n")
+    with pytest.raises(GraphError) as caught:
+        load_graph(path)
+    assert len(str(caught.value).splitlines()) == 2
+
+
+def test_words_for_the_other_way_round():
+    graph = SceneGraph.from_yaml(
+        "room: study\nobjects: {desk: desk, lamp: pendant_lamp, cup: plant}\n"
+        "relations: [desk under lamp, desk carries cup]\n"
+    )
+    assert [str(relation) for relation in graph.relations] == ["lamp above desk", "cup standing_on desk"]

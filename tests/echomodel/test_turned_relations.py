@@ -1,0 +1,70 @@
+"""Relations that ask how objects are turned: measured by the strict rules, never labelled."""
+
+import math
+
+import pytest
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.rules import margins, rule_set, verdicts
+from echomodel.vocabulary import UnknownWord, vocabulary
+
+WORDS = vocabulary()
+
+
+def kept(predicate, offset, yaw, other=0.0):
+    """Whether a subject at `offset` (x, z) from the object, turned by `yaw`, keeps a relation to it."""
+    boxes = Boxes(
+        torch.ones(2, 3), torch.tensor([[offset[0], 0.0, offset[1]], [0.0, 0.0, 0.0]]), torch.tensor([yaw, other])
+    )
+    return bool(verdicts(boxes, torch.tensor([[0, WORDS.predicate_id(predicate), 1]])))
+
+
+def test_facing():
+    assert kept("facing", (0.0, -2.0), 0.0)  # at yaw 0 the front looks along +Z
+    assert kept("faces", (0.0, -2.0), math.radians(29))
+    assert not kept("facing", (0.0, -2.0), math.radians(31))
+    assert kept("looking at", (2.0, 0.0), -math.pi / 2)
+    assert not kept("facing", (2.0, 0.0), math.pi / 2)
+
+
+def test_opposite_asks_both():
+    assert kept("across from", (0.0, -2.0), 0.0, math.pi)
+    assert not kept("opposite", (0.0, -2.0), 0.0, 0.0)
+    assert not kept("opposite", (0.0, -2.0), math.pi, math.pi)
+
+
+def test_lines_are_the_objects():
+    assert kept("aligned_with", (2.0, 0.05), 0.3)
+    assert not kept("aligned_with", (2.0, 0.2), 0.0)
+    assert kept("aligned_with", (math.sqrt(2), -math.sqrt(2)), 0.0, math.pi / 4)
+    assert kept("centered on", (0.05, 3.0), 1.0)
+    assert not kept("centered_on", (3.0, 0.05), 1.0)
+
+
+def test_they_are_differentiable_and_not_labelled():
+    position = torch.tensor([[0.3, 0.0, -2.0], [0.0, 0.0, 0.0]], requires_grad=True)
+    yaw = torch.tensor([1.0, 0.2], requires_grad=True)
+    rows = torch.tensor(
+        [[0, WORDS.predicate_id(name), 1] for name in ("facing", "opposite", "aligned_with", "centered_on")]
+    )
+    margins(Boxes(torch.ones(2, 3), position, yaw), rows).sum().backward()
+    assert position.grad.isfinite().all()
+    assert yaw.grad.abs().sum() > 0
+    assert not set(rows[:, 1].tolist()) & rule_set("strict").labels.keys()
+    assert not set(rows[:, 1].tolist()) & rule_set("sgfront").margins.keys()
+
+
+@pytest.mark.parametrize(
+    ("ask", "word", "said"),
+    [
+        (WORDS.room_type, "bathroom", "unknown room type 'bathroom' (not supported): allowed: bedroom, living_room"),
+        (WORDS.room_type, "kids room", "unknown room type 'kids room' (not supported): nearest by meaning: bedroom"),
+        (WORDS.category, "carpet", "unknown category 'carpet' (not supported): allowed: armchair"),
+        (WORDS.category, "fridge", "unknown category 'fridge' (not supported): nearest by meaning: cabinet"),
+    ],
+)
+def test_words_that_are_no_slips_are_not_taken_for_one(ask, word, said):
+    with pytest.raises(UnknownWord) as caught:
+        ask(word)
+    assert str(caught.value).startswith(said)

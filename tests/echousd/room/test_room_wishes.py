@@ -1,0 +1,119 @@
+"""Wishes about a finished room: where things stand, how they are turned, what is locked; and those of a layer."""
+
+import hashlib
+import math
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.room.reading import read_room
+from echousd.room.wishes import Wishes, wished
+
+
+@pytest.fixture(autouse=True)
+def model(monkeypatch):
+    from echomodel.echo import EchoModel
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+
+
+@pytest.fixture
+def root(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+    return room.save(tmp_path / "bedroom", preview=False)
+
+
+def box(root, name):
+    saved = read_room(root)
+    row = saved.graph.names.index(name)
+    return [np.asarray(v[row], float) for v in (saved.boxes.size, saved.boxes.position, saved.boxes.yaw)]
+
+
+def files(folder):
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_move_turn_lock_and_restyle_at_once(root, echousd_command):
+    before = files(root.parent)
+    words = ("--move", "wardrobe:1.2,1.0", "--turn", "wardrobe:180", "--lock", "bed", "--restyle", "bed:oak")
+    done = echousd_command("edit", root, "--shapes", "boxes", *words)
+    assert done.code in (0, 1), done.err  # the wish may cost a relation
+    _, position, yaw = box(root, "wardrobe")
+    np.testing.assert_allclose(position, (1.2, 0.0, 1.0), atol=1e-3)
+    assert abs(math.remainder(float(yaw) - math.pi, 2 * math.pi)) < 1e-3
+    graph = echousd.read_graph(root)
+    assert graph.node("bed").locked
+    assert graph.node("bed").style == "oak"
+    after = files(root.parent)
+    assert after["wardrobe_geo.usdc"] == before["wardrobe_geo.usdc"]
+
+
+def test_another_category_keeps_its_place(root, echousd_command):
+    _, position, yaw = box(root, "nightstand_right")
+    done = echousd_command("edit", root, "--shapes", "boxes", "--relabel", "nightstand_right:table_lamp")
+    assert done.code in (0, 1), done.err
+    _, after, turned = box(root, "nightstand_right")
+    np.testing.assert_allclose(after, position, atol=2e-3)
+    assert float(turned) == pytest.approx(float(yaw), abs=1e-3)
+
+
+def test_dry_run_says_what_would_happen_and_writes_nothing(root, echousd_command):
+    before = files(root.parent)
+    done = echousd_command("edit", root, "--add", "chair:stool", "--relate", "lamp left of bed", "--dry-run")
+    assert done.code == 0, done.err
+    assert "+ object chair (stool)" in done.out
+    assert "new      chair" in done.out
+    assert "moves    lamp" in done.out
+    assert files(root.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--move", "bed:here"), "found 'bed:here', allowed: name:x,z or name:x,y,z, metres"),
+        (("--resize", "bed:1,2"), "found 'bed:1,2', allowed: name:x,y,z, metres"),
+        (("--turn", "bed:east"), "object 'bed': yaw: found 'east', allowed: radians, or degrees as in 90 deg"),
+        (("--lock", "sofa"), "no object 'sofa' in this graph"),
+    ],
+)
+def test_wishes_that_cannot_be_read(root, echousd_command, words, said):
+    done = echousd_command("edit", root, *words)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_unlocked_things_may_move_again(root):
+    saved = read_room(root)
+    locked = wished(saved, Wishes(lock=("bed",)))
+    assert locked.node("bed").position is not None
+    free = locked.update_node("bed", locked=False, position=None, yaw=None)
+    assert free == saved.graph
+
+
+def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
+    path = root.with_name("mine.usda")
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    place = stage.GetPrimAtPath("/Room/Objects/wardrobe").GetAttribute("xformOp:translate")
+    place.Set((1.0, 0.0, 1.1))
+    layer.Save()
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    done = echousd_command("update", path, "--dry-run")
+    assert done.code == 0, done.err
+    assert "locked   wardrobe, where mine.usda puts it" in done.out
+    done = echousd_command("update", path)
+    assert done.code in (0, 1), done.err
+    node = echousd.read_graph(root).node("wardrobe")
+    assert node.locked
+    np.testing.assert_allclose(node.position, (1.0, 0.0, 1.1), atol=1e-4)
+    np.testing.assert_allclose(box(root, "wardrobe")[1], (1.0, 0.0, 1.1), atol=1e-3)
+    done = echousd_command("update", path)
+    assert done.code == 2
+    assert "mine.usda: changes nothing about the room" in done.err
+    done = echousd_command("update", root)
+    assert done.code == 2
+    assert "the room's own root layer; name the stronger layer" in done.err
