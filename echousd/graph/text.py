@@ -83,22 +83,15 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
         raise GraphError(f"room is missing, allowed: one of {types}, or a mapping with type")
     key = "nodes" if "nodes" in data else "objects"
     errors: list[GraphError] = []
-    at = ("relations",)
-    room = _tried(errors, lambda: _room(data))
+    room = _tried(errors, _room, data)
     entries = list(enumerate(_objects(data.get(key), key)))
-    nodes = [
-        _tried(errors, lambda i=i, fields=fields: _built(Node, _in_radians(fields, ("nodes", i)), ("nodes", i)))
-        for i, fields in entries
-    ]
+    nodes = [_tried(errors, _node, fields, ("nodes", i)) for i, fields in entries]
     stated = data.get("relations")
     if not isinstance(stated, list | None):
         raise GraphError(
             f"relations: found {shown(stated)}, allowed: a list such as [bed left wardrobe]", ("relations",)
         )
-    relations = [
-        _tried(errors, lambda i=i, entry=entry: _built(Relation, _relation(entry, (*at, i)), (*at, i)))
-        for i, entry in enumerate(stated or ())
-    ]
+    relations = [_tried(errors, _stated_relation, entry, ("relations", i)) for i, entry in enumerate(stated or ())]
     if errors:
         named = {str(fields["name"]) for _, fields in entries if "name" in fields}
         errors += unknown_ends([None if r is None else r.triple for r in relations], named)
@@ -107,10 +100,20 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     return kind(room, tuple(nodes), tuple(relations))
 
 
-def _tried(errors: list[GraphError], build: Callable[[], Any]) -> Any:
+def _node(fields: dict[str, Any], about: Path) -> Node:
+    built: Node = _built(Node, _in_radians(fields, about), about)
+    return built
+
+
+def _stated_relation(entry: Any, about: Path) -> Relation:
+    built: Relation = _built(Relation, _relation(entry, about), about)
+    return built
+
+
+def _tried(errors: list[GraphError], build: Callable[..., Any], *words: Any) -> Any:
     """What a function builds; its `GraphError` is added to `errors`, so that all of a file are told at once."""
     try:
-        return build()
+        return build(*words)
     except GraphError as error:
         errors.append(error)
         return None
