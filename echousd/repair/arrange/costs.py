@@ -20,6 +20,8 @@ UNPLACED = 0.15  # weight of relations to what is not placed yet, whose draft co
 BLOCKED = 3.0  # for a front that cannot be opened
 ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regretted
 CROWDED = 0.7  # for a chair in the way of a front
+MASSIVE = ("sofa", "board", "bed", "storage")
+WAY, NARROW = 0.9, 1.3  # metres between a set table and other groups, and the price of none at all
 SLACK = 0.01  # metres or ratio by which relations are to hold
 
 
@@ -70,6 +72,8 @@ def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     others = np.flatnonzero(state.placed)
     others = others[others != i]
     depth = depths(size, poses, setting.size[others], state.position[others], state.yaw[others])
+    if setting.standing(i):
+        total += _too_near(setting, i, others, -depth)
     depth = np.maximum(depth - setting.shared[i, others], 0.0)
     total += (HIT * (depth > GRAZE) + DEEP * depth).sum(1)
     out = np.maximum(beyond(setting, size, poses), 0.0)
@@ -77,6 +81,16 @@ def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     if setting.standing(i):
         total += _in_zones(setting, state, i, poses, others)
     return total + _relations(setting, state, i, poses)
+
+
+def _too_near(setting: Setting, i: int, others: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """(K,): a set table and the furniture of other groups keep a way between them; gap (K, m) float, metres."""
+    rival = [
+        setting.standing(j) and (setting.laid[i] or setting.laid[j])
+        and setting.kinds[j].role in MASSIVE and setting.kinds[i].role in MASSIVE
+        for j in others
+    ]  # fmt: skip
+    return NARROW * (1 - gap[:, rival] / WAY).clip(0.0, 1.0).sum(1)
 
 
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:

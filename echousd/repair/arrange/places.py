@@ -42,13 +42,21 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     elif kind.wall or (kind.role == "board" and kind.access > 0):
         rows += along_walls(setting, i, lonely)
         if kind.role == "sofa":
-            rows += in_the_open(setting, i, 3.0 + lonely)
+            rows += in_the_open(setting, i, 4.5 + lonely)
     elif kind.role in ("decor", "light", "storage"):
         rows += along_walls(setting, i, lonely) + corners(setting, i, lonely)
     else:
         rows += in_the_open(setting, i, lonely)
         rows += along_walls(setting, i, lonely + 0.5)
-    rows = [*rows, *as_drawn(setting, i, draft, OFF_WALL if kind.wall else 1.0 + lonely)]
+    rows = [
+        *rows,
+        *as_drawn(
+            setting,
+            i,
+            draft,
+            OFF_WALL if kind.wall else (3.0 if kind.role == "board" and kind.access else 1.0) + lonely,
+        ),
+    ]
     out = Poses.of(rows, height)
     return _as_told(setting, i, out)
 
@@ -183,7 +191,7 @@ def overhead(setting: Setting, state: State, i: int) -> list[Row]:
         rows.append((float(state.position[j, 0]), float(state.position[j, 2]), float(state.yaw[j]), price))
     middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
     low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
-    rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.3 if low else 0.0))
+    rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.9 if low and rows else 0.0))
     return rows
 
 

@@ -95,6 +95,13 @@ class Setting:
         return {}
 
     @cached_property
+    def laid(self) -> np.ndarray:
+        """(n,) bool, tables at which two or more sit."""
+        seats = np.array([kind.stands == "at" for kind in self.kinds])
+        counts = [int((seats & (self.anchor == i)).sum()) for i in range(len(self.kinds))]
+        return np.array(counts) > 1
+
+    @cached_property
     def movable(self) -> np.ndarray:
         """(n,) bool, seats that are moved aside to open something."""
         return np.array([kind.role == "seat" and not kind.access for kind in self.kinds])

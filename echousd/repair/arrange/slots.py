@@ -67,7 +67,7 @@ def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
                 price = more + push
                 out.append((lateral, -forward, 0.0, price))
                 out.append((lateral, forward, math.pi, price))
-    at_ends = 0.35 if count <= 2 * wanted else 0.1
+    at_ends = 0.9 if count <= 2 * wanted else 0.1
     for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.3)):
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
