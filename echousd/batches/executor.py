@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 POLL = 0.25  # seconds between two looks at the workers' memory and time
-THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PXR_WORK_THREAD_LIMIT")
+THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 @dataclass(frozen=True)

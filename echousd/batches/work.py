@@ -132,7 +132,7 @@ def _rows(boxes: Any) -> Rows:
 
 def _facts(made: Any, root: Path) -> dict[str, Any]:
     from echousd.check import check_room
-    from echousd.room.living import living_faults
+    from echousd.repair.living import living_faults
 
     report = check_room(root)
     floor, geometry = made.floor, made.geometry
@@ -151,7 +151,7 @@ def _facts(made: Any, root: Path) -> dict[str, Any]:
         "categories": dict(sorted(Counter(node.category for node in made.graph.nodes).items())),
         "relations_asked": states["kept"] + states["broken"],
         "relations_kept": states["kept"],
-        "living_faults": [fault.sentence(made.names) for fault in living_faults(made.graph, made.boxes, floor)],
+        "living_faults": [fault.says for fault in living_faults(made.graph, made.boxes)],
         "collisions": len(report.collisions),
         "check": report.ok,
         "check_errors": [f"{fault.rule} <{fault.prim}>: {fault.message}"[:300] for fault in report.errors][:10],

@@ -57,6 +57,8 @@ def run(
     shapes: Annotated[str | None, typer.Option(help="parts, sdf or boxes; default: the best of the model.")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
+    drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
+    dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
     json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
 ) -> None:
@@ -73,7 +75,13 @@ def run(
     raw["sources"] = [*raw.get("sources", []), *(word for word in words if word not in files)]
     raw["sample"] = {**raw.get("sample", {}), **parse_sample(sample)}
     raw |= {key: value for key, value in (("count", count), ("seed", seed)) if value is not None}
-    told = {"shapes": shapes, "weights": str(weights) if weights else None, "preview": preview, "walls": walls}
+    told: dict[str, Any] = {
+        "shapes": shapes,
+        "weights": str(weights) if weights else None,
+        "preview": preview,
+        "walls": walls,
+    }
+    told |= {"drafts": drafts, "dress": dress, "walls": walls}
     raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
     request = request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:

@@ -1,0 +1,213 @@
+"""Runs in one process: rooms that are complete stay, what fails is told, what another run does is respected."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from pxr import Usd
+
+from echousd.batches import batch as front
+from echousd.batches import run as running
+from echousd.batches import work
+from echousd.batches.batch import batch, generate_many
+from echousd.batches.executor import Outcome, attempt
+from echousd.batches.journal import read_journals, room_digest, shard_folder
+from echousd.batches.verify import finish, status, verify
+from echousd.graph import SceneGraph
+from echousd.room.lock import locked
+
+SAMPLES = Path(__file__).parents[3] / "samples"
+QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
+
+
+class Inline:
+    """Runs tasks where it stands; `fates` are forced upon the first tries of some."""
+
+    def __init__(self, fates=()):
+        self.fates, self.done, self.megabytes, self.calls = dict(fates), [], 0.0, []
+
+    @property
+    def free(self):
+        return 1 - len(self.done)
+
+    def submit(self, task):
+        self.calls.append(task.key)
+        forced = self.fates.get(task.key)
+        if forced:
+            fate = forced.pop(0)
+            self.done.append(Outcome(task, fate, error=f"forced: {fate}"))
+            return
+        fate, value = attempt(task.call, task.given)
+        self.done.append(Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value))
+
+    def outcomes(self, seconds):
+        out, self.done = self.done, []
+        return out
+
+    def close(self):
+        pass
+
+
+def small(tmp_path):
+    """Two graphs of two objects, one of them in JSON lines beside a poisonous one."""
+    graph = {"room": {"type": "bedroom"}, "nodes": [], "relations": []}
+    texts = []
+    for things in (("double_bed", "wardrobe"), ("desk", "office_chair")):
+        nodes = [{"name": thing, "category": thing} for thing in things]
+        texts.append(json.dumps({**graph, "nodes": nodes}))
+    path = tmp_path / "graphs.jsonl"
+    path.write_text(f'{texts[0]}\n{{"room": "cellar"\n{texts[1]}\n')
+    return path
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory):
+    """An undisturbed run: two good graphs and a poisonous one."""
+    folder = tmp_path_factory.mktemp("batch")
+    source = small(folder)
+    result = batch(source, folder / "run", executor=Inline(), workers=1, **QUICK)
+    return source, folder / "run", result
+
+
+def digests(folder):
+    return {path.name: room_digest(path) for path in sorted((folder / "rooms").glob("*/*"))}
+
+
+def test_a_poisonous_graph_is_recorded_and_the_others_are_made(calm):
+    source, folder, result = calm
+    assert (result.rooms, result.done, result.failed, result.complete) == (3, 2, 1, False)
+    failed = [row for row in read_journals(folder).values() if row["state"] == "failed"]
+    assert len(failed) == 1
+    assert f"{source}:2" in failed[0]["error"]
+    assert next((wrong.room[-6:], wrong.problem[:7]) for wrong in verify(folder)) == ("000001", "failed:")
+
+
+def test_manifest_sheet_and_index_hold_every_room(calm):
+    _, folder, _ = calm
+    found = finish(folder)
+    rows = [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+    assert [row["state"] for row in rows] == ["done", "failed", "done"]
+    assert rows[0]["categories"] == {"double_bed": 1, "wardrobe": 1}
+    assert (folder / rows[0]["root"]).is_file()
+    assert rows[0]["sha256"] == room_digest((folder / rows[0]["root"]).parent)
+    assert (found["done"], found["failed"]) == (2, 1) == (status(folder)["done"], status(folder)["failed"])
+    page = (folder / "index.html").read_text()
+    assert page.index("graphs_000001") < page.index("graphs_000000")  # broken first
+    assert "http" not in page
+    stage = Usd.Stage.Open(str(folder / "index.usda"), Usd.Stage.LoadNone)
+    assert len(stage.GetPrimAtPath("/Rooms").GetAllChildren()) == 2
+    stage.Load()
+    assert stage.GetPrimAtPath("/Rooms/graphs_000000/Objects").IsValid()
+
+
+def test_a_run_that_was_ended_is_gone_on_with_to_the_same_bytes(calm, tmp_path):
+    source, folder, _ = calm
+    out = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        batch(source, out, executor=Inline(), workers=1, progress=_interrupt, **QUICK)
+    assert len(digests(out)) < 2
+    executor = Inline({"layouts 0": ["died"], "room graphs_000002": ["died", "died"]})
+    result = batch(source, out, executor=executor, workers=1, resume=True, **QUICK)
+    assert (result.done, result.failed) == (2, 1)
+    assert digests(out) == digests(folder)
+    again = Inline()
+    batch(source, out, executor=again, workers=1, resume=True, **QUICK)
+    assert again.calls == []
+
+
+def _interrupt(progress):
+    raise KeyboardInterrupt
+
+
+def test_a_damaged_room_is_made_again_and_set_aside(calm, tmp_path):
+    source, folder, _ = calm
+    out = tmp_path / "run"
+    shutil.copytree(folder, out)
+    (out / "rooms" / "0000" / "graphs_000000" / "layers" / "graph.usda").write_text("#usda 1.0\n")
+    assert "graphs_000000: changed since it was made" in [f"{w.room}: {w.problem}" for w in verify(out)]
+    batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
+    assert digests(out) == digests(folder)
+    assert len(list((out / ".batch" / "set_aside").iterdir())) == 1
+
+
+def test_a_room_that_kills_every_worker_is_given_up(calm, tmp_path):
+    source, _, _ = calm
+    executor = Inline({"room graphs_000000": ["died"] * 9, "room graphs_000002": ["limit"]})
+    result = batch(source, tmp_path / "run", executor=executor, workers=1, **QUICK)
+    assert (result.done, result.failed) == (0, 3)
+    assert executor.calls.count("room graphs_000000") == running.TRIES
+    assert executor.calls.count("room graphs_000002") == 1
+
+
+def test_max_failures_stops_the_run(calm, tmp_path):
+    source, _, _ = calm
+    result = batch(source, tmp_path / "run", executor=Inline(), workers=1, max_failures=0, **QUICK)
+    assert result.stopped == "1 rooms failed, allowed: 0"
+
+
+def test_a_full_disk_stops_the_run(calm, tmp_path, monkeypatch):
+    source, folder, _ = calm
+    out = tmp_path / "run"
+
+    def full(job):
+        raise ValueError(f"{job.folder}: cannot be written (No space left on device); nothing was changed")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(work, "room", full)
+        result = batch(source, out, executor=Inline(), workers=1, **QUICK)
+    assert "no space left on device; make room and go on with --resume" in result.stopped
+    assert batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK).done == 2
+    assert digests(out) == digests(folder)
+
+
+def test_another_plan_and_another_run_are_refused(calm, tmp_path):
+    source, folder, _ = calm
+    with pytest.raises(ValueError, match=r"another plan \(seed was 0, now 4\)"):
+        batch(source, folder, executor=Inline(), resume=True, seed=4, **QUICK)
+    with pytest.raises(ValueError, match=r"holds a run of 3 rooms; go on with it \(--resume\)"):
+        batch(source, folder, executor=Inline(), **QUICK)
+    with locked(shard_folder(folder, (0, 1))):
+        import threading
+
+        said = []
+        thread = threading.Thread(target=lambda: said.append(_refusal(source, folder)))
+        thread.start()
+        thread.join()
+    assert "is writing it" in said[0]
+    (tmp_path / "mine.txt").write_text("x")
+    with pytest.raises(ValueError, match=r"holds graphs.jsonl|holds mine\.txt and no run of echousd batch"):
+        batch(source, tmp_path, executor=Inline(), **QUICK)
+
+
+def _refusal(source, folder):
+    try:
+        batch(source, folder, executor=Inline(), resume=True, **QUICK)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def test_shards_make_the_same_rooms_together(calm, tmp_path):
+    source, folder, _ = calm
+    out = tmp_path / "run"
+    for i in range(2):
+        batch(source, out, executor=Inline(), workers=1, shard=(i, 2), **QUICK)
+    assert digests(out) == digests(folder)
+    with pytest.raises(ValueError, match="shard is 2/2, allowed: i/n"):
+        batch(source, out, executor=Inline(), shard=(2, 2), **QUICK)
+
+
+def test_generate_many_makes_the_same_rooms(calm, tmp_path):
+    source, folder, _ = calm
+    graphs = [SceneGraph.from_json(source.read_text().splitlines()[k]) for k in (0, 2)]
+    rooms = list(generate_many(graphs, **QUICK))
+    for room, name in zip(rooms, ("graphs_000000", "graphs_000002"), strict=True):
+        room.save(tmp_path / name, preview=False)
+        assert room_digest(tmp_path / name) == room_digest(folder / "rooms" / "0000" / name)
+
+
+def test_weights_are_known_by_their_bytes(tmp_path):
+    assert front.weights_hash("") == front.weights_hash("")
+    with pytest.raises(ValueError, match="no weights there"):
+        front.weights_hash(str(tmp_path))
