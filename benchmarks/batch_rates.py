@@ -1,0 +1,96 @@
+"""Rooms a second of a batch, against single warm `generate` calls and against the network's own time.
+
+    OMP_NUM_THREADS=1 python benchmarks/batch_rates.py [--rooms 16] [--shapes boxes] [--preview]
+
+Wanted: per room at least 2.5 times the single calls on boxes and 1.5 times with shapes (two workers, two cores), and at
+least 1.7 times from one worker to two. CPU seconds a room are printed beside: a busy machine does not change those.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+from echousd.batches import work
+from echousd.batches.batch import weights_hash
+from echousd.batches.executor import LocalWorkers, Task
+from echousd.batches.journal import Journal, shard_folder
+from echousd.batches.options import BatchRequest, request_of
+from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.run import Run
+
+
+def cpu() -> float:
+    """CPU seconds of this process and of its children that have ended."""
+    own, ended = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
+
+
+def one_by_one(request: BatchRequest, folder: Path) -> tuple[float, float]:
+    """Wall and CPU seconds of single warm calls, each judged and hashed as a batch does."""
+    plan = make_plan(request, "")
+    jobs = [
+        work.Job(e.id, str(folder / e.path), e.seed, plan.options[0], draw=e.draw) for e in plan.entries
+    ]  # no boxes: each is sampled alone
+    work.room(jobs[0])
+    wall, used = time.perf_counter(), cpu()
+    for job in jobs[1:]:
+        work.room(job)
+    return (time.perf_counter() - wall) / (len(jobs) - 1), (cpu() - used) / (len(jobs) - 1)
+
+
+def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, float]:
+    """Wall seconds a room with warm workers, and CPU seconds a room without their start."""
+    plan = make_plan(request, weights_hash(""))
+    folder.mkdir()
+    save_plan(plan, folder)
+    pool, journal = LocalWorkers(workers), Journal(shard_folder(folder, (0, 1)))
+    warm = [
+        work.Job("warm", str(folder / f"warm_{k}"), 0, plan.options[0], draw=("bedroom", 9, k)) for k in range(workers)
+    ]
+
+    for job in warm:
+        pool.submit(Task(job.folder, work.room, job))
+    ended = 0
+    while ended < workers:
+        ended += len(pool.outcomes(1.0))
+    begun = sum(_cpu_of(process) for process in pool.processes)
+    wall = time.perf_counter()
+    Run(plan, plan.packs(), frozenset(), folder, journal, workers).execute(pool)
+    wall = time.perf_counter() - wall
+    used = sum(_cpu_of(process) for process in pool.processes) - begun
+    pool.close()
+    return wall / len(plan.entries), used / len(plan.entries)
+
+
+def _cpu_of(process: int) -> float:
+    fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / 100
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rooms", type=int, default=16)
+    parser.add_argument("--shapes", default="boxes")
+    parser.add_argument("--preview", action="store_true")
+    parser.add_argument("--drafts", type=int, default=None)
+    options = parser.parse_args()
+    raw = {"shapes": options.shapes, "preview": options.preview, "drafts": options.drafts}
+    request = request_of({"sample": {"bedroom": options.rooms}, "options": raw}, "benchmark")
+    with tempfile.TemporaryDirectory() as scratch:
+        single = one_by_one(request, Path(scratch) / "single")
+        print(f"single     {single[0]:6.2f} s a room, CPU {single[1]:6.2f} s", flush=True)
+        for workers in (1, 2):
+            many = together(request, Path(scratch) / f"many_{workers}", workers)
+            print(
+                f"{workers} workers  {many[0]:6.2f} s a room, CPU {many[1]:6.2f} s: "
+                f"{single[0] / many[0]:.2f} times the single calls, {single[1] / many[1]:.2f} times by CPU",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
