@@ -101,8 +101,6 @@ def main() -> None:
     references = references_of(ShapeSet(options.shapes), graph.category.tolist()) if options.shapes else {}
     for sampler in SAMPLERS:
         for count in steps:
-            if sampler == "euler":  # the same as DDIM
-                continue
             if options.shapes:
                 print(shape_row(model, graph, truth, references, count, sampler), flush=True)
             else:

@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 Objective = Literal["noise", "velocity", "flow"]
 Prediction = Literal["output", "sample"]
-Sampler = Literal["euler", "ddim", "ancestral", "dpm2m"]
+Sampler = Literal["ddim", "ancestral", "dpm2m"]
 C = TypeVar("C")
 
 

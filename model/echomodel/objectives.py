@@ -50,12 +50,6 @@ def output_from(clean: Tensor, noisy: Tensor, level: Tensor, objective: Objectiv
     return noise if objective == "noise" else alpha * noise - sigma * clean
 
 
-def drawn_noise(like: Tensor, generator: torch.Generator | None) -> Tensor:
-    """Normal numbers of the shape, type and device of `like`, drawn where the generator is: equal on all devices."""
-    device = like.device if generator is None else generator.device
-    return torch.randn(like.shape, generator=generator, dtype=like.dtype, device=device).to(like.device)
-
-
 def draw_levels(count: int, generator: torch.Generator, device: torch.device | str = "cpu") -> Tensor:
     """Training levels, one per scene, stratified over (0, 1] so that every batch sees the whole range: (count,)."""
     offset = torch.rand(1, generator=generator)

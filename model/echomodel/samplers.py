@@ -24,11 +24,6 @@ Progress = Callable[[int, int], None]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
 
 
-def euler(predict: Predict, x: Tensor, levels: Tensor, objective: Objective, **options: object) -> Tensor:
-    """Euler steps along the straight line of rectified flow; for the other objectives the same as `ddim`."""
-    return ddim(predict, x, levels, objective, **options)  # type: ignore[arg-type]
-
-
 def ddim(
     predict: Predict,
     x: Tensor,
@@ -103,7 +98,7 @@ def dpm2m(
     return _march(step, predict, x, levels, known, known_mask, progress)
 
 
-SAMPLERS: dict[Sampler, Callable[..., Tensor]] = {"euler": euler, "ddim": ddim, "ancestral": ancestral, "dpm2m": dpm2m}
+SAMPLERS: dict[Sampler, Callable[..., Tensor]] = {"ddim": ddim, "ancestral": ancestral, "dpm2m": dpm2m}
 
 
 def sample(

@@ -31,7 +31,7 @@ SIZES = {
         "steps": 2,
         "components": 8,
         "tokens": 2,
-        "sampler": "euler",
+        "sampler": "ddim",
     },
 }
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
-from echomodel.objectives import drawn_noise
+from echomodel.randomness import normal
 from echomodel.training.shapes import draw_grids, read
 from echomodel.training.start import Start
 
@@ -62,7 +62,7 @@ class AutoencoderStage:
         count = self.batch // (2 if self.components else 1)
         grids = draw_grids(self.shapes, self.used, count, generator).to(model.device)
         latent = model.autoencoder.encode(grids)
-        noise = NOISE * drawn_noise(latent, generator)
+        noise = NOISE * normal(latent.shape, generator, latent.device)
         error = reconstruction_loss(grids, model.autoencoder.decode(latent + noise).float())
         if self.components is None:
             return error, {"reconstruction": error}
@@ -78,7 +78,7 @@ class AutoencoderStage:
         assert self.components is not None
         codes = self.components.codes(latent.float())
         if generator is not None:
-            codes = codes + NOISE * drawn_noise(codes, generator)
+            codes = codes + NOISE * normal(codes.shape, generator, codes.device)
         return self.components.latents(codes)
 
     @torch.no_grad()

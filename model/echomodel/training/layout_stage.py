@@ -11,8 +11,9 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import measurable, pair_features, wall_features
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import layout_predictor
-from echomodel.objectives import add_noise, clean_from, draw_levels, drawn_noise, target
+from echomodel.objectives import add_noise, clean_from, draw_levels, target
 from echomodel.openingrows import clearances
+from echomodel.randomness import normal
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import sample
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
@@ -53,7 +54,7 @@ def layout_loss(
     clean = batch.boxes.encode(scale)
     known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
     level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
-    noise = drawn_noise(clean, generator)
+    noise = normal(clean.shape, generator, clean.device)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
     context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale, batch.tidy)
     outputs = model.layout.drafts(noisy, level, context)
@@ -203,6 +204,6 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     layout = model.config.layout
     latent = model.latent(batch.graph.category, batch.pairs)
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
-    noise = drawn_noise(batch.boxes.size.new_empty(batch.graph.num_nodes, 8), generator)
+    noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
     return Boxes.decode(vectors, model.statistics.scale(batch.graph.category))

@@ -14,7 +14,8 @@ from echomodel.data.furniture.choices import OPEN
 from echomodel.data.furniture.description import draw_styles
 from echomodel.data.furniture.sizes import sample_size
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels, drawn_noise
+from echomodel.objectives import add_noise, draw_levels
+from echomodel.randomness import normal
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import PackedRooms, draw_batch
 from echomodel.training.shape_stage import ShapeBatch, draw_suites, first_of_group, shifted
@@ -39,7 +40,7 @@ def parts_loss(
     settings, scenes = model.config.furniture, batch.graph.num_scenes
     known = draw_known(batch.graph.scene, scenes, generator)
     level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
-    noise = drawn_noise(clean, generator)
+    noise = normal(clean.shape, generator, clean.device)
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
     shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[batch.graph.scene, None]
     noise = torch.where(shared, noise[first_of_group(batch)], noise)

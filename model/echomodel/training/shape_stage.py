@@ -12,7 +12,8 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels, drawn_noise, expand, output_from, target
+from echomodel.objectives import add_noise, draw_levels, expand, output_from, target
+from echomodel.randomness import normal
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
 from echomodel.training.shapes import EncodedShapes, encoded_set
@@ -62,7 +63,7 @@ def shape_loss(
     objective = settings.objective
     known = draw_known(batch.graph.scene, scenes, generator)
     level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
-    noise = drawn_noise(clean, generator)
+    noise = normal(clean.shape, generator, clean.device)
     # equal furniture starts from equal noise when sampled, so most of the scenes train that way
     shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)
     noise = torch.where(expand(shared[batch.graph.scene], noise), noise[first_of_group(batch)], noise)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -154,10 +154,6 @@ class Style:
             piping=float(rng.uniform(0, 1)),
             finish=float(rng.uniform(0, 1)),
         )
-
-    def to_dict(self) -> dict[str, object]:
-        """All fields as plain data, for catalogues and previews."""
-        return {entry.name: getattr(self, entry.name) for entry in fields(self)}
 
 
 def weighted(rng: np.random.Generator, odds: dict[str, float]) -> str:
