@@ -10,14 +10,21 @@ from echousd import plugin
 plugin.register()  # first act: a stage opened before the schema is registered never learns it
 
 if TYPE_CHECKING:
+    from echomodel.loading import load_model
+    from echomodel.vocabulary import vocabulary
     from echousd.batches.batch import batch, generate_many
+    from echousd.check import check_room
+    from echousd.export import export as export_room
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-    from echousd.room import Room, generate
+    from echousd.render import render_file
+    from echousd.room import Room, RoomOptions, generate
+    from echousd.room.edit import edit
     from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
 
 __version__ = "0.1.0"
 
-# Public names and the module of each, imported on first use: `import echousd` loads neither pxr nor torch.
+# Public names and the module of each (with its name there after a colon, if it is another one), imported on first use:
+# `import echousd` loads neither pxr nor torch. docs/API.md is made of them.
 _HOME = {
     "GraphError": "echousd.graph",
     "Node": "echousd.graph",
@@ -33,21 +40,35 @@ _HOME = {
     "batch": "echousd.batches.batch",
     "generate": "echousd.room",
     "generate_many": "echousd.batches.batch",
+    "RoomOptions": "echousd.room",
+    "check_room": "echousd.check",
+    "edit": "echousd.room.edit",
+    "export_room": "echousd.export:export",
+    "load_model": "echomodel.loading",
+    "render_file": "echousd.render",
+    "vocabulary": "echomodel.vocabulary",
 }
 __all__ = [
     "GraphError",
     "Node",
     "Relation",
     "Room",
+    "RoomOptions",
     "RoomSpec",
     "SceneGraph",
     "batch",
+    "check_room",
+    "edit",
+    "export_room",
     "generate",
     "generate_many",
+    "load_model",
     "read_graph",
     "read_rooms",
     "relations_from_boxes",
+    "render_file",
     "update_graph",
+    "vocabulary",
     "write_graph",
 ]
 
@@ -55,7 +76,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'echousd' has no attribute {name!r}")
-    value = getattr(importlib.import_module(_HOME[name]), name)
+    module, _, other = _HOME[name].partition(":")
+    value = getattr(importlib.import_module(module), other or name)
     globals()[name] = value
     return value
 

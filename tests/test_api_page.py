@@ -1,0 +1,27 @@
+"""docs/API.md is what the docstrings and the vocabulary say, and every public name is there and explains itself."""
+
+import importlib.util
+import inspect
+from pathlib import Path
+
+import echousd
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def maker():
+    spec = importlib.util.spec_from_file_location("make_api", DOCS / "make_api.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_page_is_up_to_date():
+    assert (DOCS / "API.md").read_text("utf-8") == maker().page(), "run python docs/make_api.py"
+
+
+def test_every_public_name_is_there_and_documented():
+    for name in echousd.__all__:
+        assert inspect.getdoc(getattr(echousd, name)), name
+    assert {"generate", "edit", "check_room", "render_file", "export_room", "load_model"} <= set(echousd.__all__)
+    assert set(echousd.__all__) == set(echousd._HOME)
