@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from PIL import Image
     from pxr import Usd
 
-VIEWS = ("top", "perspective")
+VIEWS = ("top", "perspective", "eye")
+EYE = 1.55  # metres above the floor
 COLORS = ("materials", "class")
 FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS = 3  # per ray: rays towards the sky
@@ -62,7 +63,8 @@ def render_stage(
 
     Arguments:
         stage: any stage; its up axis and units are taken care of.
-        view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner).
+        view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner), or
+            `eye` (from a corner inside, at the height of a standing person's eyes).
         size: pixels on each side, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.
         rays: along each side of a pixel.
@@ -82,7 +84,7 @@ def render_stage(
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     with reading(stage):
         scenery = read_scenery(stage, by_class=colors == "class")
-    camera = top_view(scenery) if view == "top" else corner_view(scenery)
+    camera = {"top": top_view, "perspective": corner_view, "eye": eye_view}[view](scenery)
     if view == "perspective":
         scenery = scenery.without_near_walls(camera.matrix[:3, 3])
     pixels = trace(scenery, camera, size, rays=rays)
@@ -97,6 +99,17 @@ def top_view(scenery: Scenery) -> View:
     centre = (lower + upper) / 2
     matrix[:3, 3] = (centre[0], upper[1] + 1.0, centre[2])
     return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)
+
+
+def eye_view(scenery: Scenery) -> View:
+    """From a corner inside the room, where least is hidden, at the height of a standing person's eyes."""
+    from echousd.room.cameras import APERTURE, WIDE, inside_view
+
+    lower, upper = scenery.bounds
+    x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
+    floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
+    matrix = inside_view(floor, scenery.furniture, EYE / 0.72)
+    return View(matrix, APERTURE / 2 / WIDE, False)
 
 
 def corner_view(scenery: Scenery) -> View:
@@ -243,7 +256,7 @@ def _light(
         other = scene.run(_f32(point), _f32(away), output=1)
         blocked = other["primID"] >= 0
         # What a sky ray meets sends back a little of its own colour: one crude bounce.
-        bounce = 0.42 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
+        bounce = 0.6 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
         near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
         open_sky = (0.55 + 0.45 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.35 + 0.65 * near), open_sky)
@@ -251,7 +264,7 @@ def _light(
     half = _unit(toward + SUN)
     gloss = scenery.gloss[face]
     shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
-    return 0.62 * direct + 0.78 * sky, shine
+    return 0.66 * direct + 0.95 * sky, shine
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
     def render(
         room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
         output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write (.png).", show_default=False)],
-        view: Annotated[str, typer.Option(help="top or perspective.")] = "perspective",
+        view: Annotated[str, typer.Option(help="top, perspective or eye.")] = "perspective",
         size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
         colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
         layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,

@@ -135,7 +135,7 @@ def test_a_small_picture_is_quick(root):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        ({"view": "side"}, "view is 'side', allowed: top, perspective"),
+        ({"view": "side"}, "view is 'side', allowed: top, perspective, eye"),
         ({"colors": "pink"}, "colors is 'pink', allowed: materials, class"),
         ({"size": 5}, "size is 5 pixels, allowed: 16 to 4096"),
     ],

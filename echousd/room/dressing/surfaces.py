@@ -40,6 +40,16 @@ class Surface:
         least_x, least_z, most_x, most_z = self.area.bounds
         return least_x, least_z, most_x, most_z
 
+    @property
+    def closed(self) -> bool:
+        """Whether doors or drawer fronts stand before it."""
+        x0, z0, x1, z1 = self.bounds
+        front = float(self.host.size[2]) / 2 + 0.02
+        if front - z1 < 1e-3:
+            return False
+        lines = [shapely.LineString([(x, (z0 + z1) / 2), (x, front)]) for x in np.linspace(x0, x1, 9)[1:-1]]
+        return sum(len(self.above.query(line, predicate="intersects")) > 0 for line in lines) > len(lines) / 2
+
     def put(
         self,
         setting: Setting,

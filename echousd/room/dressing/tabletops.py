@@ -149,7 +149,7 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
 
 def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     """A row of books against one side of a shelf, and something beside it."""
-    if not 0.1 < host.position[1] + surface.y < EYE or surface.area.area < 0.03:
+    if not 0.1 < host.position[1] + surface.y < EYE or surface.area.area < 0.03 or surface.closed:
         return
     rng = setting.rng(host.name, "shelf", f"{surface.y:.2f}")
     x0, z0, x1, z1 = surface.bounds

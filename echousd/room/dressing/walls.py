@@ -61,17 +61,18 @@ def curtains(setting: Setting) -> None:
             if rail > setting.height - 0.05:
                 continue
             rng = setting.rng(window.name, "curtain")
-            wide = round(min(0.45, 0.16 + 0.14 * window.width), 3)
-            for middle in (
-                max(window.offset - beyond + wide / 2, 0.02 + wide / 2),
-                min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2),
-            ):
-                for foot in (0.015, max(0.3, window.sill - 0.15)):
-                    size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
-                    thing = Thing("curtain", size, wall.at(middle, before, foot), wall.yaw, "", int(rng.integers(4)))
-                    if setting.clear(thing, margin=0.0, floor=False):
-                        setting.placed.append(thing)
-                        break
+            wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
+            left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
+            right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
+            for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02):
+                size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
+                pair = [
+                    Thing("curtain", size, wall.at(middle, before, foot), wall.yaw, "", variant)
+                    for middle in (left, right)
+                ]
+                if all(setting.clear(one, margin=0.0, floor=False) for one in pair):  # one alone looks forgotten
+                    setting.placed += pair
+                    break
 
 
 def pictures(setting: Setting) -> None:
