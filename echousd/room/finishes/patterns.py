@@ -123,7 +123,7 @@ def leather() -> Relief:
 def plaster() -> Relief:
     """Smooth plaster under matt paint."""
     soft = noise(71, 12.0, 12.0, 2.5)
-    return Relief(1 + 0.010 * soft, 0.0006 * soft)
+    return Relief(1 + 0.005 * soft, 0.0004 * soft)
 
 
 def pile() -> Relief:
