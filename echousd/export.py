@@ -13,7 +13,7 @@ from pxr import Sdf, Usd, UsdUtils
 
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.flattening import flat_layer
-from echousd.packing import Package, Reach, without_clock
+from echousd.packing import Package, Reach, images_beside, without_clock
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.layouts import selected_layout, showing_layout
@@ -33,6 +33,7 @@ def export(
     force: bool = False,
     search: Sequence[str | Path] = (),
     layout: int | None = None,
+    physics: bool | None = None,
 ) -> Path:
     """Write a room (any stage) as one file.
 
@@ -41,6 +42,7 @@ def export(
         out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
         arkit: usdz with one usdc inside, as Apple's viewers want it.
         force: replace a file that is in the way.
+        physics: keep bodies, colliders, joints and the scene, or none of it; None = in flat USD alone.
         layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
         search: folders besides the room's own whose layers and images may be taken along.
 
@@ -52,6 +54,8 @@ def export(
         raise ValueError(f"{out}: cannot export to {out.suffix or 'no ending'!r}, allowed: {', '.join(ENDINGS)}")
     if arkit and out.suffix != ".usdz":
         raise ValueError(f"{out}: --arkit makes a .usdz, found {out.suffix!r}")
+    if physics and out.suffix == ".glb":
+        raise ValueError(f"{out}: --physics: a .glb holds none, allowed: .usdz, .usda, .usdc")
     if out.exists() and not force:
         raise ValueError(f"{out}: exists; choose another file or use --force")
     stage = open_stage(room)
@@ -61,17 +65,20 @@ def export(
         if out.suffix == ".glb":
             content = glb(stage, reach)
         elif out.suffix == ".usdz":
-            content = usdz(stage, Package(reach), arkit=arkit)
+            content = usdz(stage, Package(reach), arkit=arkit, physics=bool(physics))
         else:
-            content = layer_bytes(_marked(flat_layer(stage), stage), out.suffix)
+            package = Package(reach, images_beside(out))
+            layer = flat_layer(stage, package=package, physics=physics is not False)
+            content = layer_bytes(_marked(layer, stage), out.suffix)
+            package.write(out.parent)
     write_whole(out, content)
     return out
 
 
-def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False) -> bytes:
+def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False, physics: bool = False) -> bytes:
     """A usdz package of one flat layer and its images."""
     root = package.reach.room
-    layer = _marked(flat_layer(stage, package=package, guides=False), stage)
+    layer = _marked(flat_layer(stage, package=package, physics=physics), stage)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         folder = Path(scratch)
         package.write(folder)

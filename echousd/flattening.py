@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdShade
 
+from echousd.bare import without_physics
 from echousd.drawables import rgb
 from echousd.packing import Package, take_assets
 from echousd.stage.files import source
@@ -11,20 +12,19 @@ from echousd.stage.units import set_units
 from echousd.stage.values import check_types, given, targets
 
 
-def flat_layer(stage: Usd.Stage, *, package: Package | None = None, guides: bool = True) -> Sdf.Layer:
+def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: bool = True) -> Sdf.Layer:
     """Everything that a stage composes to, in one layer without references, variants or paths of this machine.
 
     Arguments:
         package: receives the images; without it textured materials get their plain colour.
-        guides: keep prims of purpose guide (colliders) and physics.
+        physics: keep bodies, colliders (and other guides), joints and the scene; all of it goes, or none.
     """
     layer = stage.Flatten(False)
     set_units(layer, stage)
     check_types(layer, source(stage))
+    if not physics:
+        without_physics(layer)
     stage = Usd.Stage.Open(layer)
-    for prim in list(stage.TraverseAll()):
-        if prim.IsValid() and not guides and _is_guide(prim):
-            stage.RemovePrim(prim.GetPath())
     for prim in stage.TraverseAll():
         prim.ClearMetadata("assetInfo")  # it holds the absolute path of a file that is no longer needed
         for attribute in prim.GetAttributes():
@@ -38,11 +38,6 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, guides: bool
         if not getattr(file, "path", ""):
             _paint_plain(image)
     return layer
-
-
-def _is_guide(prim: Usd.Prim) -> bool:
-    guide = prim.IsA(UsdGeom.Imageable) and UsdGeom.Imageable(prim).GetPurposeAttr().Get() == UsdGeom.Tokens.guide
-    return guide or prim.GetTypeName() == "PhysicsScene"
 
 
 def _as_float(attribute: Usd.Attribute) -> None:
@@ -73,7 +68,8 @@ def _paint_plain(image: Usd.Prim) -> None:
 
 def _drop_unused_materials(stage: Usd.Stage) -> None:
     """Looks of assets that the room's own looks replace."""
-    bound = {target for prim in stage.TraverseAll() for target in targets(prim, "material:binding")}
+    bindings = ("material:binding", "material:binding:physics")
+    bound = {target for prim in stage.TraverseAll() for name in bindings for target in targets(prim, name)}
     unused = [p for p in stage.TraverseAll() if p.IsA(UsdShade.Material) and p.GetPath() not in bound]
     scopes = {prim.GetParent().GetPath() for prim in unused}
     for path in [prim.GetPath() for prim in unused]:

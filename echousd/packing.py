@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
+from echousd.stage.files import write_whole
 from echousd.textures import TextureError, file_of, texture_bytes
 
 PACKED = (".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")  # what a usdz may hold beside layers
@@ -76,10 +77,12 @@ class Package:
 
     Arguments:
         reach: what may be packed at all.
+        folder: that the files lie in, beside the layer.
         names: path of a file on this machine -> its name in the archive, "" for what is left out.
     """
 
     reach: Reach
+    folder: str = FOLDER
     names: dict[str, str] = field(default_factory=dict)
     content: dict[str, bytes] = field(default_factory=dict)
 
@@ -114,7 +117,7 @@ class Package:
             return ""
         name = name or self._unused(PurePosixPath(inside.replace("\\", "/")).name)
         self.content[name] = content
-        return f"./{FOLDER}/{name}"
+        return f"./{self.folder}/{name}"
 
     def _tiles(self, path: str, where: str) -> str:
         before, _, after = path.rpartition("<UDIM>")
@@ -122,7 +125,7 @@ class Package:
         packed = [
             self._file(f"{before}{tile}{after}", where, pattern.replace("<UDIM>", str(tile))) for tile in UDIM_TILES
         ]
-        return f"./{FOLDER}/{pattern}" if any(packed) else ""
+        return f"./{self.folder}/{pattern}" if any(packed) else ""
 
     def _unused(self, name: str) -> str:
         taken = {used.casefold() for used in self.content} | {
@@ -135,11 +138,14 @@ class Package:
         return free
 
     def write(self, folder: Path) -> None:
-        """Write the files below `folder`."""
+        """Write the files below `folder`; raises ValueError where that is impossible."""
         for name, content in self.content.items():
-            path = folder / FOLDER / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+            write_whole(folder / self.folder / name, content)
+
+
+def images_beside(file: Path) -> str:
+    """Name of the folder for the images of a flat layer; each file has its own."""
+    return f"{file.stem}_{FOLDER}"
 
 
 def take_assets(layer: Sdf.Layer, package: Package | None) -> Mapping[str, str]:

@@ -23,9 +23,16 @@ def register(app: typer.Typer) -> None:
             typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
         ] = None,
         layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+        physics: Annotated[
+            bool | None,
+            typer.Option(
+                "--physics/--no-physics", help="Bodies, colliders and scene, or none of it; default: in flat USD alone."
+            ),
+        ] = None,
         force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
     ) -> None:
         """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
         from echousd.export import export as write
 
-        typer.echo(str(write(room, output, arkit=arkit, force=force, search=search or (), layout=layout)))
+        path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
+        typer.echo(str(path))

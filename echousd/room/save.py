@@ -15,6 +15,7 @@ from pxr import Sdf, Usd
 
 import echousd
 from echousd.flattening import flat_layer
+from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
 from echousd.room import ownership
@@ -98,6 +99,8 @@ def identifier(word: str) -> str:
 def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
     """Write the room as one `.usda` or `.usdc` file without references (variants of the layout included).
 
+    Its images lie beside it in `<name>_textures/`.
+
     Raises ValueError for another ending, a file that is in the way, or a path that cannot be written.
     """
     if path.suffix not in (".usda", ".usdc"):
@@ -106,9 +109,12 @@ def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
         raise ValueError(f"{path}: exists; choose another file or use --force")
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         root = save_layers(room, Path(scratch) / room.name)
-        layer = flat_layer(open_stage(root))
+        stage = open_stage(root)
+        package = Package(Reach.of(stage), images_beside(path))
+        layer = flat_layer(stage, package=package)
     if len(room.layouts) > 1:
         place_layouts(Usd.Stage.Open(layer), room)
+    package.write(path.parent)
     write_whole(path, layer_bytes(layer, path.suffix))
     return path
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echousd.room.geometry import Mass
@@ -18,6 +19,7 @@ from echousd.stage.values import array, matrix
 GRAVITY = 9.81  # m/s², where the stage tells none
 FRICTION = 0.5  # where no physics material is bound
 SKIN = 0.05  # metres: how thick a triangle of a static concave mesh is made, inwards
+LEAST_DEPTH = 0.002  # metres, of a mesh that is a sheet
 LEAST_AREA = 1e-5  # m² of a triangle that is taken at all
 HULLS = ("convexHull", "boundingCube", "boundingSphere")
 
@@ -116,12 +118,24 @@ def _solids(prim: Usd.Prim, cache: UsdGeom.XformCache, metres: float, *, moves: 
     if moves or kind in HULLS:
         yield Solid(points, friction, path)
         return
-    corners = points[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(normal, axis=1) / 2
-    for triangle, across, size in zip(corners, normal, area, strict=True):
-        if size > LEAST_AREA:
-            yield Solid(np.concatenate([triangle, triangle - SKIN * across / (2 * size)]), friction, path)
+    for part in trimesh.Trimesh(points, faces).split(only_watertight=False):
+        for corners in convex_parts(part):
+            yield Solid(corners, friction, path)
+
+
+def convex_parts(mesh: trimesh.Trimesh) -> Iterator[np.ndarray]:
+    """Corners of convex pieces that have the surface of a connected mesh: itself, or a thin prism below each triangle.
+
+    No prism is thicker than the mesh, so that none comes out on the other side of a board.
+    """
+    if mesh.is_watertight and mesh.is_convex:
+        yield np.asarray(mesh.vertices)
+        return
+    depth = min(SKIN, 2 * abs(float(mesh.volume)) / max(float(mesh.area), 1e-9)) if mesh.is_watertight else SKIN
+    corners = np.asarray(mesh.triangles)
+    for triangle, normal, area in zip(corners, mesh.face_normals, mesh.area_faces, strict=True):
+        if area > LEAST_AREA:
+            yield np.concatenate([triangle, triangle - max(depth, LEAST_DEPTH) * normal])
 
 
 def _friction(prim: Usd.Prim) -> float:

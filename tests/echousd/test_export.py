@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 import trimesh
-from pxr import Sdf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import OBJECTS, StandIn, small_graph
 
 import echousd
@@ -75,18 +75,45 @@ def test_usdz_for_arkit_has_one_crate_without_whole_number_doubles(root, tmp_pat
 
 
 @pytest.mark.parametrize("ending", [".usda", ".usdc"])
-def test_flat_usd_keeps_the_graph_and_needs_no_other_file(root, room, tmp_path, ending):
-    path = export(root, tmp_path / f"room{ending}")
+def test_flat_usd_keeps_the_graph_and_its_images(root, room, tmp_path, ending):
+    path = export(root, tmp_path / "out" / f"room{ending}")
     stage = Usd.Stage.Open(str(path))
     assert [layer for layer in stage.GetUsedLayers() if not layer.anonymous] == [stage.GetRootLayer()]
     assert echousd.read_graph(stage) == room.graph
     floor = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath("/Room/Shell/Floor/Floor_mesh")).ComputeBoundMaterial()[0]
-    color = floor.ComputeSurfaceSource()[0].GetInput("diffuseColor")
-    assert not color.HasConnectedSource()
-    assert 0 < color.Get()[0] < 1
-    assert all(
-        not a.Get().path for p in stage.Traverse() for a in p.GetAttributes() if a.GetTypeName() == "asset" and a.Get()
-    )
+    assert floor.ComputeSurfaceSource()[0].GetInput("diffuseColor").HasConnectedSource()
+    named = [a.Get() for p in stage.Traverse() for a in p.GetAttributes() if a.GetTypeName() == "asset" and a.Get()]
+    assert named
+    assert all(asset.path.startswith("./room_textures/") and asset.resolvedPath for asset in named)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"room{ending}", "room_textures"}
+
+
+def physics_of(stage):
+    """How much physics of each sort a stage holds."""
+    prims = list(stage.TraverseAll())
+    return {
+        "bodies": sum(prim.HasAPI(UsdPhysics.RigidBodyAPI) for prim in prims),
+        "colliders": sum(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
+        "scenes": sum(prim.IsA(UsdPhysics.Scene) for prim in prims),
+        "contacts": sum(prim.HasAPI(UsdPhysics.MaterialAPI) for prim in prims),
+        "properties": sum(name.startswith("physics:") for prim in prims for name in prim.GetPropertyNames()),
+    }
+
+
+@pytest.mark.parametrize("ending", [".usdz", ".usda", ".usdc"])
+def test_physics_is_exported_whole_or_not_at_all(root, tmp_path, ending):
+    whole = physics_of(Usd.Stage.Open(str(root)))
+    assert min(whole.values()) > 0
+    for physics in (True, False, None):
+        stage = Usd.Stage.Open(str(export(root, tmp_path / f"room_{physics}{ending}", physics=physics)))
+        found = physics_of(stage)
+        if physics or (physics is None and ending != ".usdz"):
+            assert found == whole
+        else:
+            assert not any(found.values()), found
+        assert stage.GetPrimAtPath("/Room/Objects/bed").GetAttribute("semantics:labels:category").Get()
+    with pytest.raises(ValueError, match=r"--physics: a .glb holds none, allowed: .usdz, .usda, .usdc"):
+        export(root, tmp_path / "room.glb", physics=True)
 
 
 def test_glb_has_every_object_in_its_place(root, room, tmp_path):

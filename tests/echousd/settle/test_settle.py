@@ -5,13 +5,15 @@ import sys
 
 import numpy as np
 import pytest
+import shapely
+import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 from small_room import StandIn, small_graph
 
 import echousd
 from echousd.room import RoomOptions
 from echousd.settle import SettleUnavailable, settle
-from echousd.settle.solids import read_world
+from echousd.settle.solids import convex_parts, read_world
 
 simulated = pytest.mark.skipif("not __import__('importlib.util').util.find_spec('mujoco')", reason="extra sim")
 
@@ -105,3 +107,13 @@ def test_the_world_is_in_metres_and_leaves_out_what_is_switched_off():
     points = world.bodies[1].solids[0].points
     np.testing.assert_allclose([points.min(0), points.max(0)], [(2.9, -0.1, -0.1), (3.1, 0.1, 0.1)], atol=1e-6)
     np.testing.assert_allclose(world.gravity, (0, 0, -9.81), atol=1e-3)
+
+
+def test_no_piece_of_a_board_comes_out_behind_it():
+    board = trimesh.creation.box((2.0, 0.08, 0.012))
+    (whole,) = convex_parts(board)
+    assert len(whole) == 8
+    frame = trimesh.creation.extrude_polygon(shapely.box(0, 0, 2, 1).difference(shapely.box(0.5, 0.2, 1, 0.8)), 0.012)
+    pieces = np.concatenate(list(convex_parts(frame)))
+    assert pieces[:, 2].min() >= -1e-6
+    assert pieces[:, 2].max() <= 0.012 + 1e-6
