@@ -127,5 +127,11 @@ class Geometry:
 
     @property
     def watertight(self) -> bool:
-        """Whether every part is closed."""
-        return all(bool(part.mesh.is_watertight) for part in self.parts)
+        """Whether every part is closed once vertices at one place are one, as trimesh says."""
+        return all(_closed(part.mesh) for part in self.parts)
+
+
+def _closed(mesh: trimesh.Trimesh) -> bool:
+    merged = mesh.copy()
+    merged.merge_vertices(merge_tex=True, merge_norm=True)
+    return bool(merged.is_watertight)
