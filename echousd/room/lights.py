@@ -108,9 +108,9 @@ def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
         top = y + float(room.boxes.size[number][1])
         bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
         bulb.CreateRadiusAttr(BULB)
+        bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
         bulb.CreateEnableColorTemperatureAttr(True)
         bulb.CreateColorTemperatureAttr(2900.0)
         bulb.AddTranslateOp().Set(Gf.Vec3d(x, (y - 0.06) if row.support == "ceiling" else top + 0.06, z))
-        candela = LUMENS[row.support] / (4 * np.pi)
-        full[bulb.GetPath()] = (3, candela / (np.pi * BULB**2) / NITS)
+        full[bulb.GetPath()] = (3, LUMENS[row.support] / (np.pi * NITS))
     return full

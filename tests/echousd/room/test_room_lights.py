@@ -59,6 +59,7 @@ def test_lamps_shine_where_they_are(stage) -> None:
         assert 0.04 < (edge - place[1] if below else place[1] - edge) < 0.1
     light = UsdLux.SphereLight(stage.GetPrimAtPath("/Room/Lights/lamp_pendant"))
     stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "evening")
-    lux = light.GetIntensityAttr().Get() * 30 * np.pi * light.GetRadiusAttr().Get() ** 2 / 1.5**2
+    assert light.GetNormalizeAttr().Get()  # Blender takes a sphere's intensity for radiance times area in any case
+    candela = light.GetIntensityAttr().Get() * 30 / 4
     stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "day")
-    assert lux == pytest.approx(1500 / (4 * np.pi) / 1.5**2, rel=1e-3)  # 1,500 lumens, 1.5 m away
+    assert candela == pytest.approx(1500 / (4 * np.pi), rel=1e-3)  # 1,500 lumens all round
