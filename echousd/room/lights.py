@@ -19,12 +19,13 @@ from echousd.room.room import RoomData
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
 LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
+ENCLOSED = 0.4  # of sky and panel in a room with walls, which throw back what they get
 BULB = 0.04  # metres, radius
 SUN = 1.4  # irradiance of the sun: a white surface that faces it gains 0.45, about what the sky gives
 ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
 # What is left of sky, panel, sun and lamps.
 TIMES: Mapping[str, tuple[float, float, float, float]] = {
-    "day": (1.0, 1.0, 1.0, 0.3),
+    "day": (1.0, 1.0, 1.0, 0.15),
     "evening": (0.16, 0.25, 0.0, 1.0),
     "night": (0.02, 0.0, 0.0, 1.0),
 }
@@ -45,7 +46,8 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     UsdGeom.Scope.Define(stage, LIGHTS)
     sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
     sky.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
-    full: Intensities = {sky.GetPath(): (0, 0.5), **_panel(stage, volume, room.height)}
+    share = ENCLOSED if room.options.walls else 1.0
+    full: Intensities = {sky.GetPath(): (0, 0.5 * share), **_panel(stage, volume, room.height, share)}
     if room.options.walls:
         full |= _sun(stage, room)
     if len(room.layouts) < 2:  # bulbs stand where the lamps do
@@ -61,7 +63,7 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     times.SetVariantSelection("day")
 
 
-def _panel(stage: Usd.Stage, volume: Volume, height: float) -> Intensities:
+def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Intensities:
     """A warm panel below the ceiling; of radiance L and area A it lights the floor with about L A / h²."""
     panel = UsdLux.RectLight.Define(stage, f"{LIGHTS}/ceiling")
     side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
@@ -72,7 +74,7 @@ def _panel(stage: Usd.Stage, volume: Volume, height: float) -> Intensities:
     panel.CreateColorTemperatureAttr(4300.0)
     panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
     panel.AddRotateXOp().Set(-90.0)
-    return {panel.GetPath(): (1, min(20.0, 1.6 * height**2 / (width * depth)))}
+    return {panel.GetPath(): (1, share * min(20.0, 1.6 * height**2 / (width * depth)))}
 
 
 def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
