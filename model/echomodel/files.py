@@ -28,6 +28,10 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
         if path.is_file():
             shutil.copymode(path, beside)
         beside.replace(path)
+    except OSError as error:
+        if error.filename == str(beside):  # whoever reads the message knows the file by its own name
+            error.filename = str(path)
+        raise
     finally:
         beside.unlink(missing_ok=True)
 

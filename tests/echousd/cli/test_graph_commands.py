@@ -83,7 +83,7 @@ def test_new_does_not_overwrite_unless_told(echousd_command, tmp_path):
         ),
         (["--room", "study", "--count", "desc=1"], "unknown category 'desc': did you mean desk?"),
         (["--room", "study", "--size", "0", "3"], "room: size: found (0.0, 3.0), allowed: two positive numbers"),
-        (["--room", "study", "--height", "nan"], "room: height: found nan, allowed: a positive number, metres"),
+        (["--room", "study", "--height", "nan"], "--height is nan, allowed: a finite number"),
         (["--room", "study", "--relate", "desk left"], "relation 'desk left': allowed: subject predicate object"),
         (["--room", "study", "--relate", "desk left sofa"], "object 'sofa' is no object of this graph, allowed: book"),
         (["--room", "study", "--relate", "desk left books"], "object 'books' is no object of this graph"),

@@ -52,20 +52,19 @@ ROUND = {"round_end_table", "lazy_sofa", "table_lamp"}
 
 @cache
 def size_statistics(category: str) -> SizeStatistics:
-    """Statistics of a class of the vocabulary; raises `UnknownWord`."""
-    name = vocabulary().category(category).name
+    """Statistics of a class, or of its SG-FRONT class where it has none of its own; raises `UnknownWord`."""
+    row = vocabulary().category(category)
+    name = row.name
     table = json.loads(resources.files("echomodel.data").joinpath("room_statistics.json").read_text("utf-8"))["sizes"]
     if name not in table:
-        assumed = ASSUMED[name]
+        assumed = ASSUMED.get(name, row.sgfront)
         if isinstance(assumed, str):
             return size_statistics(assumed)
         low, median, high = (np.array(values) for values in assumed)
         return SizeStatistics(low, median, high, _correlation(0.4, 0.98 if name in ROUND else 0.6, 0.4))
-    row = table[name]
-    c = row["correlation"]
-    return SizeStatistics(
-        np.array(row["p5"]), np.array(row["median"]), np.array(row["p95"]), _correlation(c["xy"], c["xz"], c["yz"])
-    )
+    c = table[name]["correlation"]
+    low, median, high = (np.array(table[name][key]) for key in ("p5", "median", "p95"))
+    return SizeStatistics(low, median, high, _correlation(c["xy"], c["xz"], c["yz"]))
 
 
 def sample_size(

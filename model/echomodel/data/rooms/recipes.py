@@ -13,6 +13,7 @@ from echomodel.data.rooms.lamps import ceiling_lamps, on_top
 from echomodel.data.rooms.sofas import SOFAS, sofa_group, television
 from echomodel.data.rooms.statistics import RoomTypeStatistics
 from echomodel.data.rooms.tables import VANITY_SEATS, desk_group, dining_group
+from echomodel.vocabulary import vocabulary
 
 # Classes that the statistics do not show appear in place of a similar one with this probability.
 SUBSTITUTES = {
@@ -77,14 +78,17 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
 
 
 def furnish(room: Builder, name: str) -> None:
-    """Furnish an empty room of one type of the vocabulary."""
-    {
+    """Furnish an empty room of one type of the vocabulary; a type without a recipe like the one that its row names."""
+    recipes = {
         "bedroom": _bedroom,
         "living_room": _living_room,
         "dining_room": _dining_room,
         "living_dining_room": _living_dining_room,
         "study": _study,
-    }[name](room)
+    }
+    if name not in recipes:
+        name = vocabulary().room_type(name).like or "living_room"
+    recipes[name](room)
 
 
 def _bedroom(room: Builder) -> None:
