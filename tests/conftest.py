@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import pytest
@@ -11,6 +12,19 @@ from hypothesis import HealthCheck, settings
 # Busy machines draw examples slowly, which says nothing about the code.
 settings.register_profile("project", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("project")
+
+
+@pytest.fixture(autouse=True)
+def models_are_loaded_anew(request: pytest.FixtureRequest) -> Iterator[None]:
+    """A test that replaces something meets no model that was loaded before, and leaves none to others."""
+    replaces = "monkeypatch" in request.fixturenames
+    loading = sys.modules.get("echomodel.loading")
+    if replaces and loading is not None:
+        loading._loaded.cache_clear()
+    yield
+    loading = sys.modules.get("echomodel.loading")
+    if replaces and loading is not None:
+        loading._loaded.cache_clear()
 
 
 @dataclass(frozen=True)

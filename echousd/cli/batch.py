@@ -35,7 +35,9 @@ def register(app: typer.Typer) -> None:
     app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
 
 
-@batch_app.command("run", epilog="Example: echousd batch samples/*.yaml -o out/night --count 20 --workers 4")
+@batch_app.command(
+    "run", epilog="Example: echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
+)
 def run(
     sources: Annotated[
         list[str] | None,
@@ -98,7 +100,7 @@ def run(
         raise typer.Exit(1)
 
 
-@batch_app.command("status")
+@batch_app.command("status", epilog="Example: echousd batch status out/night")
 def status(
     folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
     json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
@@ -117,7 +119,7 @@ def status(
         say(f"failed   {times} x {one_line(error)}")
 
 
-@batch_app.command("verify")
+@batch_app.command("verify", epilog="Example: echousd batch verify out/night")
 def verify(
     folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
     check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,

@@ -73,7 +73,7 @@ def test_room_becomes_a_graph() -> None:
     [
         (GraphBatch.single([]), "graph has no nodes"),
         (GraphBatch.single([46]), r"category of node 0 is 46, allowed: 0\.\.45"),
-        (GraphBatch.single([1, 2], [[0, 16, 1]]), r"predicate of triplet 0 is 16, allowed: 0\.\.15"),
+        (GraphBatch.single([1, 2], [[0, 20, 1]]), r"predicate of triplet 0 is 20, allowed: 0\.\.19"),
         (GraphBatch.single([1, 2], [[0, 1, 2]]), r"object of triplet 0 is 2, allowed: 0\.\.1"),
         (GraphBatch.single([1, 2], [[1, 1, 1]]), r"triplet 0 \[1, 1, 1\] relates a node to itself"),
         (GraphBatch.single([1], room_type=7), "room type of scene 0 is 7"),

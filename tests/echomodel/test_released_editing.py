@@ -79,12 +79,14 @@ def test_a_packed_change_is_what_single_changes_are() -> None:
     whole, scene = pack_scenes(graphs)
     assert scene.tolist() == [0] * 5 + [1] * 4 + [2] * 3
     change = pack_changes(graphs, changes)
-    flags = torch.randn(4, 4)  # two added nodes, then two touched ones
+    flags = torch.randn(
+        4, 4
+    )  # of one added node, two touched ones and one added: ascending, as they stand in the batch
     with torch.inference_mode():
         latent, _ = net.encode(change.before)
         new, _, keep = net.manipulate(latent, whole, added=change.added, touched=change.touched, noise=flags)
         singles = []
-        for graph, single, noise in zip(graphs, changes, (flags[:1], flags[2:], flags[1:2]), strict=True):
+        for graph, single, noise in zip(graphs, changes, (flags[:1], flags[1:3], flags[3:]), strict=True):
             latent, _ = net.encode(single.before)
             singles.append(net.manipulate(latent, graph, added=single.added, touched=single.touched, noise=noise))
     assert torch.allclose(new, torch.cat([s[0] for s in singles]), atol=1e-5)

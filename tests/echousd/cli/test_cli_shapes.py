@@ -108,4 +108,4 @@ def test_shapes_are_scored(tmp_path, monkeypatch, capsys):
     assert "name one set" in capsys.readouterr().err
     save_weights(tmp_path / "model.safetensors", model, ("latent", "autoencoder"))
     assert run(arguments) == 2
-    assert "hold no shape; name weights with --model" in capsys.readouterr().err
+    assert "hold no shape branch; name weights with --model" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -74,7 +75,8 @@ def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypa
         raise TextEncoderError("text features need the package open_clip_torch: pip install 'echousd[text]'")
 
     monkeypatch.setattr(ClipTextEncoder, "_load", absent)
-    done = echousd_command("generate", graph, "-o", out, "--weights", weights)
+    fresh = shutil.copy(weights, tmp_path / "fresh.safetensors")  # a file that this process has not loaded yet
+    done = echousd_command("generate", graph, "-o", out, "--weights", fresh)
     assert (done.code, out.exists()) == (2, False)
     assert "pip install 'echousd[text]'" in done.err
     assert done.err.strip().splitlines()[-1].startswith("error: ")
