@@ -140,6 +140,12 @@ def test_a_closed_pipe_is_silent():
     assert "error" not in done.stderr
 
 
+def test_a_standard_output_that_was_closed_is_no_fault():
+    code = "import sys; from echousd.cli.main import main; sys.argv = ['echousd', '--help']; main()"
+    done = subprocess.run(["bash", "-c", f'"{sys.executable}" -c "{code}" >&-'], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_of_commands(shell):
     words = {
