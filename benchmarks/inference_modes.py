@@ -30,8 +30,8 @@ from echomodel.compact.model import load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.config import shape_unet
-from echomodel.released.frozen_shape import FrozenShape
 from echomodel.released.packed import pack_linear_maps
 from echomodel.released.shape import ShapeUNet
 
@@ -127,7 +127,7 @@ def released_modes(objects: int) -> dict[str, Run | None]:
     condition = torch.randn(objects, net.config.objects, generator=generator)
     triples = torch.randint(0, objects, (4 * objects, 3), generator=generator)
     t = torch.full((objects,), 501)
-    bound = FrozenShape(net).bind(condition, triples)
+    bound = CompiledShape(net).bind(condition, triples)
     last = copy.deepcopy(net).to(memory_format=LAST)
     x_last = x.contiguous(memory_format=LAST)
     faster = compiled(net)

@@ -19,8 +19,8 @@ import machine
 from literal_networks import literal_layout
 from machine import alternate, report_machine, scene_graph, tally
 
+from echomodel.released.compiled_layout import CompiledLayout
 from echomodel.released.config import UNetConfig
-from echomodel.released.frozen_layout import FrozenLayout
 from echomodel.released.layout import LayoutNet
 
 
@@ -39,14 +39,14 @@ def main() -> int:
     with torch.no_grad():  # the last layers start at zero: fill everything, so that outputs can be compared
         for parameter in net.parameters():
             parameter.add_(0.02 * torch.randn(parameter.shape, generator=generator))
-    frozen = FrozenLayout(net)
+    compiled = CompiledLayout(net)
     missed = 0
     for scenes, wanted in ((1, 2.5), (32, 4.0)):
         nodes = 12 * scenes
         x = torch.randn(nodes, 8, generator=generator)
         objects = torch.randn(nodes, 640, generator=generator)
         triples, t = scene_graph(scenes, generator), torch.full((nodes,), 500)
-        bound = frozen.bind(objects, triples)
+        bound = compiled.bind(objects, triples)
         with tally() as counts:
             fast = bound(x, t)
         error = float((fast - literal_layout(net, x, objects, triples, t)).abs().max())

@@ -21,8 +21,8 @@ import machine
 from literal_networks import literal_shape
 from machine import alternate, report_machine
 
+from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.config import shape_unet
-from echomodel.released.frozen_shape import FrozenShape
 from echomodel.released.shape import ShapeUNet
 
 
@@ -57,7 +57,7 @@ def main() -> int:
     objects = torch.randn(count, config.objects, generator=generator)
     triples = torch.randint(0, count, (4 * count, 3), generator=generator)
     t = torch.full((count,), 501)
-    bound = FrozenShape(net, winograd=not options.no_winograd).bind(objects, triples)
+    bound = CompiledShape(net, winograd=not options.no_winograd).bind(objects, triples)
     outputs: dict[str, torch.Tensor] = {}
     runs = {
         "literal": lambda: outputs.update(literal=literal_shape(net, x, objects, triples, t)),

@@ -14,7 +14,7 @@ from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
-from echousd.batches.run import Progress, Run
+from echousd.batches.run import BatchProgress, Run
 from echousd.room.folder import check_writable
 from echousd.room.lock import locked
 
@@ -63,7 +63,7 @@ def batch(
     until: float | None = None,
     memory: int | None = MEMORY,
     executor: Executor | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[BatchProgress], None] | None = None,
     **options: Any,
 ) -> BatchResult:
     """Make many rooms in one folder, each whole or not at all; a run that was ended is gone on with (`resume`).
@@ -109,7 +109,7 @@ def run_batch(
     until: float | None = None,
     memory: int | None = MEMORY,
     executor: Executor | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[BatchProgress], None] | None = None,
 ) -> BatchResult:
     """`batch` for a checked request."""
     if not 0 <= shard[0] < shard[1]:
@@ -123,7 +123,7 @@ def run_batch(
     plan = make_plan(request, weights_hash(request.options.weights))
     place = shard_folder(out, shard)
     with locked(place):
-        _settle(plan, out, resume=resume or shard[1] > 1)
+        _agree_on(plan, out, resume=resume or shard[1] > 1)
         valid = _valid(plan, out, shard)
         journal = Journal(place)
         pool = executor or LocalWorkers(min(workers, max(len(plan.entries), 1)), timeout=timeout, memory=memory)
@@ -184,7 +184,7 @@ def weights_hash(weights: str) -> str:
     return digest.hexdigest()[:12]
 
 
-def _settle(plan: Plan, out: Path, *, resume: bool) -> None:
+def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
     """Write the plan, or make sure that the one that lies there is the same."""
     if not (out / STATE / "plan.jsonl").is_file():
         others = sorted(entry.name for entry in out.iterdir() if entry.name != STATE)

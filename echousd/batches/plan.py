@@ -170,6 +170,6 @@ def _entry(raw: dict[str, Any]) -> Entry:
 
 def _word(name: str) -> str:
     """A file's name as the beginning of an identifier of bounded length."""
-    from echousd.room.save import identifier
+    from echousd.room.save import as_identifier
 
-    return identifier(name)[:60]
+    return as_identifier(name)[:60]

@@ -19,7 +19,7 @@ FULL = "No space left on device"
 
 
 @dataclass
-class Progress:
+class BatchProgress:
     """How far a run is.
 
     Arguments:
@@ -67,16 +67,16 @@ class Run:
     workers: int
     max_failures: int | None = None
     until: float | None = None
-    tell: Callable[[Progress], None] | None = None
+    tell: Callable[[BatchProgress], None] | None = None
     stopped: str = ""
     _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
     _tries: dict[str, int] = field(default_factory=dict)
     _asked: dict[str, Any] = field(default_factory=dict)
 
-    def execute(self, executor: Executor) -> Progress:
+    def execute(self, executor: Executor) -> BatchProgress:
         """Do all that is left, until it is done or something stops the run; `stopped` says what."""
         began = time.monotonic()
-        progress = Progress(sum(map(len, self.packs)), done=len(self.skip))
+        progress = BatchProgress(sum(map(len, self.packs)), done=len(self.skip))
         waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
         layouts_out = 0
         while waiting or self._ready or self._asked:
@@ -105,7 +105,7 @@ class Run:
                 self.tell(progress)
         return progress
 
-    def _check_stop(self, progress: Progress) -> None:
+    def _check_stop(self, progress: BatchProgress) -> None:
         if self.stopped:
             return
         if self.max_failures is not None and progress.failed > self.max_failures:
@@ -113,7 +113,7 @@ class Run:
         elif self.until is not None and time.time() >= self.until:
             self.stopped = "the time is over"
 
-    def _submit_layouts(self, executor: Executor, pack: tuple[Entry, ...], progress: Progress) -> int:
+    def _submit_layouts(self, executor: Executor, pack: tuple[Entry, ...], progress: BatchProgress) -> int:
         """Begin a pack's layouts, of all its rooms, as what is sampled together is part of the plan."""
         good = tuple(entry for entry in pack if not entry.error)
         for entry in pack:
@@ -133,7 +133,7 @@ class Run:
         self._tries[key] = self._tries.get(key, 1) + 1
         return self._tries[key] <= TRIES and not self.stopped
 
-    def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: Progress) -> None:
+    def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: BatchProgress) -> None:
         """Rooms whose layouts were sampled are ready; if the pack was too much for a worker, each is tried alone."""
         alone: list[tuple[str, Any, str]] = [("", None, "")] * len(pack)
         found = outcome.value if outcome.fate == "done" else alone
@@ -145,7 +145,7 @@ class Run:
                 continue
             self._ready.append((entry, self._job(entry, text, boxes)))
 
-    def _ended(self, entry: Entry, outcome: Outcome, progress: Progress) -> None:
+    def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
         if outcome.fate != "done":
             if FULL in outcome.error:
                 self.stopped = f"{self.folder}: {FULL.lower()}; make room and go on with --resume"
@@ -156,7 +156,7 @@ class Run:
             progress.done, progress.made = progress.done + 1, progress.made + 1
             progress.room, progress.error = entry.id, ""
 
-    def _fail(self, entry: Entry, error: str, progress: Progress) -> None:
+    def _fail(self, entry: Entry, error: str, progress: BatchProgress) -> None:
         row = {"room": entry.id, "state": "failed", "when": round(time.time(), 3), "error": error[:2000]}
         if self._write(row):
             progress.failed += 1

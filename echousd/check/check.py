@@ -11,7 +11,7 @@ from pxr import Usd
 from echousd.check.collisions import Collision, find_collisions
 from echousd.check.living import find_living
 from echousd.check.placement import Misplacement, find_misplaced
-from echousd.check.relations import Judged, judge
+from echousd.check.relations import MeasuredRelation, measured_relations
 from echousd.check.validity import Fault, find_faults
 from echousd.repair.living import LivingFault
 from echousd.stage.contents import RoomContents, read_contents
@@ -33,20 +33,20 @@ class LayoutReport:
     """
 
     name: str
-    relations: tuple[Judged, ...]
+    relations: tuple[MeasuredRelation, ...]
     collisions: tuple[Collision, ...]
     placement: tuple[Misplacement, ...]
     living: tuple[LivingFault, ...]
 
     @property
-    def broken(self) -> tuple[Judged, ...]:
+    def broken(self) -> tuple[MeasuredRelation, ...]:
         """The relations that do not hold."""
-        return tuple(judged for judged in self.relations if not judged.kept)
+        return tuple(relation for relation in self.relations if not relation.kept)
 
     @property
     def kept(self) -> int:
         """Number of measured relations that hold."""
-        return sum(judged.kept and judged.margin is not None for judged in self.relations)
+        return sum(relation.kept and relation.margin is not None for relation in self.relations)
 
     @property
     def ok(self) -> bool:
@@ -58,8 +58,8 @@ class LayoutReport:
         return {
             "relations": {
                 "kept": self.kept,
-                "broken": [judged.to_json() for judged in self.broken],
-                "unmeasured": sum(judged.margin is None for judged in self.relations),
+                "broken": [relation.to_json() for relation in self.broken],
+                "unmeasured": sum(relation.margin is None for relation in self.relations),
             },
             "collisions": [hit.to_json() for hit in self.collisions],
             "placement": [wrong.to_json() for wrong in self.placement],
@@ -84,9 +84,9 @@ class CheckReport:
     warnings: tuple[Fault, ...]
 
     @property
-    def relations(self) -> tuple[Judged, ...]:
+    def relations(self) -> tuple[MeasuredRelation, ...]:
         """The relations of all layouts."""
-        return tuple(judged for layout in self.layouts for judged in layout.relations)
+        return tuple(relation for layout in self.layouts for relation in layout.relations)
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
@@ -104,9 +104,9 @@ class CheckReport:
         return tuple(fault for layout in self.layouts for fault in layout.living)
 
     @property
-    def broken(self) -> tuple[Judged, ...]:
+    def broken(self) -> tuple[MeasuredRelation, ...]:
         """The relations that do not hold, of all layouts."""
-        return tuple(judged for layout in self.layouts for judged in layout.broken)
+        return tuple(relation for layout in self.layouts for relation in layout.broken)
 
     @property
     def ok(self) -> bool:
@@ -166,7 +166,7 @@ def _check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tup
             rooms = []
         report = LayoutReport(
             "" if layout is None else name,
-            tuple(judged for room in rooms for judged in judge(room, rules)),
+            tuple(relation for room in rooms for relation in measured_relations(room, rules)),
             tuple(hit for room in rooms for hit in find_collisions(room.objects)),
             tuple(wrong for room in rooms for wrong in _misplaced(room)),
             tuple(fault for room in rooms for fault in find_living(room)),

@@ -13,7 +13,7 @@ from echousd.stage.contents import RoomContents
 
 
 @dataclass(frozen=True)
-class Judged:
+class MeasuredRelation:
     """A relation with its signed margin (metres or ratio, >= 0 = kept), None where the rules do not measure it."""
 
     relation: Relation
@@ -27,7 +27,7 @@ class Judged:
         return {"subject": subject, "predicate": predicate, "object": object_, "margin": margin}
 
 
-def judge(room: RoomContents, rules: str = "strict") -> tuple[Judged, ...]:
+def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[MeasuredRelation, ...]:
     """Every relation between objects with boxes; raises ValueError for unknown rules."""
     import torch
 
@@ -51,6 +51,6 @@ def judge(room: RoomContents, rules: str = "strict") -> tuple[Judged, ...]:
     margin = margins(boxes, triplets, rules=rules, center=center).tolist()
     # Meshes are stored in single precision: a relation that holds to a tenth of a millimetre holds.
     return tuple(
-        Judged(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
+        MeasuredRelation(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
         for relation, found, value in zip(room.relations, verdict, margin, strict=True)
     )

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from echousd.cli.output import one_line, plain_json, say
 
 if TYPE_CHECKING:
-    from echousd.batches.run import Progress
+    from echousd.batches.run import BatchProgress
 
 
 class _RunByDefault(TyperGroup):
@@ -156,7 +156,7 @@ def _clock(text: str) -> float | None:
 
 
 @contextmanager
-def _shown(json: bool) -> Iterator[Callable[[Progress], None]]:
+def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
     """A live line on a terminal, plain lines in a log (a failure at once, else every 30 s), JSON lines if wanted."""
     import json as text
 
@@ -165,14 +165,14 @@ def _shown(json: bool) -> Iterator[Callable[[Progress], None]]:
     console = Console(stderr=True, highlight=False)
     last: dict[str, Any] = {"room": "", "when": 0.0}
 
-    def line(progress: Progress) -> str:
+    def line(progress: BatchProgress) -> str:
         left = "" if progress.left is None else f", {progress.left / 60:.0f} min left"
         return (
             f"{progress.done} of {progress.total} rooms, {progress.rate:.2f} a second{left}, "
             f"{progress.failed} failed, {progress.megabytes:.0f} MiB"
         )
 
-    def tell(progress: Progress) -> None:
+    def tell(progress: BatchProgress) -> None:
         new = progress.room != last["room"]
         last["room"] = progress.room
         if json and new:

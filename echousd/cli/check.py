@@ -72,7 +72,7 @@ def _show(report: CheckReport, strict: bool) -> None:
 
     for layout in report.layouts:
         which = f"{layout.name} " if layout.name else ""
-        unmeasured = sum(judged.margin is None for judged in layout.relations)
+        unmeasured = sum(found.margin is None for found in layout.relations)
         measured = len(layout.relations) - unmeasured
         silent = f", {unmeasured} not measured" * bool(unmeasured)
         row(not layout.broken, f"{which}relations", f"{layout.kept} of {measured} kept{silent}")
@@ -115,8 +115,8 @@ def _show_faults(console: Console, layout: LayoutReport, strict: bool) -> None:
         which = f"{layout.name}: " if layout.name else ""
         console.print(f"  [{colour}]{kind:<9}[/] {escape(safe(which + text))}", highlight=False)
 
-    for judged in layout.broken:
-        line("broken", f"{judged.relation} (margin {judged.margin:+.3f})")
+    for found in layout.broken:
+        line("broken", f"{found.relation} (margin {found.margin:+.3f})")
     for hit in layout.collisions:
         line("collision", f"{hit.first} and {hit.second}, {hit.depth:.3f} m deep")
     for wrong in layout.placement:

@@ -24,7 +24,7 @@ OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
 
 
 @dataclass(frozen=True)
-class Finding:
+class Diagnosis:
     """One thing looked at; `state` is ok, gap (something will not work) or optional (an extra not installed)."""
 
     name: str
@@ -33,19 +33,19 @@ class Finding:
     remedy: str = ""
 
 
-def diagnose() -> list[Finding]:
+def diagnose() -> list[Diagnosis]:
     """Look at the USD provider, the schema plugin, torch, the weights and the optional extras."""
-    checks: tuple[Callable[[], Iterator[Finding]], ...] = (_python, _usd, _plugin, _torch, _weights, _extras)
-    return [finding for check in checks for finding in check()]
+    checks: tuple[Callable[[], Iterator[Diagnosis]], ...] = (_python, _usd, _plugin, _torch, _weights, _extras)
+    return [diagnosis for check in checks for diagnosis in check()]
 
 
-def _python() -> Iterator[Finding]:
-    yield Finding("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+def _python() -> Iterator[Diagnosis]:
+    yield Diagnosis("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
 
 
-def _usd() -> Iterator[Finding]:
+def _usd() -> Iterator[Diagnosis]:
     if util.find_spec("pxr") is None:
-        yield Finding("usd", "gap", "no pxr module", "pip install usd-core")
+        yield Diagnosis("usd", "gap", "no pxr module", "pip install usd-core")
         return
     from pxr import Usd
 
@@ -53,29 +53,29 @@ def _usd() -> Iterator[Finding]:
     by = sorted({f"{name} {metadata.version(name)}" for name in metadata.packages_distributions().get("pxr", [])})
     text = f"OpenUSD {version[1]}.{version[2]:02d} from {' and '.join(by) or import_module('pxr').__path__[0]}"
     if len(by) > 1:
-        yield Finding("usd", "gap", text, "two distributions share the module pxr: uninstall one of them")
+        yield Diagnosis("usd", "gap", text, "two distributions share the module pxr: uninstall one of them")
     elif version < OLDEST or util.find_spec("pxr.UsdSemantics") is None:
-        yield Finding("usd", "gap", text, "OpenUSD 24.11 or newer is needed (UsdSemantics): pip install -U usd-core")
+        yield Diagnosis("usd", "gap", text, "OpenUSD 24.11 or newer is needed (UsdSemantics): pip install -U usd-core")
     else:
-        yield Finding("usd", "ok", text)
+        yield Diagnosis("usd", "ok", text)
 
 
-def _plugin() -> Iterator[Finding]:
+def _plugin() -> Iterator[Diagnosis]:
     from echousd import plugin
 
     folder = plugin.plugin_path()
     if util.find_spec("pxr") is None:
-        yield Finding("schema plugin", "gap", f"not active, {folder}", "install a pxr first")
+        yield Diagnosis("schema plugin", "gap", f"not active, {folder}", "install a pxr first")
     elif plugin.is_active():
-        yield Finding("schema plugin", "ok", f"active, {folder}")
+        yield Diagnosis("schema plugin", "ok", f"active, {folder}")
     else:
         remedy = f"import echousd before a stage is opened, or set {plugin.ENVIRONMENT_VARIABLE}={folder}"
-        yield Finding("schema plugin", "gap", f"not active, {folder}", remedy)
+        yield Diagnosis("schema plugin", "gap", f"not active, {folder}", remedy)
 
 
-def _torch() -> Iterator[Finding]:
+def _torch() -> Iterator[Diagnosis]:
     if util.find_spec("torch") is None:
-        yield Finding("torch", "gap", "not installed", "pip install torch")
+        yield Diagnosis("torch", "gap", "not installed", "pip install torch")
         return
     import torch
 
@@ -83,29 +83,29 @@ def _torch() -> Iterator[Finding]:
     devices += [f"cuda:{i} ({torch.cuda.get_device_name(i)})" for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():
         devices.append("mps")
-    yield Finding("torch", "ok", f"{torch.__version__}, devices: {', '.join(devices)}")
+    yield Diagnosis("torch", "ok", f"{torch.__version__}, devices: {', '.join(devices)}")
 
 
-def _weights() -> Iterator[Finding]:
+def _weights() -> Iterator[Diagnosis]:
     folder = resources.files("echomodel").joinpath("weights")
     entries = folder.iterdir() if folder.is_dir() else ()
     files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
     if files:
         sizes = (len(folder.joinpath(name).read_bytes()) / 2**20 for name in files)
         told = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
-        yield Finding("weights", "ok", f"{told} in {folder}")
+        yield Diagnosis("weights", "ok", f"{told} in {folder}")
     else:
-        yield Finding("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
+        yield Diagnosis("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
 
 
-def _extras() -> Iterator[Finding]:
+def _extras() -> Iterator[Diagnosis]:
     for extra, modules, purpose in EXTRAS:
         missing = [module for module in modules if util.find_spec(module) is None]
         if missing:
             remedy = f"pip install 'echousd[{extra}]'"
-            yield Finding(f"extra {extra}", "optional", f"not installed ({purpose})", remedy)
+            yield Diagnosis(f"extra {extra}", "optional", f"not installed ({purpose})", remedy)
         else:
-            yield Finding(f"extra {extra}", "ok", f"installed ({purpose})")
+            yield Diagnosis(f"extra {extra}", "ok", f"installed ({purpose})")
 
 
 def register(app: typer.Typer) -> None:
@@ -128,15 +128,15 @@ def register(app: typer.Typer) -> None:
         Example: echousd doctor --json
         """
         findings = diagnose()
-        healthy = all(finding.state != "gap" for finding in findings)
+        healthy = all(diagnosis.state != "gap" for diagnosis in findings)
         if as_json:
-            typer.echo(json.dumps({"ok": healthy, "findings": [asdict(finding) for finding in findings]}, indent=2))
+            typer.echo(json.dumps({"ok": healthy, "findings": [asdict(diagnosis) for diagnosis in findings]}, indent=2))
         else:
             _show(findings)
         raise typer.Exit(0 if healthy else 1)
 
 
-def _show(findings: list[Finding]) -> None:
+def _show(findings: list[Diagnosis]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -144,9 +144,9 @@ def _show(findings: list[Finding]) -> None:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for heading in ("", "state", "found", "remedy"):
         table.add_column(heading, overflow="fold")
-    for finding in findings:
-        state = f"[{colours[finding.state]}]{finding.state}[/]"
-        table.add_row(finding.name, state, _plain(finding.found), _plain(finding.remedy))
+    for diagnosis in findings:
+        state = f"[{colours[diagnosis.state]}]{diagnosis.state}[/]"
+        table.add_row(diagnosis.name, state, _plain(diagnosis.found), _plain(diagnosis.remedy))
     console = Console()
     if not console.is_terminal:
         console.width = 200  # nobody's window: keep paths on one line

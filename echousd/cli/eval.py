@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from torch import Tensor
 
-    from echomodel.metrics.layout_evaluation import EditedGraph, Finish, Sampler
+    from echomodel.metrics.layout_evaluation import EditedGraph, Finish, LayoutSource
     from echomodel.roomboxes import RoomBoxes
 
 eval_app = typer.Typer(help="Scores of a model: relations, sizes, collisions, shapes.", no_args_is_help=True)
@@ -128,7 +128,7 @@ def _repairing(rules: str) -> Finish:
 
 def _model_sampler(
     weights: Path | None, seed: int, rules: str, steps: int | None, asked: dict[str, float | None]
-) -> Sampler:
+) -> LayoutSource:
     """Samples with the model; `asked` holds what only compact weights understand."""
     import torch
 
@@ -160,7 +160,7 @@ def _model_sampler(
     return sample
 
 
-def _truth(rooms: list) -> Sampler:
+def _truth(rooms: list) -> LayoutSource:
     """A sampler that knows the answer: what the scores are for the true boxes themselves."""
     from echomodel.boxes import Boxes
     from echomodel.metrics.room_figures import with_known_words

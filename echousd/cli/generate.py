@@ -14,6 +14,7 @@ import typer
 from echousd.cli.output import say
 
 if TYPE_CHECKING:
+    from echomodel.progress import StageListener
     from echousd.room import Room
     from echousd.room.house import Place
 
@@ -174,7 +175,7 @@ def generate_house(
 
 
 @contextmanager
-def took(spent: dict[str, float], stage: str, listen: Callable[[str, int, int], None]) -> Iterator[None]:
+def took(spent: dict[str, float], stage: str, listen: StageListener) -> Iterator[None]:
     """Note how long a stage took, and tell the bar."""
     started = time.perf_counter()
     listen(stage, 0, 1)
@@ -244,7 +245,7 @@ def set_crate_version(version: str | None) -> None:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[str, int, int], None]]:
+def progress_bar() -> Iterator[StageListener]:
     """A bar per stage on a terminal, a plain line per stage elsewhere (on stderr)."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -277,8 +278,8 @@ def report(room: Room, root: Path, preview: Path | None) -> None:
     say(f"room     {root}")
     if preview is not None:
         say(f"preview  {preview}")
-    for number, found in enumerate(room.judged):
-        counts, several = found.counts(), len(room.judged) > 1
+    for number, found in enumerate(room.outcomes):
+        counts, several = found.counts(), len(room.outcomes) > 1
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
         say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
         for verdict in found.broken:

@@ -24,7 +24,7 @@ Vector: TypeAlias = tuple[float, float, float]
 Scalar: TypeAlias = StrictBool | int | float | str
 
 
-def identifier(value: Any) -> str:
+def checked_identifier(value: Any) -> str:
     """A valid USD identifier of at most `MAX_NAME` characters; raises ValueError."""
     if not isinstance(value, str) or not IDENTIFIER.fullmatch(value):
         raise ValueError(f"{shown(value)} is no identifier, allowed: letters, digits and _, not starting with a digit")
@@ -138,7 +138,7 @@ def _openings(value: Any) -> tuple[Opening, ...]:
         if not isinstance(entry, Opening | Mapping):
             raise ValueError(f"found {shown(entry)}, allowed: an opening with name, kind, edge, offset, width, height")
         opening = entry if isinstance(entry, Opening) else opening_from_json(entry)
-        identifier(opening.name)
+        checked_identifier(opening.name)
         found.append(opening)
     return tuple(found)
 
@@ -146,7 +146,7 @@ def _openings(value: Any) -> tuple[Opening, ...]:
 def _attributes(value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise ValueError(f"found {shown(value)}, allowed: names with a text, a number or true/false each")
-    return {identifier(key): _scalar(key, entry) for key, entry in value.items()}
+    return {checked_identifier(key): _scalar(key, entry) for key, entry in value.items()}
 
 
 def _scalar(key: str, value: Any) -> bool | int | float | str:
@@ -194,7 +194,7 @@ def _word(kind: str) -> tuple[BeforeValidator, WithJsonSchema]:
 _category, _predicate, _room_type = _word("category"), _word("predicate"), _word("room_type")
 
 Name: TypeAlias = Annotated[
-    str, BeforeValidator(identifier), Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=MAX_NAME)
+    str, BeforeValidator(checked_identifier), Field(pattern=f"^{IDENTIFIER.pattern}$", max_length=MAX_NAME)
 ]
 CategoryWord: TypeAlias = Annotated[str, _category[0], _category[1]]
 PredicateWord: TypeAlias = Annotated[str, _predicate[0], _predicate[1]]

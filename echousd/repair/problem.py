@@ -72,7 +72,7 @@ def pose(
     floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
     n = len(words)
     carrier = carriers(words, size, position, yaw, triplets)
-    position, yaw = settle(size, position, carrier, height, fixed), yaw.copy()
+    position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
     wall = np.full((n, 2, 2), np.nan)
     if floor is not None:
         wall = lean(words, size, position, yaw, floor, carrier)
@@ -166,7 +166,7 @@ def _reaches(carrier: np.ndarray, start: int, goal: int) -> bool:
     return False
 
 
-def settle(
+def stacked(
     size: np.ndarray, position: np.ndarray, carrier: np.ndarray, height: float | None, fixed: np.ndarray
 ) -> np.ndarray:
     """(n, 3) float: positions with each bottom on the floor or its carrier's top, and ceiling things at the ceiling."""

@@ -13,7 +13,7 @@ from echomodel.openings import Opening
 from echomodel.rules.living.sizes import usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
-from echousd.repair.problem import Problem, pose, settle
+from echousd.repair.problem import Problem, pose, stacked
 from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
 from echousd.repair.solver import RepairConfig, Solution, solve, violation
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
-UNSETTLED = 0.01  # metres or ratio of hard constraints that are missed in all
+UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 DEFAULT_HEIGHT = 2.8
 
@@ -208,7 +208,7 @@ def repair_boxes(
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
     centre = np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2
-    judged = np.isin(triplets[:, 1], sorted(measured(rules)))
+    asked = np.isin(triplets[:, 1], sorted(measured(rules)))
     config = config or RepairConfig()
 
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Start:
@@ -216,7 +216,7 @@ def repair_boxes(
             categories, size, position, yaw, triplets,
             floor_polygon=floor_polygon, height=height, fixed=fixed, rigid=rigid, turned=turned,
         )  # fmt: skip
-        return Start(replace(problem, triplets=triplets[judged]), size, start, turn)
+        return Start(replace(problem, triplets=triplets[asked]), size, start, turn)
 
     def solved(at: Start) -> Solution:
         return solve(at.problem, at.size, at.position, at.yaw, rules=rules, centre=centre, config=config)
@@ -234,13 +234,13 @@ def repair_boxes(
         chosen = arrange(setting)
         at = posed(at.size, chosen.position, chosen.yaw)
     found = solved(at)
-    if at is not drawn and violation(found.at) > UNSETTLED:  # what the graph states comes before all habits
+    if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
         plain = solved(drawn)
-        if violation(plain.at) < violation(found.at) - UNSETTLED:
+        if violation(plain.at) < violation(found.at) - UNMET:
             found, at = plain, drawn
     problem, turn = at.problem, at.yaw
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
-    end = settle(found.size, found.position, problem.carrier, None, fixed)
+    end = stacked(found.size, found.position, problem.carrier, None, fixed)
     ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre))
@@ -257,7 +257,7 @@ def repair_boxes(
         yaw=turn,
         verdict=verdict.numpy(),
         margin=margin,
-        conflicts=conflicts(problem, found, np.flatnonzero(judged), failures),
+        conflicts=conflicts(problem, found, np.flatnonzero(asked), failures),
         collisions=hit,
         outside=beyond,
         moved=np.linalg.norm(end - position, axis=1),

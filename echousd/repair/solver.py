@@ -145,9 +145,9 @@ def _descend(
         score = hard + SOFT * soft
         if best is None or score < best.score - 1e-9:
             best, last = Solution(now_size, now_position, at, score, number), number
-        settled = number > 0 and hard < 1e-9 and (soft < 0.01 or abs(soft - before) < 0.005)
+        steady = number > 0 and hard < 1e-9 and (soft < 0.01 or abs(soft - before) < 0.005)
         before = soft
-        if number == config.rounds or settled or number - max(last, through) > config.patience:
+        if number == config.rounds or steady or number - max(last, through) > config.patience:
             break
         # Late rounds are damped: two constraints that take turns would otherwise swing for ever.
         damping = 1.0 if number < 6 + through else 4.0 * (number - through - 5)

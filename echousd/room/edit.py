@@ -11,20 +11,21 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.loading import load_model
+from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
-from echousd.room.progress import Listener, StageTimer
+from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, free_name, style_groups
 from echousd.room.tensors import graph_batch
-from echousd.room.verdicts import judgement, warn_of_faults
+from echousd.room.verdicts import layout_outcome, warn_of_faults
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
@@ -40,7 +41,7 @@ def edit(
     repair: bool = True,
     steps: int | None = None,
     faces: int = FACES,
-    progress: Listener | None = None,
+    progress: StageListener | None = None,
 ) -> Room:
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -110,7 +111,7 @@ def edit(
         assets=assets,
         floor=room_floor(graph, layouts),
         layouts=tuple(layouts),
-        judged=tuple(judgement(graph, found) for found in layouts),
+        outcomes=tuple(layout_outcome(graph, found) for found in layouts),
         notes=notes,
         provenance=_provenance(manifest, model_used),
         options=RoomOptions(

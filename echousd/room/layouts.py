@@ -17,7 +17,7 @@ from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.shell import floor_polygon
 from echousd.room.styles import equal_sizes
 from echousd.room.tensors import floor_centre, graph_batch, seeded
-from echousd.room.verdicts import judgement
+from echousd.room.verdicts import layout_outcome
 
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
@@ -119,7 +119,7 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]]) -> tuple[fl
     from echousd.repair.living import living_faults
 
     boxes, conflicts = found
-    return len(judgement(graph, boxes).faults), len(conflicts), len(living_faults(graph, boxes))
+    return len(layout_outcome(graph, boxes).faults), len(conflicts), len(living_faults(graph, boxes))
 
 
 def finished_boxes(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from echomodel.boxes import Boxes
 from echomodel.loading import check_preset, load_model
+from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
@@ -16,13 +17,13 @@ from echousd.room.fitting import FITS, fitted, with_space
 from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
-from echousd.room.progress import Listener, StageTimer
+from echousd.room.progress import StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
-from echousd.room.verdicts import judgement, warn_of_faults
+from echousd.room.verdicts import layout_outcome, warn_of_faults
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
@@ -47,7 +48,7 @@ def generate(
     steps: int | None = None,
     faces: int = FACES,
     options: RoomOptions | None = None,
-    progress: Listener | None = None,
+    progress: StageListener | None = None,
     drawn: Boxes | None = None,
 ) -> Room:
     """Make a room from a scene graph.
@@ -150,7 +151,7 @@ def generate(
         assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}),
         floor=room_floor(graph, layouts),
         layouts=tuple(layouts),
-        judged=tuple(judgement(graph, found) for found in layouts),
+        outcomes=tuple(layout_outcome(graph, found) for found in layouts),
         notes=(*crowded, *homeless, *notes),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=options or RoomOptions(),

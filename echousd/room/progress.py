@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-Listener = Callable[[str, int, int], None]  # (stage, done, total)
+from echomodel.progress import StageListener, StepListener
 
 
 @dataclass
 class StageTimer:
     """Measures the stages of one run and tells a listener how far each is."""
 
-    listener: Listener | None = None
+    listener: StageListener | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
-    def stage(self, name: str, total: int = 1) -> Iterator[Callable[[int, int], None]]:
+    def stage(self, name: str, total: int = 1) -> Iterator[StepListener]:
         """Time a stage; what it yields takes (done, total)."""
         started = time.perf_counter()
         self.tell(name, 0, total)

@@ -85,7 +85,7 @@ class Collision:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class LayoutOutcome:
     """What became of one layout: one verdict per relation of the graph, and the objects that collide."""
 
     verdicts: tuple[Verdict, ...] = ()
@@ -142,7 +142,7 @@ class RoomData:
         assets: object name -> name of the asset that it references; objects with one asset have one geometry.
         floor: (k, 2) float, x and z of the floor's corners, counter-clockwise seen from above.
         layouts: all arrangements of the same furniture; the first is `boxes`.
-        judged: what became of each layout, in their order.
+        outcomes: what became of each layout, in their order.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
         carried: asset name -> its files (path -> bytes), which are written again as they are.
@@ -155,7 +155,7 @@ class RoomData:
     assets: Mapping[str, str]
     floor: np.ndarray
     layouts: tuple[Boxes, ...] = ()
-    judged: tuple[Judgement, ...] = ()
+    outcomes: tuple[LayoutOutcome, ...] = ()
     notes: tuple[str, ...] = ()
     provenance: Provenance = Provenance()
     options: RoomOptions = RoomOptions()
@@ -170,16 +170,16 @@ class RoomData:
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
         """One per relation of the graph, of the first layout."""
-        return self.judged[0].verdicts if self.judged else ()
+        return self.outcomes[0].verdicts if self.outcomes else ()
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Broken relations and collisions of all layouts, one sentence each; says which layout if there are several."""
-        several = len(self.judged) > 1
+        several = len(self.outcomes) > 1
         return tuple(
             f"layout_{number}: {fault}" if several else fault
-            for number, judgement in enumerate(self.judged)
-            for fault in judgement.faults
+            for number, outcome in enumerate(self.outcomes)
+            for fault in outcome.faults
         )
 
     @property

@@ -23,7 +23,7 @@ from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
-from echousd.room.room import Judgement, RoomData
+from echousd.room.room import LayoutOutcome, RoomData
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.layouts import layout_names
@@ -54,7 +54,7 @@ def save_layers(room: RoomData, folder: Path, *, force: bool = False) -> Path:
 def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
     recorded: dict[str, str] = dict(old.get("files", {}))
     # A folder that was renamed or copied keeps its root's name: other layers refer to it.
-    room = replace(room, name=old.get("name") or identifier(folder.resolve().name))
+    room = replace(room, name=old.get("name") or as_identifier(folder.resolve().name))
     room = replace(room, assets=ownership.free_assets(folder, room, recorded))
     for left in folder.glob(f".{room.name}.png.*.partial"):  # of a run that was killed at its preview
         left.unlink(missing_ok=True)
@@ -90,7 +90,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
     return folder / root
 
 
-def identifier(word: str) -> str:
+def as_identifier(word: str) -> str:
     """A file's or folder's name as a USD identifier."""
     name = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in word) or "room"
     return name if not name[0].isdigit() else f"_{name}"
@@ -193,7 +193,7 @@ def _drawn_by_us(path: Path) -> bool:
 
 def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
     """What was asked for, what made the room, what became of every relation, and which files are ours."""
-    first = room.judged[0] if room.judged else Judgement()
+    first = room.outcomes[0] if room.outcomes else LayoutOutcome()
     return {
         MANIFEST_KEY: 1,
         "name": room.name,
@@ -208,7 +208,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "atlas": room.options.atlas,
         "ceiling": room.options.ceiling,
         "dress": room.options.dress,
-        "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.judged)],
+        "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),
         "verdicts": [verdict.to_json() for verdict in room.verdicts],

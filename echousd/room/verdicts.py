@@ -12,7 +12,7 @@ from echousd.graph import SceneGraph
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import pair_indices, separation
 from echousd.repair.report import TOUCH
-from echousd.room.room import Collision, Judgement, RoomData, Verdict
+from echousd.room.room import Collision, LayoutOutcome, RoomData, Verdict
 from echousd.room.tensors import floor_centre, graph_batch
 
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
@@ -22,9 +22,9 @@ class RoomWarning(UserWarning):
     """A room is finished but does not keep its graph, or its furniture collides."""
 
 
-def judgement(graph: SceneGraph, boxes: Boxes) -> Judgement:
+def layout_outcome(graph: SceneGraph, boxes: Boxes) -> LayoutOutcome:
     """What became of one layout, whether it was repaired or not."""
-    return Judgement(relation_verdicts(graph, boxes), colliding(graph, boxes))
+    return LayoutOutcome(relation_verdicts(graph, boxes), colliding(graph, boxes))
 
 
 def colliding(graph: SceneGraph, boxes: Boxes) -> tuple[Collision, ...]:

@@ -22,7 +22,8 @@ from echomodel.compact.predictors import agreeing, shape_predictor
 from echomodel.compact.wholeness import group_means, merit
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.protocols import GraphEdit, StepListener, part_of, touched_nodes
+from echomodel.progress import StepListener, part_of
+from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.randomness import Randomness
 from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample

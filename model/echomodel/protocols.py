@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeGuard
 
@@ -11,15 +10,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
-
-StepListener = Callable[[int, int], None]  # (steps done, steps)
-
-
-def part_of(progress: StepListener | None, attempt: int, tries: int) -> StepListener | None:
-    """Progress of one of several draws as progress of all."""
-    if progress is None:
-        return None
-    return lambda done, steps: progress(attempt * steps + done, tries * steps)
+from echomodel.progress import StepListener
 
 
 @dataclass(frozen=True, eq=False)

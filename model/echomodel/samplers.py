@@ -15,12 +15,12 @@ from torch import Tensor
 
 from echomodel.config import Objective, Sampler
 from echomodel.objectives import add_noise, expand
+from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
 from echomodel.schedule import alpha_sigma, sampling_levels
 
 FEWEST = 4  # steps from a draft
 Predict = Callable[[Tensor, Tensor], Tensor]
-Progress = Callable[[int, int], None]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
 
 
@@ -33,7 +33,7 @@ def ddim(
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
     generator: Randomness | None = None,
-    progress: Progress | None = None,
+    progress: StepListener | None = None,
 ) -> Tensor:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
 
@@ -53,7 +53,7 @@ def ancestral(
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
     generator: Randomness | None = None,
-    progress: Progress | None = None,
+    progress: StepListener | None = None,
 ) -> Tensor:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
 
@@ -79,7 +79,7 @@ def dpm2m(
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
     generator: Randomness | None = None,
-    progress: Progress | None = None,
+    progress: StepListener | None = None,
 ) -> Tensor:
     """DPM-Solver++(2M) (Lu et al. 2022, Algorithm 2), first order in the first and the last step."""
     last: list[tuple[Tensor, float]] = []
@@ -111,7 +111,7 @@ def sample(
     known: Tensor | None = None,
     known_mask: Tensor | None = None,
     generator: Randomness | None = None,
-    progress: Progress | None = None,
+    progress: StepListener | None = None,
     draft: Tensor | None = None,
     start: float = 1.0,
 ) -> Tensor:
@@ -159,7 +159,7 @@ def _march(
     levels: Tensor,
     known: Tensor | None,
     known_mask: Tensor | None,
-    progress: Progress | None,
+    progress: StepListener | None,
 ) -> Tensor:
     times = levels.tolist()
     free = torch.ones(len(x), dtype=x.dtype, device=x.device)

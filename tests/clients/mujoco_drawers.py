@@ -39,5 +39,5 @@ for joint in range(model.njnt):
     name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, joint)
     place = float(data.qpos[model.jnt_qposadr[joint]])
     opened[name] = {"to": place, "limit": model.jnt_range[joint].tolist()}
-settled = {name: float(far) for name, far in zip(names[1:], moved[1:], strict=True)}
-sys.stdout.write(json.dumps({"settled": settled, "opened": opened}))
+moved = {name: float(far) for name, far in zip(names[1:], moved[1:], strict=True)}
+sys.stdout.write(json.dumps({"moved": moved, "opened": opened}))

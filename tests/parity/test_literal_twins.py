@@ -10,9 +10,9 @@ from literal_networks import literal_layout, literal_shape
 from parity_numbers import close, fill
 from torch.nn import functional as F
 
+from echomodel.released.compiled_layout import CompiledLayout
+from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.config import UNetConfig, shape_unet
-from echomodel.released.frozen_layout import FrozenLayout
-from echomodel.released.frozen_shape import FrozenShape
 from echomodel.released.layout import LayoutNet
 from echomodel.released.shape import ShapeUNet
 from echomodel.released.volumes import WinogradConv, convolve_repeated
@@ -42,7 +42,7 @@ def test_layout(graph: str, change: dict) -> None:
     expected = literal_layout(net, x, objects, _graph(graph), t)
     with torch.inference_mode():
         close(net(x, objects, _graph(graph), t), expected, 1e-4)
-    bound = FrozenLayout(net, t).bind(objects, _graph(graph))
+    bound = CompiledLayout(net, t).bind(objects, _graph(graph))
     close(bound(x, t), expected, 1e-4)
     with pytest.raises(ValueError, match="step 17 was not prepared"):
         bound(x, torch.full((6,), 17))
@@ -61,7 +61,7 @@ def test_shape(graph: str, change: dict) -> None:
     with torch.inference_mode():
         close(net(x, objects, _graph(graph), t), expected, 5e-5)
     for winograd in (True, False):
-        close(FrozenShape(net, winograd).bind(objects, _graph(graph))(x, t), expected, 5e-5)
+        close(CompiledShape(net, winograd).bind(objects, _graph(graph))(x, t), expected, 5e-5)
 
 
 def test_one_node_alone() -> None:
@@ -70,9 +70,9 @@ def test_one_node_alone() -> None:
     fill(shape, seed=4)
     t, none = torch.tensor([7]), _graph("no edges")
     x, objects = torch.randn(1, 8), torch.randn(1, LAYOUT.objects)
-    close(FrozenLayout(layout, t).bind(objects, none)(x, t), literal_layout(layout, x, objects, none, t), 1e-4)
+    close(CompiledLayout(layout, t).bind(objects, none)(x, t), literal_layout(layout, x, objects, none, t), 1e-4)
     x, objects = torch.randn(1, 3, 8, 8, 8), torch.randn(1, SHAPE.objects)
-    close(FrozenShape(shape).bind(objects, none)(x, t), literal_shape(shape, x, objects, none, t), 5e-5)
+    close(CompiledShape(shape).bind(objects, none)(x, t), literal_shape(shape, x, objects, none, t), 5e-5)
 
 
 @pytest.mark.parametrize("doubled", [(False, True, True), (True, True, True), (True, False, False)])

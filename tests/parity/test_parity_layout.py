@@ -7,7 +7,7 @@ import torch
 from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echomodel.released.frozen_layout import FrozenLayout
+from echomodel.released.compiled_layout import CompiledLayout
 from echomodel.released.layout import LayoutNet
 from echomodel.released.sampling import ancestral, layout_loss
 from echomodel.released.tables import LayoutTables
@@ -33,7 +33,7 @@ def test_step(name: str) -> None:
     x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
     close(net.echo(x, objects, triples, embedding, None), numbers["echo"], 1e-4)
     close(net(x, objects, triples, numbers["t"]), numbers["eps"], 2e-4)
-    close(FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 2e-4)
+    close(CompiledLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 2e-4)
 
 
 @torch.inference_mode()
@@ -43,7 +43,7 @@ def test_step_at_full_size(name: str) -> None:
     net = _net(numbers)
     x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
     close(net(x, objects, triples, numbers["t"]), numbers["eps"], 1e-4)
-    close(FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 1e-4)
+    close(CompiledLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"]), numbers["eps"], 1e-4)
 
 
 def test_tables() -> None:
@@ -68,7 +68,7 @@ def test_thousand_step_sampling() -> None:
     numbers = Numbers("layout_sampling")
     net = _net(numbers)
     tables = _tables(numbers.meta["diffusion"])
-    bound = FrozenLayout(net).bind(numbers["obj_embed"], numbers["triples"])
+    bound = CompiledLayout(net).bind(numbers["obj_embed"], numbers["triples"])
     noise, top = numbers["noise"], len(tables.betas) - 1
     checked = 0
     for step, x in ancestral(bound, numbers["x_T"], tables, noise=lambda step: noise[top - step]):
@@ -109,5 +109,5 @@ def test_the_fast_path_is_as_exact_as_the_literal_one_where_groups_are_narrow() 
     x, objects, triples = numbers["x"], numbers["obj_embed"], numbers["triples"]
     published = numbers["eps"]
     slow = float((net(x, objects, triples, numbers["t"]) - published).abs().max())
-    fast = FrozenLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"])
+    fast = CompiledLayout(net, numbers["t"]).bind(objects, triples)(x, numbers["t"])
     assert float((fast - published).abs().max()) <= 1.5 * slow + 1e-6

@@ -7,7 +7,7 @@ import torch
 from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echomodel.released.frozen_shape import FrozenShape
+from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.sampling import ddim, shape_loss
 from echomodel.released.shape import ShapeNet
 from echomodel.released.tables import DDIMGrid, ShapeTables
@@ -34,7 +34,7 @@ def test_step() -> None:
     close(net.diffusion_net.echo(x, _objects(numbers), triples, embedding, None), numbers["echo"], 1e-4)
     close(net(x, _objects(numbers), triples, numbers["t"]), numbers["eps"], 5e-5)
     for winograd in (True, False):
-        bound = FrozenShape(net.diffusion_net, winograd).bind(_objects(numbers), triples)
+        bound = CompiledShape(net.diffusion_net, winograd).bind(_objects(numbers), triples)
         close(bound(x, numbers["t"]), numbers["eps"], 5e-5)
 
 
@@ -46,7 +46,7 @@ def test_ddim() -> None:
     assert grid.timesteps.tolist() == numbers["timesteps"].tolist()
     close(grid.alphas, numbers["ddim_alphas"], 1e-7)
     close(grid.alphas_prev, numbers["ddim_alphas_prev"], 1e-7)
-    bound = FrozenShape(net.diffusion_net).bind(_objects(numbers), numbers["triples"])
+    bound = CompiledShape(net.diffusion_net).bind(_objects(numbers), numbers["triples"])
     states = ddim(bound, numbers["x_T"], grid)
     for number, (_, x) in enumerate(states):
         close(x, numbers["x_steps"][number], 1e-3)

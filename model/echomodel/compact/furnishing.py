@@ -10,7 +10,8 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing
 from echomodel.config import Sampler
 from echomodel.graph import GraphBatch
-from echomodel.samplers import Predict, Progress, guided, sample
+from echomodel.progress import StepListener
+from echomodel.samplers import Predict, guided, sample
 from echomodel.vocabulary import vocabulary
 
 
@@ -52,7 +53,7 @@ def sample_descriptions(
     known_mask: Tensor | None = None,
     guidance: float = 1.0,
     bare_latent: Tensor | None = None,
-    progress: Progress | None = None,
+    progress: StepListener | None = None,
 ) -> Tensor:
     """Descriptions (N, D) of all pieces of S scenes.
 

@@ -19,7 +19,8 @@ from echomodel.drafts import drafted
 from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
-from echomodel.protocols import GraphEdit, StepListener
+from echomodel.progress import StepListener
+from echomodel.protocols import GraphEdit
 from echomodel.randomness import Randomness, for_scenes, uniform
 from echomodel.samplers import Predict, guided, sample
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.data.shapeset import ShapeSet, build_shapes
+from echomodel.progress import StageListener, StepListener
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,10 @@ RECIPES = {
     recipe.name: recipe
     for recipe in (DataRecipe("smoke", 64, 2), DataRecipe("packed", 12_000, 160), DataRecipe("full", 30_000, 327))
 }
-Progress = Callable[[str, int, int], None]
 
 
 def build_data(
-    directory: str | os.PathLike[str], recipe: str, seed: int, progress: Progress | None = None
+    directory: str | os.PathLike[str], recipe: str, seed: int, progress: StageListener | None = None
 ) -> tuple[RoomSet, ShapeSet]:
     """Make `directory/rooms` and `directory/shapes`; a build that was stopped continues, a finished one is kept.
 
@@ -47,7 +46,7 @@ def build_data(
         raise ValueError(f"unknown recipe {recipe!r}: allowed are {', '.join(RECIPES)}")
     chosen, folder = RECIPES[recipe], Path(directory)
 
-    def report(part: str) -> Callable[[int, int], None] | None:
+    def report(part: str) -> StepListener | None:
         return None if progress is None else lambda done, total: progress(part, done, total)
 
     rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), untidy=chosen.untidy)

@@ -21,6 +21,7 @@ from echomodel.data.shapeset import ShapeRecord, ShapeSet, finish_set, write_sha
 from echomodel.data.sheet import thumbnail
 from echomodel.data.tsdf import tsdf_from_mesh
 from echomodel.files import whole_file
+from echomodel.progress import StepListener
 from echomodel.vocabulary import vocabulary
 
 HELD_OUT = 0.2
@@ -208,7 +209,7 @@ def build_meshes(
     *,
     copies: int = 2,
     loaders: Mapping[str, Loader] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepListener | None = None,
     skipped: Callable[[str], None] | None = None,
 ) -> ShapeSet:
     """Turn the meshes that the table uses into a shape set with thumbnails and ATTRIBUTION.md.

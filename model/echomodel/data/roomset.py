@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from echomodel.data.folders import claim
 from echomodel.data.rooms import generate_rooms, untidied
 from echomodel.files import whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
+from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -56,7 +57,7 @@ def build_rooms(
     count: int,
     seed: int,
     styles: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepListener | None = None,
     *,
     untidy: float = 0.0,
 ) -> RoomSet:

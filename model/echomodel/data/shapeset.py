@@ -21,6 +21,7 @@ from echomodel.data.furniture import Choices, Style, sample_size, solids, tsdf_o
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.tsdf import RESOLUTION, TRUNCATION
 from echomodel.files import whole_file, write_json
+from echomodel.progress import StepListener
 from echomodel.vocabulary import vocabulary
 
 # Magnitudes of the 16 levels in voxels: finest about the surface, where the zero crossing is read off.
@@ -73,7 +74,7 @@ def build_shapes(
     directory: str | os.PathLike[str],
     styles: int,
     seed: int,
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepListener | None = None,
 ) -> ShapeSet:
     """Make all categories in `styles` styles, shard by shard; the same bytes for the same seed, whenever interrupted.
 

@@ -17,6 +17,7 @@ from echomodel.metrics.layout import relation_scores, size_rows, touched_triplet
 from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures, with_known_words
 from echomodel.metrics.variety import variety_scores
+from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
 from echomodel.rules.telling import told_relations
@@ -46,7 +47,7 @@ class EditedGraph:
     known_mask: Tensor | None = None
 
 
-Sampler = Callable[[EditedGraph], Boxes]
+LayoutSource = Callable[[EditedGraph], Boxes]
 Finish = Callable[[Sequence[RoomBoxes], Tensor], RoomBoxes]
 
 
@@ -85,9 +86,9 @@ class LayoutEvaluation:
 
 def evaluate_layout(
     rooms: Sequence[RoomBoxes],
-    sample: Sampler,
+    sample: LayoutSource,
     settings: LayoutEvaluation = LayoutEvaluation(),
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepListener | None = None,
     finish: Finish | None = None,
 ) -> dict:
     """Score boxes that `sample` makes for the graphs of `rooms`.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -18,6 +17,7 @@ from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
 from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 POINTS = 1024
 SUITE = 4  # pieces of different classes in a suite
-Told = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ def evaluate_parts(
     model: EchoModel,
     settings: PartsEvaluation = PartsEvaluation(),
     shapes: ShapeSet | None = None,
-    progress: Told | None = None,
+    progress: StageListener | None = None,
 ) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
     """Generate pieces of every class and suites of classes, and score both.
 

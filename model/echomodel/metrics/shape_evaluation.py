@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from echomodel.metrics.shapes import (
     surface_points,
     watertight_share,
 )
+from echomodel.progress import StageListener
 from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 
@@ -49,7 +50,7 @@ def evaluate_shapes(
     model: RoomModel,
     shapes: ShapeSet,
     settings: ShapeEvaluation = ShapeEvaluation(),
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: StageListener | None = None,
 ) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
     """Score reconstruction on held-out shapes of a set, and generation against the set's shapes of the same classes.
 
@@ -88,7 +89,7 @@ def evaluate_shapes(
 
 
 def class_shapes(
-    model: RoomModel, count: int, seed: int = 0, progress: Callable[[str, int, int], None] | None = None
+    model: RoomModel, count: int, seed: int = 0, progress: StageListener | None = None
 ) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
     """Generate `count` objects of every class, each alone in its scene: (64, 64, 64) grids and (3,) sizes in metres.
 
@@ -113,7 +114,7 @@ def class_shapes(
 
 
 def _generation(
-    model: RoomModel, shapes: ShapeSet, settings: ShapeEvaluation, told: Callable[[str, int, int], None]
+    model: RoomModel, shapes: ShapeSet, settings: ShapeEvaluation, told: StageListener
 ) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
     words = [category.name for category in vocabulary().categories]
     rng = np.random.default_rng([settings.seed, 1])

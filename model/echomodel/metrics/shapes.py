@@ -14,6 +14,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from echomodel.data.tsdf import mesh_from_tsdf
+from echomodel.progress import StepListener
 
 THRESHOLD = 1 / 64
 SAMPLES = 8_000  # points whose distance is scored
@@ -65,7 +66,7 @@ def reconstruction_scores(
     grids: Callable[[int], np.ndarray],
     labels: Sequence[str],
     reconstruct: Callable[[np.ndarray], np.ndarray],
-    progress: Callable[[int, int], None] | None = None,
+    progress: StepListener | None = None,
 ) -> dict[str, dict[str, float]]:
     """Mean `surface_scores` of reconstructions, per label and under "all" (mean over shapes), with their number `n`.
 

@@ -26,7 +26,8 @@ from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
-    from echomodel.protocols import GraphEdit, StepListener
+    from echomodel.progress import StepListener
+    from echomodel.protocols import GraphEdit
 
 DECODED = 2  # shapes at a time: one takes 67 MB for every feature map of 64 channels
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,10 +10,11 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.progress import StepListener
+from echomodel.released.compiled_layout import CompiledLayout
+from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.config import ReleasedConfig
 from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
-from echomodel.released.frozen_layout import FrozenLayout
-from echomodel.released.frozen_shape import FrozenShape
 from echomodel.released.layout import LayoutNet
 from echomodel.released.sampling import Denoiser, ancestral, ddim, last, layout_loss, node_budget, shape_loss
 from echomodel.released.shape import ShapeNet
@@ -137,7 +137,7 @@ class ReleasedModel(GraphEncoder):
         generator: torch.Generator,
         steps: int | None = None,
         change: GraphChange | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: StepListener | None = None,
     ) -> Boxes:
         """Boxes of all nodes by ancestral steps (EchoScene, section 3.3); sizes can come out negative.
 
@@ -157,7 +157,7 @@ class ReleasedModel(GraphEncoder):
             raise ValueError("box statistics are missing: convert the checkpoint with --bounds FILE")
         conditions = self.eval().conditions(graph, change, generator)
         tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
-        bound = FrozenLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
+        bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
         shape = (len(graph.classes), net.config.channels)
         start = torch.randn(shape, generator=generator)
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
@@ -181,14 +181,14 @@ class ReleasedModel(GraphEncoder):
         shared_noise: bool = True,
         change: GraphChange | None = None,
         winograd: bool = True,
-        progress: Callable[[int, int], None] | None = None,
+        progress: StepListener | None = None,
     ) -> Tensor:
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
 
         Arguments:
             graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
             shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
-            change: as `conditions`. winograd: as `FrozenShape`: faster, at the cost of memory.
+            change: as `conditions`. winograd: as `CompiledShape`: faster, at the cost of memory.
             progress: called with (steps done, steps).
 
         Returns:
@@ -212,7 +212,7 @@ class ReleasedModel(GraphEncoder):
         denoise: Denoiser = as_trained
         if self.config.shape.conditioning == "crossattn" and conditions.shape is not None:
             net = self.shape_df.diffusion_net
-            denoise = FrozenShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
+            denoise = CompiledShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
         return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
 
     def training_losses(

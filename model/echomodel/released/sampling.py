@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import torch
 from torch import Tensor
 
+from echomodel.progress import StepListener
 from echomodel.released.tables import DDIMGrid, LayoutTables, ShapeTables
 
 Denoiser = Callable[[Tensor, Tensor], Tensor]  # (state (N, ...), step (N,) int64) -> noise (N, ...)
@@ -71,9 +72,7 @@ def ddim(denoise: Denoiser, x: Tensor, grid: DDIMGrid) -> Iterator[tuple[int, Te
         yield step, x
 
 
-def last(
-    states: Iterator[tuple[int, Tensor]], progress: Callable[[int, int], None] | None = None, steps: int = 0
-) -> Tensor:
+def last(states: Iterator[tuple[int, Tensor]], progress: StepListener | None = None, steps: int = 0) -> Tensor:
     """The final state of a sampler; `progress` is called with (steps done, `steps`)."""
     final = None
     for done, (_, state) in enumerate(states, start=1):

@@ -71,7 +71,7 @@ def later(tmp_path_factory):
     """A room whose second layout is bad."""
     with pytest.warns(RoomWarning, match="layout_1: bed and wardrobe collide"):
         room = echousd.generate(small_graph(), model=Piled(True), shapes="boxes", samples=2, repair=False)
-    assert [len(found.collisions) > 0 for found in room.judged] == [False, True]
+    assert [len(found.collisions) > 0 for found in room.outcomes] == [False, True]
     return room.save(tmp_path_factory.mktemp("rooms") / "room")
 
 
@@ -120,7 +120,7 @@ def test_more_layouts_are_drawn_again_where_the_first_try_fails():
 
     model = Counting()
     room = echousd.generate(small_graph(), model=model, shapes="boxes", samples=3)
-    assert [found.faults for found in room.judged] == [(), (), ()]
+    assert [found.faults for found in room.outcomes] == [(), (), ()]
     assert model.drawn == 3  # none was drawn twice
     crowded = Counting()
     with pytest.warns(RoomWarning):

@@ -15,7 +15,7 @@ import echousd
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.folder import STAGING
-from echousd.room.save import identifier, save_flat, write_preview
+from echousd.room.save import as_identifier, save_flat, write_preview
 
 
 def make(seed=0, shift=0.5, graph=None, **more):
@@ -306,5 +306,5 @@ def test_room_is_shown_in_notebooks():
 
 @pytest.mark.parametrize(("word", "name"), [("out", "out"), ("my room", "my_room"), ("7", "_7"), ("über", "_ber")])
 def test_names_of_rooms_are_identifiers(word, name):
-    assert identifier(word) == name
+    assert as_identifier(word) == name
     assert Sdf.Path.IsValidIdentifier(name)

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.frozen_echo import FrozenEcho, GraphIndex
+from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
 from echomodel.released.layout import LayoutNet, check_inputs, edge_input
 from echomodel.released.packed import PackedLinear, folded_norm
 from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, time_signal
@@ -106,7 +106,7 @@ class _Linear:
         return self.linear(h)
 
 
-class FrozenLayout:
+class CompiledLayout:
     """A layout denoiser for inference; weights are copied, later changes of `net` do not reach it.
 
     Arguments:
@@ -127,11 +127,11 @@ class FrozenLayout:
         self.outputs = [self._freeze(block) for block in net.output_blocks]
         norm, _, conv = (cast(Any, part) for part in net.out)
         self.out_norm, self.out = _Norm.of(norm), PackedLinear(_tap(conv), conv.bias)
-        self.echo: FrozenEcho | None = None
+        self.echo: CompiledEcho | None = None
         if self.config.echo:
             time = net.box_time_emb if self.config.time_in_echo else None
             self.table = net.pred_embeddings
-            self.echo = FrozenEcho(net.box_graph_cov, self.config.objects, self.config.code, net.box_embeddings, time)
+            self.echo = CompiledEcho(net.box_graph_cov, self.config.objects, self.config.code, net.box_embeddings, time)
         self.context = PackedLinear(*(torch.cat(parts) for parts in zip(*self._contexts, strict=True)))
         self.times = torch.cat([self._time_rows(net, part) for part in steps.split(128)])
 
@@ -148,10 +148,10 @@ class FrozenLayout:
                 start = sum(len(bias) for _, bias in self._contexts)
                 attention = cast(Any, part.transformer_blocks[0]).attn2
                 out = attention.to_out[0]
-                frozen = _Transformer(part, slice(start, start + len(out.bias)))
+                compiled = _Transformer(part, slice(start, start + len(out.bias)))
                 matrix = out.weight.double() @ attention.to_v.weight.double()
-                self._contexts.append((matrix, out.bias.double() + frozen.shift))
-                parts.append(frozen)
+                self._contexts.append((matrix, out.bias.double() + compiled.shift))
+                parts.append(compiled)
             else:
                 parts.append(
                     _Linear(part.op if isinstance(part, Down) else part.conv if isinstance(part, Up) else part)
@@ -187,33 +187,33 @@ class FrozenLayout:
 
 
 class BoundLayout:
-    """A frozen layout denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
+    """A compiled layout denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
 
     @torch.no_grad()
-    def __init__(self, frozen: FrozenLayout, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
-        self.frozen, self.nodes = frozen, len(objects)
-        config = frozen.config
+    def __init__(self, compiled: CompiledLayout, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
+        self.compiled, self.nodes = compiled, len(objects)
+        config = compiled.config
         check_inputs(
             objects.new_zeros(len(objects), config.channels), objects, triples, triples.new_zeros(len(objects)), config
         )
-        if frozen.echo is None:
-            self.context = frozen.context(objects)
+        if compiled.echo is None:
+            self.context = compiled.context(objects)
             return
         self.graph = GraphIndex.of(triples, len(objects))
-        self.bound = frozen.echo.bind(objects, edge_input(frozen.table, triples, edges, config))
+        self.bound = compiled.echo.bind(objects, edge_input(compiled.table, triples, edges, config))
 
     @torch.inference_mode()
     def __call__(self, x: Tensor, t: Tensor) -> Tensor:
         """(N, 8) float32 boxes and (N,) int64 steps -> (N, 8) float32 noise; ValueError for a step not prepared."""
-        frozen = self.frozen
-        if tuple(x.shape) != (self.nodes, frozen.config.channels) or tuple(t.shape) != (self.nodes,):
+        compiled = self.compiled
+        if tuple(x.shape) != (self.nodes, compiled.config.channels) or tuple(t.shape) != (self.nodes,):
             raise ValueError(f"state is {tuple(x.shape)}, steps {tuple(t.shape)}, for a graph of {self.nodes} nodes")
-        if bool(((t < 0) | (t >= len(frozen.row))).any()) or bool((frozen.row[t] < 0).any()):
-            raise ValueError(f"step {int(t[0])} was not prepared: allowed are the steps given to FrozenLayout")
-        rows = frozen.times[frozen.row[t]]
-        if frozen.echo is None:
-            return frozen.denoise(x, rows, self.context)
-        width = frozen.echo.time_width
+        if bool(((t < 0) | (t >= len(compiled.row))).any()) or bool((compiled.row[t] < 0).any()):
+            raise ValueError(f"step {int(t[0])} was not prepared: allowed are the steps given to CompiledLayout")
+        rows = compiled.times[compiled.row[t]]
+        if compiled.echo is None:
+            return compiled.denoise(x, rows, self.context)
+        width = compiled.echo.time_width
         echo_rows = rows[:, rows.shape[1] - width :]
-        context = frozen.echo(self.bound, x, echo_rows, self.graph)
-        return frozen.denoise(x, rows, frozen.context(context))
+        context = compiled.echo(self.bound, x, echo_rows, self.graph)
+        return compiled.denoise(x, rows, compiled.context(context))

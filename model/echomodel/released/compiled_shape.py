@@ -14,7 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.frozen_echo import FrozenEcho, GraphIndex
+from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
 from echomodel.released.layout import check_inputs, edge_input
 from echomodel.released.packed import PackedLinear, folded_norm
 from echomodel.released.shape import ShapeUNet
@@ -119,7 +119,7 @@ class _Plain:
         return self.run(h)
 
 
-class FrozenShape:
+class CompiledShape:
     """A shape denoiser for inference.
 
     Arguments:
@@ -132,7 +132,7 @@ class FrozenShape:
     def __init__(self, net: ShapeUNet, winograd: bool = True) -> None:
         config = net.config
         if config.conditioning != "crossattn":
-            raise ValueError(f"frozen shape branch: conditioning is {config.conditioning!r}, allowed: crossattn")
+            raise ValueError(f"compiled shape branch: conditioning is {config.conditioning!r}, allowed: crossattn")
         self.net, self.config, self.winograd = net, config, winograd
         self._side, self._shifts, self._contexts = config.grid, [], []  # type: ignore[var-annotated]
         self.inputs = [self._freeze(block) for block in net.input_blocks]
@@ -145,10 +145,10 @@ class FrozenShape:
         weights, biases = zip(*self._shifts, strict=True)
         self.shift = PackedLinear(torch.cat(weights), torch.cat(biases))
         del self._contexts, self._shifts
-        self.echo: FrozenEcho | None = None
+        self.echo: CompiledEcho | None = None
         if config.echo:
             time = net.shape_time_emb if config.time_in_echo else None
-            self.echo = FrozenEcho(net.shape_code_graph_cov, config.objects, config.code, None, time)
+            self.echo = CompiledEcho(net.shape_code_graph_cov, config.objects, config.code, None, time)
 
     def _freeze(self, block: Any) -> list[_Res | _Transformer | _Plain]:
         parts: list[_Res | _Transformer | _Plain] = []
@@ -196,29 +196,29 @@ class FrozenShape:
 
 
 class BoundShape:
-    """A frozen shape denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
+    """A compiled shape denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
 
     @torch.no_grad()
-    def __init__(self, frozen: FrozenShape, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
-        self.frozen, self.objects = frozen, objects
-        config = frozen.config
+    def __init__(self, compiled: CompiledShape, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
+        self.compiled, self.objects = compiled, objects
+        config = compiled.config
         count = len(objects)
         check_inputs(objects.new_zeros(count, config.channels), objects, triples, triples.new_zeros(count), config)
-        if frozen.echo is not None:
+        if compiled.echo is not None:
             self.graph = GraphIndex.of(triples, count)
-            self.bound = frozen.echo.bind(objects, edge_input(frozen.net.pred_embeddings, triples, edges, config))
+            self.bound = compiled.echo.bind(objects, edge_input(compiled.net.pred_embeddings, triples, edges, config))
 
     @torch.inference_mode()
     def __call__(self, x: Tensor, t: Tensor) -> Tensor:
         """(N, 3, D, H, W) float32 latents and (N,) int64 steps -> noise of the same shape."""
-        frozen, net = self.frozen, self.frozen.net
+        compiled, net = self.compiled, self.compiled.net
         if len(x) != len(self.objects) or len(t) != len(x):
             raise ValueError(f"{len(x)} latents and {len(t)} steps for a graph of {len(self.objects)} nodes")
         steps, row = t.unique(return_inverse=True)
         embedding = net.embed_time(steps)
-        time = frozen.shift(F.silu(embedding))[row]
+        time = compiled.shift(F.silu(embedding))[row]
         context = self.objects
-        if frozen.echo is not None:
+        if compiled.echo is not None:
             code = net.shape_embeddings(x)
-            context = frozen.echo(self.bound, code, frozen.echo.time_rows(embedding)[row], self.graph)
-        return frozen.denoise(x, time, frozen.context(context))
+            context = compiled.echo(self.bound, code, compiled.echo.time_rows(embedding)[row], self.graph)
+        return compiled.denoise(x, time, compiled.context(context))

@@ -92,7 +92,7 @@ class GraphIndex:
         return cls(triples[:, 0].contiguous(), triples[:, 2].contiguous(), sender, counts.cumsum(0) - counts)
 
 
-class FrozenEcho:
+class CompiledEcho:
     """A triplet GCN in evaluation mode over nodes [condition, code of the state, code of the time].
 
     Arguments:
