@@ -20,43 +20,44 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-
-    @app.command(
+    app.command(
         epilog="Example: echousd check out/bedroom/bedroom.usda  (exit code 0: good, 1: faults, 2: not a room)"
-    )
-    def check(
-        room: Annotated[Path, typer.Argument(help="Room to check (.usda, .usdc, .usd, .usdz).", show_default=False)],
-        json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
-        rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
-        layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
-        strict: Annotated[bool, typer.Option("--strict", help="Broken living rules fail the check, too.")] = False,
-        settle: Annotated[
-            bool, typer.Option("--settle", help="Simulate two seconds as well: everything must rest (extra: sim).")
-        ] = False,
-    ) -> None:
-        """Check a room: relations, collisions, placement, living rules in all its layouts, and its USD."""
-        from echousd.check import check_room
+    )(check)
 
-        report = check_room(room, rules=rules, layout=layout)
-        settled: tuple[SettleReport, ...] = ()
+
+def check(
+    room: Annotated[Path, typer.Argument(help="Room to check (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+    rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
+    layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Broken living rules fail the check, too.")] = False,
+    settle: Annotated[
+        bool, typer.Option("--settle", help="Simulate two seconds as well: everything must rest (extra: sim).")
+    ] = False,
+) -> None:
+    """Check a room: relations, collisions, placement, living rules in all its layouts, and its USD."""
+    from echousd.check import check_room
+
+    report = check_room(room, rules=rules, layout=layout)
+    settled: tuple[SettleReport, ...] = ()
+    if settle:
+        from echousd.settle import settle_layouts
+
+        settled = settle_layouts(room, layout=layout)
+    rests = all(found.ok for found in settled)
+    if json:
+        import json as text
+
+        told = report.to_json()
         if settle:
-            from echousd.settle import settle_layouts
-
-            settled = settle_layouts(room, layout=layout)
-        rests = all(found.ok for found in settled)
-        if json:
-            import json as text
-
-            told = report.to_json()
-            if settle:
-                told["settle"] = [found.to_json() for found in settled]
-                told["ok"] = told["ok"] and rests
-            typer.echo(text.dumps(plain_json(told), indent=2, allow_nan=False))
-        else:
-            _show(report, strict)
-            _show_settled(settled)
-        if not report.ok or not rests or (strict and report.living):
-            raise typer.Exit(1)
+            told["settle"] = [found.to_json() for found in settled]
+            told["ok"] = told["ok"] and rests
+        typer.echo(text.dumps(plain_json(told), indent=2, allow_nan=False))
+    else:
+        _show(report, strict)
+        _show_settled(settled)
+    if not report.ok or not rests or (strict and report.living):
+        raise typer.Exit(1)
 
 
 def _show(report: CheckReport, strict: bool) -> None:

@@ -110,30 +110,32 @@ def _extras() -> Iterator[Diagnosis]:
 
 def register(app: typer.Typer) -> None:
     """Add `plugin-path` and `doctor`."""
+    app.command("plugin-path")(plugin_path)
+    app.command()(doctor)
 
-    @app.command("plugin-path")
-    def plugin_path() -> None:
-        """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD).
 
-        Example: PXR_PLUGINPATH_NAME=$(echousd plugin-path) usdview bedroom.usda
-        """
-        from echousd import plugin
+def plugin_path() -> None:
+    """Print the folder of the USD schema plugin, for PXR_PLUGINPATH_NAME (does not load USD).
 
-        typer.echo(plugin.plugin_path())
+    Example: PXR_PLUGINPATH_NAME=$(echousd plugin-path) usdview bedroom.usda
+    """
+    from echousd import plugin
 
-    @app.command()
-    def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
-        """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one.
+    typer.echo(plugin.plugin_path())
 
-        Example: echousd doctor --json
-        """
-        findings = diagnose()
-        healthy = all(diagnosis.state != "gap" for diagnosis in findings)
-        if as_json:
-            typer.echo(json.dumps({"ok": healthy, "findings": [asdict(diagnosis) for diagnosis in findings]}, indent=2))
-        else:
-            _show(findings)
-        raise typer.Exit(0 if healthy else 1)
+
+def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+    """Report what EchoUSD finds on this machine and what to do about each gap; exit code 1 if there is one.
+
+    Example: echousd doctor --json
+    """
+    findings = diagnose()
+    healthy = all(diagnosis.state != "gap" for diagnosis in findings)
+    if as_json:
+        typer.echo(json.dumps({"ok": healthy, "findings": [asdict(diagnosis) for diagnosis in findings]}, indent=2))
+    else:
+        _show(findings)
+    raise typer.Exit(0 if healthy else 1)
 
 
 def _show(findings: list[Diagnosis]) -> None:

@@ -16,79 +16,81 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-
-    @app.command(
+    app.command(
         epilog='Example: echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
-    )
-    def edit(
-        room: Annotated[Path, typer.Argument(help="Root layer of a room that generate made.", show_default=False)],
-        add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
-        remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
-        relabel: Annotated[list[str] | None, typer.Option(help="Other category in its place, name:category.")] = None,
-        relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
-        unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
-        lock: Annotated[list[str] | None, typer.Option(help="Object that stays as it stands.")] = None,
-        unlock: Annotated[list[str] | None, typer.Option(help="Object that may move and change again.")] = None,
-        move: Annotated[list[str] | None, typer.Option(help="Where to, name:x,z or name:x,y,z, metres.")] = None,
-        turn: Annotated[list[str] | None, typer.Option(help="Heading, name:degrees; 0 looks along +Z.")] = None,
-        resize: Annotated[list[str] | None, typer.Option(help="Size at heading 0, name:x,y,z, metres.")] = None,
-        restyle: Annotated[list[str] | None, typer.Option(help="Style, name:style.")] = None,
-        dry_run: Annotated[
-            bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
-        ] = False,
-        output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
-        seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-        shapes: Annotated[
-            str | None, typer.Option(help="Of new objects: parts, sdf or boxes; default: what the room is made of.")
-        ] = None,
-        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
-        repair: Annotated[
-            bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
-        ] = True,
-        force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
-        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
-    ) -> None:
-        """Change what a room holds; objects that the change does not touch stay byte for byte.
+    )(edit)
+    app.command(epilog="Example: echousd update out/bedroom/mine.usda")(update)
 
-        Every option may be given several times.
-        """
-        from echousd.room.reading import read_room
-        from echousd.room.wishes import Wishes, wished
 
-        wishes = Wishes(
-            remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
-            turn or (), resize or (), restyle or (),
-        )  # fmt: skip
-        options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair}
-        nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
-        _change(
-            room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
-            dry_run=dry_run, force=force, wait=wait,
-        )  # fmt: skip
+def edit(
+    room: Annotated[Path, typer.Argument(help="Root layer of a room that generate made.", show_default=False)],
+    add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
+    remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
+    relabel: Annotated[list[str] | None, typer.Option(help="Other category in its place, name:category.")] = None,
+    relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
+    unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
+    lock: Annotated[list[str] | None, typer.Option(help="Object that stays as it stands.")] = None,
+    unlock: Annotated[list[str] | None, typer.Option(help="Object that may move and change again.")] = None,
+    move: Annotated[list[str] | None, typer.Option(help="Where to, name:x,z or name:x,y,z, metres.")] = None,
+    turn: Annotated[list[str] | None, typer.Option(help="Heading, name:degrees; 0 looks along +Z.")] = None,
+    resize: Annotated[list[str] | None, typer.Option(help="Size at heading 0, name:x,y,z, metres.")] = None,
+    restyle: Annotated[list[str] | None, typer.Option(help="Style, name:style.")] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
+    shapes: Annotated[
+        str | None, typer.Option(help="Of new objects: parts, sdf or boxes; default: what the room is made of.")
+    ] = None,
+    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
+    ] = True,
+    force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+) -> None:
+    """Change what a room holds; objects that the change does not touch stay byte for byte.
 
-    @app.command(epilog="Example: echousd update out/bedroom/mine.usda")
-    def update(
-        layer: Annotated[Path, typer.Argument(help="Your layer over a room that generate made.", show_default=False)],
-        seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-        weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
-        dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
-        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
-    ) -> None:
-        """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
+    Every option may be given several times.
+    """
+    from echousd.room.reading import read_room
+    from echousd.room.wishes import Wishes, wished
 
-        What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
-        """
-        from echousd.room.wishes import artists_wishes
+    wishes = Wishes(
+        remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
+        turn or (), resize or (), restyle or (),
+    )  # fmt: skip
+    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair}
+    nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
+    _change(
+        room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
+        dry_run=dry_run, force=force, wait=wait,
+    )  # fmt: skip
 
-        def wanted() -> tuple[Path, SceneGraph]:
-            own, graph, moved = artists_wishes(layer)
-            for name in moved:
-                say(f"locked   {name}, where {layer.name} puts it")
-            return own, graph
 
-        options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
-        nothing = f"{layer}: changes nothing about the room"
-        _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait)
+def update(
+    layer: Annotated[Path, typer.Argument(help="Your layer over a room that generate made.", show_default=False)],
+    seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
+    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+) -> None:
+    """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
+
+    What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
+    """
+    from echousd.room.wishes import artists_wishes
+
+    def wanted() -> tuple[Path, SceneGraph]:
+        own, graph, moved = artists_wishes(layer)
+        for name in moved:
+            say(f"locked   {name}, where {layer.name} puts it")
+        return own, graph
+
+    options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
+    nothing = f"{layer}: changes nothing about the room"
+    _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait)
 
 
 def _change(

@@ -10,29 +10,28 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")(export)
 
-    @app.command(epilog="Example: echousd export out/bedroom/bedroom.usda -o bedroom.usdz")
-    def export(
-        room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
-        output: Annotated[
-            Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)
-        ],
-        arkit: Annotated[bool, typer.Option("--arkit", help="usdz for Apple's viewers (a usdc inside).")] = False,
-        search: Annotated[
-            list[Path] | None,
-            typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
-        ] = None,
-        layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
-        physics: Annotated[
-            bool | None,
-            typer.Option(
-                "--physics/--no-physics", help="Bodies, colliders and scene, or none of it; default: in flat USD alone."
-            ),
-        ] = None,
-        force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
-    ) -> None:
-        """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
-        from echousd.export import export as write
 
-        path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
-        typer.echo(str(path))
+def export(
+    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)],
+    arkit: Annotated[bool, typer.Option("--arkit", help="usdz for Apple's viewers (a usdc inside).")] = False,
+    search: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
+    ] = None,
+    layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    physics: Annotated[
+        bool | None,
+        typer.Option(
+            "--physics/--no-physics", help="Bodies, colliders and scene, or none of it; default: in flat USD alone."
+        ),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
+) -> None:
+    """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
+    from echousd.export import export as write
+
+    path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
+    typer.echo(str(path))

@@ -32,117 +32,110 @@ TITLES = {
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: echousd generate samples/bedroom.usda -o out/bedroom --seed 7")(generate)
 
-    @app.command(epilog="Example: echousd generate samples/bedroom.usda -o out/bedroom --seed 7")
-    def generate(
-        graph: Annotated[
-            Path, typer.Argument(help="Scene graph (.usda, .usdc, .usd, .yaml, .json).", show_default=False)
-        ],
-        output: Annotated[
-            Path,
-            typer.Option(
-                "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
-            ),
-        ],
-        room: Annotated[
-            str | None, typer.Option(help="Prim path of one room of several; default: all of them.")
-        ] = None,
-        seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
-        preset: Annotated[
-            str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
-        ] = None,
-        weights: Annotated[
-            Path | None,
-            typer.Option(help="Weights file or folder, from convert or train; default: those that ship."),
-        ] = None,
-        model: Annotated[Path | None, typer.Option(hidden=True, help="The same as --weights.")] = None,
-        shapes: Annotated[
-            str | None,
-            typer.Option(
-                help="parts: built of parts, with doors and drawers; sdf: free shapes; boxes. Default: parts."
-            ),
-        ] = None,
-        samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
-        drafts: Annotated[
-            int | None, typer.Option(help="Layouts to choose the best from; default: 8.", min=1, max=64)
-        ] = None,
-        fit: Annotated[
-            str, typer.Option(help="keep: all that is asked for; drop: leave out what has no place.")
-        ] = "keep",
-        steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
-        faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
-        up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
-        walls: Annotated[
-            bool, typer.Option("--walls/--no-walls", help="Walls around the floor, with doors and windows.")
-        ] = True,
-        ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
-        dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "some",
-        atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
-        repair: Annotated[
-            bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
-        ] = True,
-        flat: Annotated[bool, typer.Option("--flat", help="Write one file instead of a folder of layers.")] = False,
-        crate: Annotated[
-            str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
-        ] = None,
-        timings: Annotated[bool, typer.Option("--timings", help="Print how long each stage took.")] = False,
-        force: Annotated[
-            bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
-        ] = False,
-        wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
-    ) -> None:
-        """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD.
 
-        A stage of several rooms becomes a folder for each and a root layer that composes them.
-        """
-        from echousd.room.manifest import check_seed
+def generate(
+    graph: Annotated[Path, typer.Argument(help="Scene graph (.usda, .usdc, .usd, .yaml, .json).", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", help="Folder of the room (with --flat: a .usda or .usdc file).", show_default=False
+        ),
+    ],
+    room: Annotated[str | None, typer.Option(help="Prim path of one room of several; default: all of them.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
+    preset: Annotated[
+        str | None, typer.Option(help="Which model: compact, paper or released; default: what the weights say.")
+    ] = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(help="Weights file or folder, from convert or train; default: those that ship."),
+    ] = None,
+    model: Annotated[Path | None, typer.Option(hidden=True, help="The same as --weights.")] = None,
+    shapes: Annotated[
+        str | None,
+        typer.Option(help="parts: built of parts, with doors and drawers; sdf: free shapes; boxes. Default: parts."),
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
+    drafts: Annotated[
+        int | None, typer.Option(help="Layouts to choose the best from; default: 8.", min=1, max=64)
+    ] = None,
+    fit: Annotated[str, typer.Option(help="keep: all that is asked for; drop: leave out what has no place.")] = "keep",
+    steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
+    faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
+    up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
+    walls: Annotated[
+        bool, typer.Option("--walls/--no-walls", help="Walls around the floor, with doors and windows.")
+    ] = True,
+    ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
+    dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "some",
+    atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
+    repair: Annotated[
+        bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
+    ] = True,
+    flat: Annotated[bool, typer.Option("--flat", help="Write one file instead of a folder of layers.")] = False,
+    crate: Annotated[
+        str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
+    ] = None,
+    timings: Annotated[bool, typer.Option("--timings", help="Print how long each stage took.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
+    ] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+) -> None:
+    """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD.
 
-        started = time.perf_counter()
-        check_seed(seed)
-        check_output(output, flat=flat, force=force)
-        set_crate_version(crate)
-        house = () if room or flat else rooms_of(graph)
-        with ExitStack() as held:
-            if not house:
-                held.enter_context(writing(output, flat=flat, force=force, wait=wait))
-            held.enter_context(telling_faults())
-            listen = held.enter_context(progress_bar())
-            gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
-            try:
-                from echousd.room.pipeline import generate as make
-                from echousd.room.room import RoomOptions
-                from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
-            finally:
-                gc.enable()
-            options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
-            spent = {"imports": time.perf_counter() - started}
+    A stage of several rooms becomes a folder for each and a root layer that composes them.
+    """
+    from echousd.room.manifest import check_seed
 
-            def one(path: str | None, folder: Path) -> tuple[Room, Path, Path | None]:
-                made = make(
-                    graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
-                    samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
-                    options=options, fit=fit, progress=listen,
-                )  # fmt: skip
-                with took(spent, "write", listen):
-                    root = save_flat(made, folder, force=force) if flat else save_layers(made, folder, force=force)
-                preview = None
-                if not flat:
-                    with took(spent, "preview", listen):
-                        preview = write_preview(root)
-                        preview = write_sheet(root) or preview
-                for stage, seconds in made.timings.items():
-                    spent[stage] = spent.get(stage, 0.0) + seconds
-                return made, root, preview
+    started = time.perf_counter()
+    check_seed(seed)
+    check_output(output, flat=flat, force=force)
+    set_crate_version(crate)
+    house = () if room or flat else rooms_of(graph)
+    with ExitStack() as held:
+        if not house:
+            held.enter_context(writing(output, flat=flat, force=force, wait=wait))
+        held.enter_context(telling_faults())
+        listen = held.enter_context(progress_bar())
+        gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
+        try:
+            from echousd.room.pipeline import generate as make
+            from echousd.room.room import RoomOptions
+            from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
+        finally:
+            gc.enable()
+        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
+        spent = {"imports": time.perf_counter() - started}
 
-            made = generate_house(output, house, one, force=force, wait=wait) if house else [one(room, output)]
-        if timings:
-            total = time.perf_counter() - started
-            spent |= {"other": total - sum(spent.values()), "total": total}
-            for stage, seconds in spent.items():
-                typer.echo(f"{stage:>10} {seconds:7.2f} s")
-        for each in made:
-            report(*each)
-        end(made)
+        def one(path: str | None, folder: Path) -> tuple[Room, Path, Path | None]:
+            made = make(
+                graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
+                samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
+                options=options, fit=fit, progress=listen,
+            )  # fmt: skip
+            with took(spent, "write", listen):
+                root = save_flat(made, folder, force=force) if flat else save_layers(made, folder, force=force)
+            preview = None
+            if not flat:
+                with took(spent, "preview", listen):
+                    preview = write_preview(root)
+                    preview = write_sheet(root) or preview
+            for stage, seconds in made.timings.items():
+                spent[stage] = spent.get(stage, 0.0) + seconds
+            return made, root, preview
+
+        made = generate_house(output, house, one, force=force, wait=wait) if house else [one(room, output)]
+    if timings:
+        total = time.perf_counter() - started
+        spent |= {"other": total - sum(spent.values()), "total": total}
+        for stage, seconds in spent.items():
+            typer.echo(f"{stage:>10} {seconds:7.2f} s")
+    for each in made:
+        report(*each)
+    end(made)
 
 
 Made = tuple["Room", Path, Path | None]
