@@ -9,7 +9,6 @@ import typer
 
 if TYPE_CHECKING:
     from echomodel.data.report import Row
-    from echomodel.roomboxes import RoomBoxes
 
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 
@@ -20,26 +19,6 @@ Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a ro
 def register(app: typer.Typer) -> None:
     """Add the topic."""
     app.add_typer(data_app, name="data")
-
-
-def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
-    """Rooms of a rooms file, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
-
-    Raises ValueError for anything else.
-    """
-    from echomodel.roomboxes import read_rooms
-
-    if not path.exists():
-        raise ValueError(f"{path}: no such file or folder")
-    if path.is_dir():
-        from echomodel.data.roomset import RoomSet
-
-        rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
-        numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
-        return [rooms.room(int(k)) for k in numbers[:limit]]
-    if held_out:
-        raise ValueError(f"{path}: a rooms file holds nothing out, allowed with --held-out: a folder of a room set")
-    return read_rooms(path)[:limit]
 
 
 @data_app.command("build")
@@ -109,21 +88,12 @@ def plot(
     Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
     """
     from echomodel.data.plot import plot_rooms
+    from echomodel.data.room_files import load_rooms, rooms_of_type
 
     found = load_rooms(rooms)
     if room is not None:
-        found = _of_type(found, room, rooms)
+        found = rooms_of_type(found, room, rooms)
     plot_rooms(found[:limit], out, columns=columns, labels=labels)
-
-
-def _of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBoxes]:
-    from echomodel.vocabulary import vocabulary
-
-    wanted = vocabulary().room_type(word).name
-    kept = [room for room in rooms if vocabulary().room_type(room.room_type).name == wanted]
-    if not kept:
-        raise ValueError(f"{path}: holds no room of type {wanted}")
-    return kept
 
 
 @data_app.command("report")
@@ -141,6 +111,7 @@ def report(
     Example: echousd data report --count 2000 --worst 20
     """
     from echomodel.data.report import compare, section_means
+    from echomodel.data.room_files import load_rooms
     from echomodel.data.rooms import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,9 +10,8 @@ import typer
 if TYPE_CHECKING:
     import trimesh
 
-    from echomodel.data.catalogues import MeshEntry
 
-PACKAGE = "sweethome3d-furniture"
+PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.mesh_sources` has it, which need not be loaded for --help
 USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -44,16 +41,18 @@ def meshes(
     from rich.console import Console
     from rich.progress import Progress
 
+    from echomodel.data.mesh_sources import entries_of, fetched_package
     from echomodel.data.meshes import build_meshes, draft_table, read_table, write_table
+    from echousd.stage.meshes import stage_mesh
 
     console = Console(stderr=True, highlight=False)
     out.mkdir(parents=True, exist_ok=True)
     paths = list(sources or [])
     if debian:
-        paths.append(_fetch(out))
+        paths.append(fetched_package(out))
     if not paths:
         raise ValueError("no source given: name libraries or folders, or use --debian")
-    entries = [entry for path in paths for entry in _entries(path, out)]
+    entries = [entry for path in paths for entry in entries_of(path, out, USD_FILES)]
     table = out / "table.csv"
     if not table.exists():
         write_table(table, draft_table(entries))
@@ -62,7 +61,7 @@ def meshes(
     console.print(f"{table}: {len(rows)} models, {used} of them used")
     if table_only:
         return
-    loaders = dict.fromkeys(USD_FILES, _read_usd)
+    loaders = dict.fromkeys(USD_FILES, stage_mesh)
     with Progress(console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("meshes", total=used)
 
@@ -112,88 +111,3 @@ def sheet(
         if drawn:
             rows.append((f"{name} ({len(drawn)})", drawn))
     contact_sheet(rows, pixels).save(out)
-
-
-def _fetch(out: Path) -> Path:
-    """Download the Debian package into OUT/source; raises ValueError where apt is missing or fails."""
-    folder = out / "source"
-    folder.mkdir(exist_ok=True)
-    have = sorted(folder.glob(f"{PACKAGE}_*.deb"))
-    if have:
-        return have[-1]
-    if shutil.which("apt-get") is None:
-        raise ValueError(f"--debian needs apt-get; elsewhere download {PACKAGE}_1.8-1_all.deb and name it as a source")
-    done = subprocess.run(["apt-get", "download", PACKAGE], cwd=folder, capture_output=True, text=True, check=False)
-    found = sorted(folder.glob(f"{PACKAGE}_*.deb"))
-    if done.returncode or not found:
-        raise ValueError(f"apt-get download {PACKAGE} failed: {(done.stderr.strip() or 'no file').splitlines()[-1]}")
-    return found[-1]
-
-
-def _entries(path: Path, out: Path) -> list[MeshEntry]:
-    """Models of one source: a library, a package of libraries, or a folder."""
-    from echomodel.data.catalogues import MESH_FILES, read_folder, read_library
-
-    if not path.exists():
-        raise ValueError(f"{path}: no such file or folder")
-    if path.suffix == ".sh3f":
-        return read_library(path)
-    if path.suffix == ".deb":
-        if shutil.which("dpkg") is None:
-            raise ValueError(f"{path}: unpacking a Debian package needs dpkg; unpack it and name the .sh3f files")
-        unpacked = out / "source" / path.stem
-        if not unpacked.exists():
-            unpacked.parent.mkdir(parents=True, exist_ok=True)
-            done = subprocess.run(["dpkg", "-x", str(path), str(unpacked)], capture_output=True, text=True, check=False)
-            if done.returncode:
-                reason = (done.stderr.strip() or "no reason given").splitlines()[-1]
-                raise ValueError(f"{path}: dpkg cannot unpack it ({reason})")
-        path = unpacked
-    if not path.is_dir():
-        raise ValueError(f"{path}: not a .sh3f library, a .deb package or a folder")
-    libraries = sorted(path.rglob("*.sh3f"))
-    found = [entry for library in libraries for entry in read_library(library)]
-    found = found or read_folder(path, (*MESH_FILES, *USD_FILES))
-    if not found:
-        raise ValueError(f"{path}: holds neither .sh3f libraries nor {', '.join((*MESH_FILES, *USD_FILES))} files")
-    return found
-
-
-def _read_usd(path: Path) -> trimesh.Trimesh:
-    """All meshes of a stage as triangles, in metres, +Y up; raises ValueError where there are none."""
-    import numpy as np
-    import trimesh
-    from pxr import Usd, UsdGeom
-
-    from echousd.stage.units import metres_per_unit, up_axis
-
-    stage = Usd.Stage.Open(str(path))
-    cache = UsdGeom.XformCache()
-    parts = []
-    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
-        if not prim.IsA(UsdGeom.Mesh) or UsdGeom.Imageable(prim).ComputeVisibility() == UsdGeom.Tokens.invisible:
-            continue
-        mesh = UsdGeom.Mesh(prim)
-        points = np.asarray(mesh.GetPointsAttr().Get() or [], float).reshape(-1, 3)
-        counts = np.asarray(mesh.GetFaceVertexCountsAttr().Get() or [], int)
-        indices = np.asarray(mesh.GetFaceVertexIndicesAttr().Get() or [], int)
-        if len(points) == 0 or len(counts) == 0:
-            continue
-        matrix = np.array(cache.GetLocalToWorldTransform(prim))
-        world = np.c_[points, np.ones(len(points))] @ matrix
-        starts = np.cumsum(counts) - counts
-        fans = [
-            np.stack(
-                [indices[starts[counts > k]], indices[starts[counts > k] + k - 1], indices[starts[counts > k] + k]], 1
-            )
-            for k in range(2, counts.max())
-        ]
-        parts.append(trimesh.Trimesh(world[:, :3], np.concatenate(fans), process=False))
-    if not parts:
-        raise ValueError("the stage holds no visible Mesh prims")
-    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=False)])
-    vertices = np.concatenate([part.vertices for part in parts]) * metres_per_unit(stage)
-    if up_axis(stage) == UsdGeom.Tokens.z:
-        vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
-    return trimesh.Trimesh(vertices, faces, process=False)

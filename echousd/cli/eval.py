@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rich.console import Console
-    from torch import Tensor
-
-    from echomodel.metrics.layout_evaluation import EditedGraph, Finish, LayoutSource
-    from echomodel.roomboxes import RoomBoxes
 
 eval_app = typer.Typer(help="Scores of a model: relations, sizes, collisions, shapes.", no_args_is_help=True)
 
@@ -70,8 +64,10 @@ def layout(
     from rich.console import Console
     from rich.progress import Progress
 
+    from echomodel.data.room_files import load_rooms
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
-    from echousd.cli.data import load_rooms
+    from echomodel.metrics.layout_sources import model_layouts, true_layouts
+    from echousd.repair.drafts import best_repaired
 
     found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(
@@ -81,16 +77,16 @@ def layout(
     if model == "truth":
         if seeds or drafts > 1:
             raise ValueError("--seeds and --drafts need several layouts of a room, the true one is one")
-        sampler = _truth(found)
+        sampler = true_layouts(found)
     else:
         weights = None if model is None else Path(model)
         extra = {"guidance": guidance, "relation_guidance": relation_guidance, "start": start}
-        sampler = _model_sampler(weights, seed, rules, steps, extra)
+        sampler = model_layouts(weights, seed, rules, steps, extra)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
             found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total),
-            _repairing(rules) if repair else None,
+            best_repaired(rules) if repair else None,
         )  # fmt: skip
     if out is not None:
         out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
@@ -98,83 +94,6 @@ def layout(
         typer.echo(json.dumps(result))
     else:
         _print(result, Console(highlight=False))
-
-
-def _repairing(rules: str) -> Finish:
-    """The repair of `generate`, for rooms as boxes: the first draft without a fault, else the one with fewest."""
-    from dataclasses import replace
-
-    from echomodel.rules.living import faults
-    from echousd.repair.repair import repair_boxes
-
-    def finish(drafts: Sequence[RoomBoxes], triplets: Tensor) -> RoomBoxes:
-        found: list[tuple[int, int, RoomBoxes]] = []
-        for room in drafts:
-            floor = room.floor_polygon if len(room.floor_polygon) else None
-            done = repair_boxes(
-                room.categories, room.size, room.position, room.yaw, triplets.numpy(),
-                floor_polygon=floor, height=room.height, rules=rules, openings=room.openings,
-            )  # fmt: skip
-            made = replace(room, size=done.size, position=done.position, yaw=done.yaw)
-            wrong = len(faults(made, room.categories, floor, room.openings, triplets))
-            broken = int((done.verdict == 0).sum()) + len(done.collisions) + len(done.outside)
-            found.append((broken, wrong, made))
-            if broken + wrong == 0:
-                break
-        return min(found, key=lambda one: one[:2])[2]
-
-    return finish
-
-
-def _model_sampler(
-    weights: Path | None, seed: int, rules: str, steps: int | None, asked: dict[str, float | None]
-) -> LayoutSource:
-    """Samples with the model; `asked` holds what only compact weights understand."""
-    import torch
-
-    from echomodel.boxes import Boxes
-    from echomodel.echo import EchoModel
-    from echomodel.loading import load_model
-    from echomodel.protocols import GraphEdit
-
-    model = load_model(weights)
-    extra: dict[str, Any] = {}
-    if isinstance(model, EchoModel):
-        extra = {"rules": rules, **asked}
-    elif asked != {"guidance": 1.0, "relation_guidance": None, "start": None}:
-        raise ValueError(f"--guidance, --relation-guidance and --start are for compact weights, found: {model.preset}")
-    generator = torch.Generator().manual_seed(seed)
-
-    def sample(edited: EditedGraph) -> Boxes:
-        edit = None if edited.before is None else GraphEdit(before=edited.before, added=edited.added)
-        return model.sample_layout(
-            edited.graph,
-            generator=generator,
-            steps=steps,
-            edit=edit,
-            known=edited.known,
-            known_mask=edited.known_mask,
-            **extra,
-        )
-
-    return sample
-
-
-def _truth(rooms: list) -> LayoutSource:
-    """A sampler that knows the answer: what the scores are for the true boxes themselves."""
-    from echomodel.boxes import Boxes
-    from echomodel.metrics.room_figures import with_known_words
-
-    boxes = [Boxes.from_room(room) for room in with_known_words(rooms) if len(room) > 1]
-    given = 0
-
-    def sample(edited: EditedGraph) -> Boxes:
-        nonlocal given
-        chosen = [boxes[(given + k) % len(boxes)] for k in range(edited.graph.num_scenes)]
-        given += edited.graph.num_scenes
-        return Boxes.cat(chosen)
-
-    return sample
 
 
 def _print(result: dict, console: Console) -> None:

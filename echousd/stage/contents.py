@@ -117,7 +117,7 @@ def _object(
     own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
     points, faces = [], []
     count = 0
-    for form in forms(prim, cache, _counts, others):
+    for form in forms(prim, cache, is_seen, others):
         found = _readable(lambda form=form: triangulated(form.prim))  # type: ignore[misc]
         if found is None or not len(found[1]):
             continue
@@ -147,7 +147,7 @@ def _object(
     return RoomObject(node, vertices, np.concatenate(faces), high - low, position, yaw)
 
 
-def _counts(prim: Usd.Prim) -> bool:
+def is_seen(prim: Usd.Prim) -> bool:
     """Whether a surface is one that people see: no guide, no proxy, not invisible."""
     image = UsdGeom.Imageable(prim)
     return image.ComputePurpose() not in HIDDEN and image.ComputeVisibility() != UsdGeom.Tokens.invisible

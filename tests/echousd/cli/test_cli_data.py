@@ -8,8 +8,8 @@ import pytest
 from echomodel.data.rooms import generate_rooms
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
 from echomodel.rules import label_relations
-from echousd.cli.data_stage import graph_of, room_of
 from echousd.cli.main import run
+from echousd.stage.rooms import graph_of, room_of
 
 
 @pytest.fixture(scope="module")
