@@ -15,6 +15,7 @@ from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import write_whole
+from echousd.store import store_of
 from echousd.textures import TextureError, file_of, texture_bytes
 
 PACKED = (".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")  # what a usdz may hold beside layers
@@ -30,7 +31,7 @@ class LeftOut(UserWarning):
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the files of a room may lie: below its folder (for a usdz: in the file) and in named search paths."""
+    """Where files of a room may lie: below its folder (for a usdz: in the file), in named search paths, in a store."""
 
     room: Path
     places: tuple[Path, ...]
@@ -46,7 +47,7 @@ class Reach:
     def holds(self, path: str) -> bool:
         """Whether a file, all links followed, lies in reach."""
         real = file_of(path).resolve()
-        return any(real == place or place in real.parents for place in self.places)
+        return any(real == place or place in real.parents for place in self.places) or store_of(real) is not None
 
     def check(self, path: str, where: str) -> None:
         """Raises StageError that names `where` (a prim, a layer) for a file out of reach."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from echousd.batches.executor import Executor, LocalWorkers
-from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
+from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
 from echousd.batches.run import BatchProgress, Run
@@ -202,16 +202,16 @@ def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
 
 def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
-    rows = read_journals(out)
+    rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
     for entry in (entry for pack in plan.packs(shard) for entry in pack):
         row = rows.get(entry.id)
         folder = out / entry.path
         if row is None or row["state"] != "done":
             continue
-        if room_digest(folder) == row["sha256"]:
+        if not fault_of(folder, row, stored):
             valid.add(entry.id)
-        elif folder.is_dir():
+        elif folder.is_dir() and room_digest(folder) != row["sha256"]:
             aside = out / STATE / "set_aside" / f"{entry.id}_{int(row['when'])}"
             aside.parent.mkdir(parents=True, exist_ok=True)
             number = 0

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
-from echousd.batches.plan import STATE
+from echousd.batches.plan import STATE, STORE
 from echousd.room.journal import STAGING
 from echousd.room.lock import LOCK
+from echousd.store import Store
 
 JOURNAL = "journal.jsonl"
 
@@ -70,6 +71,32 @@ def room_digest(folder: Path) -> str:
         if name != LOCK and not name.startswith(f"{STAGING}/"):
             total.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
     return total.hexdigest()
+
+
+def fault_of(folder: Path, row: dict[str, Any], stored: Collection[str]) -> str:
+    """What is wrong with a room that the journal calls done, "" where nothing is.
+
+    Arguments:
+        folder: of the room. row: its line in the journal. stored: keys of what is whole in the run's store.
+    """
+    if not folder.is_dir():
+        return "missing"
+    if room_digest(folder) != row["sha256"]:
+        return "changed since it was made"
+    manifest = json.loads((folder / row["root"]).with_suffix(".json").read_bytes())
+    missing = set(manifest.get("stored", {}).values()) - set(stored)
+    return f"{len(missing)} of its assets are missing in the store or changed" if missing else ""
+
+
+def whole_keys(folder: Path, *, mend: bool = False) -> set[str]:
+    """Keys of what is whole in the store of a run; `mend` takes away what is not, for its rooms to put it again."""
+    if not (folder / STORE).is_dir():
+        return set()
+    store = Store.open(folder / STORE)
+    wrong = set(store.wrong())
+    for key in wrong if mend else ():
+        store.remove(key)
+    return set(store.keys()) - wrong
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:

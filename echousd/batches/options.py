@@ -21,6 +21,7 @@ class BatchOptions(BaseModel):
         relations: relations an object that are told of a room drawn from the room generator (`sample`).
         preview: draw a picture of every room (needs the extra `render`).
         weights: weights file or folder, "" for those that ship.
+        self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -40,6 +41,7 @@ class BatchOptions(BaseModel):
     dress: str = "none"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5
+    self_contained: bool = False
 
     @property
     def look(self) -> RoomOptions:

@@ -12,7 +12,7 @@ from typing import Any
 from echousd.batches import work
 from echousd.batches.executor import Executor, Outcome, Task
 from echousd.batches.journal import Journal
-from echousd.batches.plan import PACK, Entry, Plan
+from echousd.batches.plan import PACK, STORE, Entry, Plan
 
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
 FULL = "No space left on device"
@@ -171,12 +171,14 @@ class Run:
         return True
 
     def _job(self, entry: Entry, text: str = "", boxes: Any = None) -> work.Job:
+        options = self.plan.options[entry.options]
         return work.Job(
             entry.id,
             str(self.folder / entry.path),
             entry.seed,
-            self.plan.options[entry.options],
+            options,
             text or self.plan.graphs.get(entry.graph, ""),
             entry.draw,
             boxes,
+            "" if options.self_contained else str(self.folder / STORE),
         )

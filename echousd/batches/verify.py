@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from echousd.batches.index import write_index
-from echousd.batches.journal import read_journals, room_digest
+from echousd.batches.journal import fault_of, read_journals, whole_keys
 from echousd.batches.manifest import manifest_rows, summary, write_manifest
 from echousd.batches.plan import load_plan
 from echousd.batches.sheet import write_sheet
@@ -32,15 +32,15 @@ def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
 
     Raises ValueError for a folder without a run.
     """
-    plan, rows = load_plan(folder), read_journals(folder)
+    plan, rows, stored = load_plan(folder), read_journals(folder), whole_keys(folder)
     for entry in plan.entries:
         row, place = rows.get(entry.id), folder / entry.path
         if row is None:
             yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
         elif row["state"] != "done":
             yield Wrong(entry.id, f"failed: {row['error']}")
-        elif room_digest(place) != row["sha256"]:
-            yield Wrong(entry.id, "missing" if not place.is_dir() else "changed since it was made")
+        elif fault := fault_of(place, row, stored):
+            yield Wrong(entry.id, fault)
         elif check:
             from echousd.check import check_room
 

@@ -22,7 +22,7 @@ class Job:
     """One room as a worker needs it.
 
     Arguments:
-        id: its name; folder: where it goes.
+        id: its name; folder: where it goes; store: where its assets go, "" = into the folder.
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
         seed, options: as in the plan. boxes: of its first layout, or None to sample them alone.
     """
@@ -34,6 +34,7 @@ class Job:
     text: str = ""
     draw: tuple[str, int, int] | None = None
     boxes: Rows | None = None
+    store: str = ""
 
 
 def layouts(jobs: list[Job]) -> list[tuple[str, Rows | None, str]]:
@@ -80,7 +81,7 @@ def room(job: Job) -> dict[str, Any]:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         made = generated(job)
-        root = made.save(folder, preview=job.options.preview, wait=True)
+        root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
     facts = _facts(made, root)
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
     facts["seconds"] = round(time.perf_counter() - started, 3)

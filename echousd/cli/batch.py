@@ -62,6 +62,9 @@ def run(
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
     dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
+    self_contained: Annotated[
+        bool | None, typer.Option("--self-contained/--store", help="Assets in every room, or once in a store.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
@@ -83,7 +86,7 @@ def run(
         "preview": preview,
         "walls": walls,
     }
-    told |= {"drafts": drafts, "dress": dress, "walls": walls}
+    told |= {"drafts": drafts, "dress": dress, "self_contained": self_contained}
     raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
     request = request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:

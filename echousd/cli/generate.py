@@ -79,6 +79,9 @@ def generate(
         str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
     ] = None,
     timings: Annotated[bool, typer.Option("--timings", help="Print how long each stage took.")] = False,
+    store: Annotated[
+        Path | None, typer.Option(help="Folder where many rooms keep their assets and images once.")
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
     ] = False,
@@ -93,6 +96,8 @@ def generate(
     started = time.perf_counter()
     check_seed(seed)
     check_output(output, flat=flat, force=force)
+    if flat and store:
+        raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")
     set_crate_version(crate)
     house = () if room or flat else rooms_of(graph)
     with ExitStack() as held:
@@ -117,7 +122,10 @@ def generate(
                 options=options, fit=fit, progress=listen,
             )  # fmt: skip
             with took(spent, "write", listen):
-                root = save_flat(made, folder, force=force) if flat else save_layers(made, folder, force=force)
+                if flat:
+                    root = save_flat(made, folder, force=force)
+                else:
+                    root = save_layers(made, folder, force=force, store=store)
             preview = None
             if not flat:
                 with took(spent, "preview", listen):

@@ -29,6 +29,7 @@ TOPICS: tuple[str, ...] = (
     "graph",
     "generate",
     "batch",
+    "store",
     "edit",
     "render",
     "export",

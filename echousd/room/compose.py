@@ -18,6 +18,7 @@ from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
 from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
+from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface
 from echousd.room.taxonomy import ade20k
@@ -37,8 +38,12 @@ class Asset:
     files: Mapping[str, bytes]
 
 
-def room_files(room: RoomData) -> dict[str, bytes]:
-    """Relative path -> content of everything that a room consists of, except the preview and the manifest."""
+def room_files(room: RoomData, shelf: Shelf | None = None) -> dict[str, bytes]:
+    """Relative path -> content of everything that a room consists of, except the preview and the manifest.
+
+    Arguments:
+        shelf: takes assets and images, which are not among the files then.
+    """
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
     for name, user in room.asset_users.items():
@@ -64,7 +69,12 @@ def room_files(room: RoomData) -> dict[str, bytes]:
         looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
         parts = {name: asset.slots for name, asset in small.items()}
         layers["dressing"] = dressing_layer(dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"))
+    if shelf is not None:
+        shelf.put(files)
+        files = {path: content for path, content in files.items() if not shelf.holds(path)}
     for name, layer in layers.items():
+        if shelf is not None:
+            shelf.redirect(layer)
         files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
     files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
     return files

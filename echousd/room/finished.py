@@ -18,7 +18,15 @@ if TYPE_CHECKING:
 class Room(RoomData):
     """A room that can be saved, opened as a stage and looked at; its data are those of `RoomData`."""
 
-    def save(self, folder: str | Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        force: bool = False,
+        preview: bool = True,
+        wait: bool = False,
+        store: str | Path | None = None,
+    ) -> Path:
         """Write the layered room and return the path of its root layer.
 
         Arguments:
@@ -28,6 +36,8 @@ class Room(RoomData):
             force: also write into a folder that holds other things than a room of ours.
             preview: draw `<name>.png` (needs the extra `render`; left out without it).
             wait: for another process that writes this folder, instead of raising.
+            store: folder where many rooms keep their assets and images once (`echousd.store`), made if need be; None =
+                that of the room which is there, "" = none: the room travels alone.
 
         Raises:
             ValueError: the folder is not ours, is being written by another process, cannot be written, or the disk is
@@ -35,7 +45,7 @@ class Room(RoomData):
         """
         from echousd.room.save import save_room
 
-        return save_room(self, Path(folder), force=force, preview=preview, wait=wait)
+        return save_room(self, Path(folder), force=force, preview=preview, wait=wait, store=store)
 
     @property
     def stage(self) -> Usd.Stage:

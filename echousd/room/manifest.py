@@ -39,6 +39,8 @@ class Manifest(BaseModel):
     ceiling: bool = False
     dress: Literal["none", "some", "full"] = "none"
     meshes: dict[str, dict[str, Any]] = {}
+    store: Annotated[str, Field(max_length=4096)] = ""
+    stored: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]] = {}
 
 
 def check_seed(seed: int) -> None:

@@ -21,6 +21,7 @@ from echousd.room.joints import read_joints
 from echousd.room.manifest import find_manifest
 from echousd.room.masses import read_mass
 from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, coarse_file, piece_of
+from echousd.room.stored import asset_from, shelf_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
 
@@ -59,6 +60,7 @@ def read_room(root: str | Path) -> SavedRoom:
     manifest = find_manifest(root.parent, root.stem)
     if manifest is None:
         raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
+    shelf = shelf_of(manifest, root.parent)
     graph = read_graph(stage)
     geometry: dict[str, Geometry] = {}
     carried: dict[str, Mapping[str, bytes]] = {}
@@ -73,10 +75,15 @@ def read_room(root: str | Path) -> SavedRoom:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:
             made[asset] = found
-            files = {path: inside(root.parent, path, f"asset {asset!r}") for path in asset_files(asset)}
-            carried[asset] = {
-                path: file.read_bytes() for path, file in files.items() if path != coarse_file(asset) or file.exists()
-            }
+            if shelf is not None and f"assets/{asset}" in shelf.keys:
+                carried[asset] = asset_from(shelf, asset)
+            else:
+                files = {path: inside(root.parent, path, f"asset {asset!r}") for path in asset_files(asset)}
+                carried[asset] = {
+                    path: file.read_bytes()
+                    for path, file in files.items()
+                    if path != coarse_file(asset) or file.exists()
+                }
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
     sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)

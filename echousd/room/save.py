@@ -24,22 +24,32 @@ from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
 from echousd.room.room import LayoutOutcome, RoomData
+from echousd.room.stored import Shelf, shelf_of
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.layouts import layout_names
+from echousd.store import Store
 
 
-def save_room(room: RoomData, folder: Path, *, force: bool = False, preview: bool = True, wait: bool = False) -> Path:
+def save_room(
+    room: RoomData,
+    folder: Path,
+    *,
+    force: bool = False,
+    preview: bool = True,
+    wait: bool = False,
+    store: str | Path | None = None,
+) -> Path:
     """Write the layered room and its preview; see `Room.save`."""
     with locked(folder, wait=wait):
-        root = save_layers(room, folder, force=force)
+        root = save_layers(room, folder, force=force, store=store)
         if preview:
             write_preview(root)
             write_sheet(root)
         return root
 
 
-def save_layers(room: RoomData, folder: Path, *, force: bool = False) -> Path:
+def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str | Path | None = None) -> Path:
     """Write the layers, assets and the manifest of a room; see `Room.save`.
 
     Warns of every file that is kept because somebody else wrote or edited it, and names it.
@@ -48,24 +58,25 @@ def save_layers(room: RoomData, folder: Path, *, force: bool = False) -> Path:
         raise ValueError(f"{folder}: is a file, the output must be a folder")
     with locked(folder):
         old = folders.claim(folder, force=force, root=room.name)
-        return _save_layers(room, folder, old)
+        shelf = shelf_of(old, folder) if store is None else Shelf(Store.create(store), folder) if store else None
+        return _save_layers(room, folder, old, replace(shelf, keys={}) if shelf else None)
 
 
-def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
+def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Shelf | None) -> Path:
     recorded: dict[str, str] = dict(old.get("files", {}))
     # A folder that was renamed or copied keeps its root's name: other layers refer to it.
     room = replace(room, name=old.get("name") or as_identifier(folder.resolve().name))
     room = replace(room, assets=ownership.free_assets(folder, room, recorded))
     for left in folder.glob(f".{room.name}.png.*.partial"):  # of a run that was killed at its preview
         left.unlink(missing_ok=True)
-    files = room_files(room)
+    files = room_files(room, shelf)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     owned = {path: folders.digest(content) for path, content in files.items()}
     current = ownership.read(folder, root)
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
         files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
     for path in (path for files_of in room.carried.values() for path in files_of):
-        if path in recorded and path in owned and ownership.read(folder, path) == files[path]:
+        if path in files and path in recorded and path in owned and ownership.read(folder, path) == files[path]:
             owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
     replaced = [path for path in files if path != root or root not in recorded] + ([] if old else [manifest])
     kept = ownership.backups(folder, replaced, recorded, files)
@@ -73,7 +84,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any]) -> Path:
     gone = [path for path in recorded if path not in owned]
     needed = ownership.referenced(folder, recorded, gone, replaced)
     owned |= {path: recorded[path] for path in needed}
-    files[manifest] = (json.dumps(manifest_of(room, owned), indent=1) + "\n").encode()
+    told = manifest_of(room, owned) | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
+    files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [root, manifest]

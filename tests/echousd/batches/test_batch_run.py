@@ -16,6 +16,7 @@ from echousd.batches.journal import read_journals, room_digest, shard_folder
 from echousd.batches.verify import finish, status, verify
 from echousd.graph import SceneGraph
 from echousd.room.lock import locked
+from echousd.store import Store
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
@@ -131,6 +132,35 @@ def test_a_damaged_room_is_made_again_and_set_aside(calm, tmp_path):
     assert len(list((out / ".batch" / "set_aside").iterdir())) == 1
 
 
+def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path):
+    source, folder, _ = calm
+    out = tmp_path / "run"
+    shutil.copytree(folder, out)
+    store = Store.open(out / "store")
+    manifest = json.loads((out / "rooms" / "0000" / "graphs_000000" / "graphs_000000.json").read_text())
+    place = store.folder(manifest["stored"]["assets/bed"])
+    file = place / "bed_geo.usdc"
+    file.chmod(0o644)
+    file.write_bytes(b"no crate")
+    told = [f"{wrong.room}: {wrong.problem}" for wrong in verify(out)]
+    assert "graphs_000000: 1 of its assets are missing in the store or changed" in told
+    batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
+    assert [wrong.problem[:7] for wrong in verify(out)] == ["failed:"]
+    assert digests(out) == digests(folder)
+    shutil.rmtree(place)
+    assert len(list(verify(out))) == 2
+
+
+def test_rooms_that_travel_alone_have_all_in_their_folders(calm, tmp_path):
+    source, folder, _ = calm
+    batch(source, tmp_path / "run", executor=Inline(), workers=1, self_contained=True, **QUICK)
+    assert not (tmp_path / "run" / "store").exists()
+    rooms = sorted((tmp_path / "run" / "rooms").glob("*/*"))
+    assert all((room / "assets").is_dir() for room in rooms)
+    assert [wrong.problem[:7] for wrong in verify(tmp_path / "run")] == ["failed:"]
+    assert not list((folder / "rooms").glob("*/*/assets"))
+
+
 def test_a_room_that_kills_every_worker_is_given_up(calm, tmp_path):
     source, _, _ = calm
     executor = Inline({"room graphs_000000": ["died"] * 9, "room graphs_000002": ["limit"]})
@@ -203,8 +233,9 @@ def test_generate_many_makes_the_same_rooms(calm, tmp_path):
     graphs = [SceneGraph.from_json(source.read_text().splitlines()[k]) for k in (0, 2)]
     rooms = list(generate_many(graphs, **QUICK))
     for room, name in zip(rooms, ("graphs_000000", "graphs_000002"), strict=True):
-        room.save(tmp_path / name, preview=False)
-        assert room_digest(tmp_path / name) == room_digest(folder / "rooms" / "0000" / name)
+        place = tmp_path / "rooms" / "0000" / name
+        room.save(place, preview=False, store=tmp_path / "store")
+        assert room_digest(place) == room_digest(folder / "rooms" / "0000" / name)
 
 
 def test_weights_are_known_by_their_bytes(tmp_path):

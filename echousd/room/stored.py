@@ -1,0 +1,87 @@
+"""A room's assets and images in a store: which folders they become, and what its layers call them then."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from pxr import Sdf, UsdUtils
+
+from echousd.store import Store
+
+SHARED = ("assets", "textures")  # folders of a room whose entries are put into a store
+
+
+@dataclass
+class Shelf:
+    """The store as one room sees it.
+
+    Arguments:
+        store: where its assets go. folder: of the room.
+        keys: `assets/bed` or `textures/wood.jpg` -> its key, of what was put.
+    """
+
+    store: Store
+    folder: Path
+    keys: dict[str, str] = field(default_factory=dict)
+    _paths: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def at(self) -> str:
+        """The store's path from the room's folder, with forward slashes; raises ValueError where there is none."""
+        try:
+            return Path(os.path.relpath(os.path.realpath(self.store.root), os.path.realpath(self.folder))).as_posix()
+        except ValueError:
+            raise ValueError(
+                f"{self.store.root}: on another drive than {self.folder}, allowed: a store on the same"
+            ) from None
+
+    def put(self, files: Mapping[str, bytes]) -> None:
+        """Put the assets and images among a room's files (relative path -> content) into the store."""
+        units: dict[str, dict[str, bytes]] = {}
+        for path, content in files.items():
+            unit = unit_of(path)
+            if unit:
+                units.setdefault(unit, {})[path] = content
+        for unit, inside in units.items():
+            names = {_name_in(unit, path): path for path in inside}
+            key = self.keys[unit] = self.store.put({name: inside[path] for name, path in names.items()})
+            for name, path in names.items():
+                self._paths[f"../{path}"] = f"../{self.at}/{key[:2]}/{key}/{name}"
+
+    def redirect(self, layer: Sdf.Layer) -> None:
+        """Have a layer in the room's `layers/` name the store's files in place of the room's."""
+        UsdUtils.ModifyAssetPaths(layer, lambda path: self._paths.get(path, path))
+
+    def holds(self, path: str) -> bool:
+        """Whether a file of the room (relative path) lies in the store."""
+        return unit_of(path) in self.keys
+
+
+def unit_of(path: str) -> str:
+    """`assets/bed` for what lies below it, an image's own path, "" for what stays with the room."""
+    parts = PurePosixPath(path).parts
+    return "/".join(parts[:2]) if len(parts) > 1 and parts[0] in SHARED else ""
+
+
+def shelf_of(manifest: Mapping[str, Any], folder: Path) -> Shelf | None:
+    """The shelf that a saved room uses; raises ValueError where its store is gone or is none."""
+    at = manifest.get("store")
+    if not at:
+        return None
+    if "\0" in at or "\\" in at or PurePosixPath(at).is_absolute() or PureWindowsPath(at).drive:
+        raise ValueError(f"{folder}: its manifest names the store {at!r:.80}, allowed: a relative path")
+    return Shelf(Store.open(os.path.realpath(folder / at)), folder, dict(manifest.get("stored") or {}))
+
+
+def asset_from(shelf: Shelf, asset: str) -> dict[str, bytes]:
+    """Files of a stored asset as they would lie in the room's folder; raises ValueError where they are damaged."""
+    unit = f"assets/{asset}"
+    return {f"{unit}/{name}": content for name, content in shelf.store.read(shelf.keys[unit]).items()}
+
+
+def _name_in(unit: str, path: str) -> str:
+    return PurePosixPath(path).name if path == unit else path.removeprefix(f"{unit}/")

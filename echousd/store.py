@@ -1,0 +1,237 @@
+"""A store of assets: every folder lies once, named by the hash of what it holds, and rooms refer to it (no pxr here).
+
+    STORE/echousd_store.json    the mark
+    STORE/3f/3fa9.../bed.usda   an asset's files, read-only: many rooms use them
+
+Whoever names a file in a store knows the hash of its content; that is why packing and check let a room reach in.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from echomodel.files import flush, write_json
+
+MARK = "echousd_store.json"
+VERSION = 1
+KEY = re.compile(r"[0-9a-f]{32}")
+NEW = ".new_"  # beginning of the name of a folder that is being written
+GRACE = 3600.0  # seconds for which a folder that nobody refers to stays: its room may be on its way
+NAMING = (".usda", ".json")  # texts of a room in which a key can be read as it is
+LAYERS = (".usd", ".usdc")
+
+
+@dataclass(frozen=True)
+class Store:
+    """A store on disk.
+
+    Arguments:
+        root: its folder.
+    """
+
+    root: Path
+
+    @classmethod
+    def create(cls, root: str | os.PathLike[str]) -> Store:
+        """The store in a folder, made if it is not there; raises ValueError for a folder that holds other things."""
+        root = Path(root)
+        if root.exists() and not root.is_dir():
+            raise ValueError(f"{root}: is a file, a store must be a folder")
+        if (root / MARK).is_file():
+            return cls.open(root)
+        others = sorted(path.name for path in root.iterdir()) if root.is_dir() else []
+        if others and any(not name.startswith(f".{MARK}") for name in others):  # another process begins it, too
+            if (root / MARK).is_file():
+                return cls.open(root)
+            raise ValueError(f"{root}: holds {', '.join(others[:3])} and no store; choose another folder")
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            write_json(root / MARK, {"echousd_store": VERSION})
+        except OSError as error:
+            raise ValueError(f"{root}: cannot be written ({error.strerror or error})") from None
+        return cls(root)
+
+    @classmethod
+    def open(cls, root: str | os.PathLike[str]) -> Store:
+        """The store in a folder; raises ValueError where there is none of this version."""
+        root = Path(root)
+        try:
+            mark = json.loads((root / MARK).read_bytes())
+        except OSError:
+            raise ValueError(f"{root}: no store of assets there (no {MARK})") from None
+        except ValueError:
+            mark = None
+        if not isinstance(mark, dict) or mark.get("echousd_store") != VERSION:
+            raise ValueError(f"{root / MARK}: not a store of this version ({VERSION})")
+        return cls(root)
+
+    def folder(self, key: str) -> Path:
+        """Where the files of a key lie."""
+        return self.root / key[:2] / key
+
+    def put(self, files: Mapping[str, bytes]) -> str:
+        """Have a folder with these files (relative path -> content) in the store; returns its key.
+
+        The folder appears whole. One that is there already is left alone, but for one whose files were cut short.
+
+        Raises ValueError for a path that leads out of the folder, or where nothing can be written.
+        """
+        key = key_of(files)
+        place = self.folder(key)
+        try:
+            if _whole(place, files):
+                os.utime(place)  # it is wanted again: `collect` waits
+            else:
+                self._write(place, files)
+        except OSError as error:
+            raise ValueError(f"{place}: cannot be written ({error.strerror or error})") from None
+        return key
+
+    def read(self, key: str) -> dict[str, bytes]:
+        """The files of a key; raises ValueError where they are missing or not what the key says."""
+        place = self.folder(key)
+        if not KEY.fullmatch(key) or not place.is_dir():
+            raise ValueError(f"{self.root}: {key!r:.40} is not in the store")
+        try:
+            files = {path.relative_to(place).as_posix(): path.read_bytes() for path in _files(place)}
+        except OSError as error:
+            raise ValueError(f"{place}: cannot be read ({error.strerror or error})") from None
+        if key_of(files) != key:
+            raise ValueError(f"{place}: changed since it was stored; make its room again")
+        return files
+
+    def keys(self) -> Iterator[str]:
+        """All keys, sorted."""
+        for shelf in sorted(self.root.iterdir()):
+            if shelf.is_dir() and len(shelf.name) == 2:
+                yield from sorted(path.name for path in shelf.iterdir() if KEY.fullmatch(path.name))
+
+    def wrong(self) -> Iterator[str]:
+        """Keys whose files are no longer what the key says."""
+        for key in self.keys():
+            try:
+                self.read(key)
+            except ValueError:
+                yield key
+
+    def remove(self, key: str) -> None:
+        """Take a folder away."""
+        place = self.folder(key)
+        aside = self._aside(key)
+        place.replace(aside)  # gone at once, whatever happens then
+        _delete(aside)
+
+    def collect(self, users: Iterable[Path], *, grace: float = GRACE, dry: bool = False) -> list[str]:
+        """Remove what no file of a room below `users` names, and return the keys.
+
+        Arguments:
+            users: folders with rooms; every layer and manifest below them is asked.
+            grace: seconds since it was last put for which a folder stays in any case.
+            dry: remove nothing.
+        """
+        used, now = keys_named(users), time.time()
+        gone = [key for key in self.keys() if key not in used and now - self.folder(key).stat().st_mtime >= grace]
+        for key in () if dry else gone:
+            self.remove(key)
+        for left in () if dry else self.root.glob(f"{NEW}*"):  # of a run that was killed
+            if now - left.stat().st_mtime >= grace:
+                _delete(left)
+        return gone
+
+    def _write(self, place: Path, files: Mapping[str, bytes]) -> None:
+        beside = self._aside(place.name)
+        try:
+            for name, content in files.items():
+                path = beside / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+                flush(path)
+                path.chmod(0o444)  # an edit of one would change many rooms
+            place.parent.mkdir(exist_ok=True)
+            if place.is_dir() and not _whole(place, files):
+                place.replace(self._aside(f"damaged_{place.name}"))
+            beside.rename(place)
+            flush(place.parent)
+        except OSError:
+            if not _whole(place, files):  # else another process was faster
+                raise
+        finally:
+            if beside.is_dir():
+                _delete(beside)
+
+    def _aside(self, word: str) -> Path:
+        return self.root / f"{NEW}{word}_{os.getpid()}_{time.monotonic_ns()}"
+
+
+def key_of(files: Mapping[str, bytes]) -> str:
+    """Hash of some files, their relative paths and their bytes; raises ValueError for a path that leads elsewhere."""
+    total = hashlib.blake2b(digest_size=16)
+    for name, content in sorted(files.items()):
+        path = PurePosixPath(name)
+        if path.is_absolute() or ".." in path.parts or path.as_posix() != name or "\\" in name or ":" in name:
+            raise ValueError(f"store: a file is called {name!r:.200}, allowed: a relative path with forward slashes")
+        total.update(f"{name}\0{hashlib.blake2b(content, digest_size=16).hexdigest()}\n".encode())
+    return total.hexdigest()
+
+
+def store_of(path: Path) -> Store | None:
+    """The store that a file lies in under a key, its links followed; None for any other file."""
+    for place in path.resolve().parents:
+        if KEY.fullmatch(place.name) and place.parent.name == place.name[:2]:
+            root = place.parent.parent
+            return Store(root) if (root / MARK).is_file() else None
+    return None
+
+
+def keys_named(folders: Iterable[Path]) -> set[str]:
+    """All words in the layers and manifests below some folders that may be keys."""
+    found: set[str] = set()
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in NAMING and path.is_file():
+                found.update(word.decode() for word in re.findall(rb"(?<![0-9a-f])[0-9a-f]{32}", path.read_bytes()))
+            elif path.suffix in LAYERS and path.is_file() and store_of(path) is None:
+                found.update(word for name in _named_by(path) for word in KEY.findall(name))
+    return found
+
+
+def _named_by(layer: Path) -> list[str]:
+    from pxr import Tf, UsdUtils
+
+    try:
+        return [name for names in UsdUtils.ExtractExternalReferences(str(layer)) for name in names]
+    except Tf.ErrorException:  # no layer that could refer to anything
+        return []
+
+
+def _whole(place: Path, files: Mapping[str, bytes]) -> bool:
+    """Whether a folder holds files of these names and lengths; what they hold is for `wrong` to say."""
+    if not place.is_dir():
+        return False
+    return {p.relative_to(place).as_posix(): p.lstat().st_size for p in _files(place)} == {
+        name: len(content) for name, content in files.items()
+    }
+
+
+def _files(place: Path) -> list[Path]:
+    """All files of a folder; raises ValueError for a link, which never belongs there."""
+    found = [path for path in place.rglob("*") if path.is_symlink() or not path.is_dir()]
+    for path in found:
+        if path.is_symlink() or not path.is_file():
+            raise ValueError(f"{path}: a link or no plain file, allowed in a store: plain files")
+    return found
+
+
+def _delete(place: Path) -> None:
+    for path in place.rglob("*"):
+        if not path.is_dir() and not path.is_symlink():
+            path.chmod(0o644)  # Windows deletes nothing that is read-only
+    shutil.rmtree(place, ignore_errors=True)
