@@ -138,8 +138,8 @@ def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path):
     shutil.copytree(folder, out)
     store = Store.open(out / "store")
     manifest = json.loads((out / "rooms" / "0000" / "graphs_000000" / "graphs_000000.json").read_text())
-    place = store.folder(manifest["stored"]["assets/bed"])
-    file = place / "bed_geo.usdc"
+    place = store.folder(manifest["stored"]["assets/double_bed"])
+    file = place / "double_bed_geo.usdc"
     file.chmod(0o644)
     file.write_bytes(b"no crate")
     told = [f"{wrong.room}: {wrong.problem}" for wrong in verify(out)]
