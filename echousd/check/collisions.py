@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import axes, pair_indices, separation
 from echousd.stage.contents import RoomObject
 
@@ -31,10 +30,7 @@ class Collision:
 
 
 def find_collisions(objects: Sequence[RoomObject]) -> tuple[Collision, ...]:
-    """All pairs that collide and do not belong together, deepest first.
-
-    A pair that belongs together (`repair.belonging`) is excepted as long as its boxes overlap no further than allowed.
-    """
+    """All pairs whose meshes reach into each other, deepest first; boxes may: a chair stands under its table."""
     if len(objects) < 2:
         return ()
     size = np.array([thing.size for thing in objects])
@@ -42,10 +38,9 @@ def find_collisions(objects: Sequence[RoomObject]) -> tuple[Collision, ...]:
     yaw = np.array([thing.yaw for thing in objects])
     pairs = pair_indices(len(objects))
     depth = -separation(size, position, yaw, pairs)
-    allowed = allowed_overlap([thing.node.category for thing in objects], size, pairs)
     found = []
-    for (i, j), overlap, free in zip(pairs.tolist(), depth, allowed, strict=True):
-        if overlap > TOUCH + free:
+    for (i, j), overlap in zip(pairs.tolist(), depth, strict=True):
+        if overlap > TOUCH:
             deep = mesh_depth(objects[i], objects[j]) if len(objects[i].faces) and len(objects[j].faces) else overlap
             if deep > DEEP:
                 found.append(Collision(objects[i].node.name, objects[j].node.name, float(deep)))

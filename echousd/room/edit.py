@@ -15,6 +15,7 @@ from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan_of
+from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
@@ -70,6 +71,7 @@ def edit(
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
     layouts: list[Boxes] = []
+    pins: list[SceneGraph] = []
     notes: tuple[str, ...] = ()
     if fresh or moving:
         with timer.stage("load"):
@@ -84,6 +86,7 @@ def edit(
         pinned = _pinned(graph, saved.graph, before, fresh, moving)
         if layouts:  # one furniture in all layouts
             pinned = with_sizes(pinned, layouts[0])
+        pins.append(pinned)
         if model_used is None:
             layouts.append(_boxes_of(pinned))
             continue
@@ -103,15 +106,20 @@ def edit(
         assets |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     assets = _own_names({name: assets[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
+    geometry = {name: geometry[name] for name in graph.names}
+    floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
+    if repair:
+        with timer.stage("repair"):
+            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=manifest.get("walls", False))
     room = Room(
         name=manifest["name"],
         graph=graph,
         boxes=layouts[0],
-        geometry={name: geometry[name] for name in graph.names},
+        geometry=geometry,
         assets=assets,
-        floor=room_floor(graph, layouts),
+        floor=floor,
         layouts=tuple(layouts),
-        outcomes=tuple(layout_outcome(graph, found) for found in layouts),
+        outcomes=outcomes,
         notes=notes,
         provenance=_provenance(manifest, model_used),
         options=RoomOptions(

@@ -12,6 +12,7 @@ from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
+from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
 from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
@@ -143,18 +144,24 @@ def generate(
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     graph = with_placed_openings(graph, plan, seed)
     made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
+    geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
+    options, floor = options or RoomOptions(), room_floor(graph, layouts)
+    outcomes = tuple(layout_outcome(graph, found) for found in layouts)
+    if repair:
+        with timer.stage("repair"):
+            layouts, outcomes = cleared_layouts([graph] * samples, layouts, geometry, floor, walls=options.walls)
     made_room = Room(
         name=graph.room.type,
         graph=graph,
-        boxes=boxes,
-        geometry={name: made.geometry[owner] for name, owner in made.owners.items()},
+        boxes=layouts[0],
+        geometry=geometry,
         assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}),
-        floor=room_floor(graph, layouts),
+        floor=floor,
         layouts=tuple(layouts),
-        outcomes=tuple(layout_outcome(graph, found) for found in layouts),
+        outcomes=outcomes,
         notes=(*crowded, *homeless, *notes),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
-        options=options or RoomOptions(),
+        options=options,
         timings=timer.seconds,
     )
     warn_of_faults(made_room)

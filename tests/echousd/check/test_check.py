@@ -186,12 +186,13 @@ def test_what_fits_between_the_legs_does_not_collide() -> None:
     assert hit.to_json() == {"objects": ["desk", "box"], "depth": round(hit.depth, 4)}
 
 
-def test_pairs_that_belong_together_may_overlap_as_far_as_allowed() -> None:
-    top = thing("table", "dining_table", box(1.6, 0.75, 0.9), (0, 0, 0))
-    chair = box(0.5, 0.9, 0.5)
-    assert not find_collisions([top, thing("chair", "dining_chair", chair, (0, 0, 0.45))])
-    assert find_collisions([top, thing("chair", "dining_chair", chair, (0, 0, 0.1))])
-    assert find_collisions([top, thing("plant", "plant", chair, (0, 0, 0.45))])
+def test_a_chair_stands_under_a_table_and_not_in_it() -> None:
+    top, low = thing("table", "dining_table", table(1.6, 0.75, 0.9), (0, 0, 0)), box(0.5, 0.6, 0.5)
+    assert not find_collisions([top, thing("chair", "dining_chair", low, (0, 0, 0.45))])
+    assert find_collisions([top, thing("chair", "dining_chair", low, (0.6, 0, 0.3))])  # in a leg
+    high = box(0.5, 0.9, 0.5)
+    (hit,) = find_collisions([top, thing("chair", "dining_chair", high, (0, 0, 0.6))])  # its back in the top
+    assert {hit.first, hit.second} == {"table", "chair"}
 
 
 def test_depth_of_two_boxes() -> None:

@@ -36,7 +36,7 @@ def together():
 
 
 def test_a_collision_that_is_left_is_warned_of_and_in_the_manifest(tmp_path):
-    with pytest.warns(RoomWarning, match="bed and wardrobe collide by 1.00 m"):
+    with pytest.warns(RoomWarning, match="bed and wardrobe collide by 1.10 m"):
         room = echousd.generate(together(), model=StandIn(), shapes="boxes")
     assert any("bed and wardrobe collide" in fault for fault in room.faults)
     root = room.save(tmp_path / "room", preview=False)
@@ -57,7 +57,7 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
     together().to_stage(tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--shapes", "boxes")
     assert done.code == 1
-    assert "collide  bed and wardrobe by 1.00 m" in done.out
+    assert "collide  bed and wardrobe by 1.10 m" in done.out
     assert "warning" not in done.err
     assert (tmp_path / "room" / "room.usda").is_file()
     done = echousd_command("edit", tmp_path / "room" / "room.usda", "--remove", "lamp")

@@ -1,0 +1,133 @@
+"""Pieces are moved apart until no solid of one reaches into a solid of another: chairs out of their tables first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from echomodel.boxes import Boxes
+from echousd.graph import SceneGraph
+from echousd.repair.living import living_faults
+from echousd.room.clearing.scene import REACH, Scene, scene_of
+from echousd.room.geometry import Geometry
+from echousd.room.reproducible import rounded_boxes
+from echousd.room.room import Collision, LayoutOutcome
+from echousd.room.verdicts import relation_verdicts
+
+DEEP = 0.001  # metres that solids may reach into one another
+GAP = 0.001  # metres left between what was moved apart
+ROUNDS = 4  # moves a piece
+DIRECTIONS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Cleared:
+    """What became of a layout.
+
+    Arguments:
+        boxes: N boxes, those that were moved in other places.
+        collisions: what still reaches into one another, deepest first.
+        moved: name -> metres, of what was moved.
+    """
+
+    boxes: Boxes
+    collisions: tuple[Collision, ...]
+    moved: Mapping[str, float]
+
+
+def cleared_layouts(
+    graphs: Sequence[SceneGraph],
+    layouts: Sequence[Boxes],
+    geometry: Mapping[str, Geometry],
+    floor: np.ndarray,
+    *,
+    walls: bool,
+) -> tuple[list[Boxes], tuple[LayoutOutcome, ...]]:
+    """Every layout `cleared`, and what became of it; one graph a layout, which says what must stay."""
+    found = [cleared(graph, boxes, geometry, floor, walls=walls) for graph, boxes in zip(graphs, layouts, strict=True)]
+    outcomes = [
+        LayoutOutcome(relation_verdicts(graph, each.boxes), each.collisions)
+        for graph, each in zip(graphs, found, strict=True)
+    ]
+    return [each.boxes for each in found], tuple(outcomes)
+
+
+def cleared(
+    graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
+) -> Cleared:
+    """Move what is free as little as possible until nothing starts inside anything else.
+
+    Relations are kept before distances, living rules after them; what is locked or has a position stays.
+
+    Arguments:
+        graph: N objects. boxes: N boxes in its order. geometry: name -> solids of each, in its own frame.
+        floor: (k, 2) float, corners of the floor, metres.
+        walls: whether there are any; their sills and casings reach into the room.
+    """
+    scene = scene_of(graph, boxes, geometry, floor, walls=walls)
+    moves = np.zeros((len(graph.nodes), 2))
+    stuck: set[tuple[int, int]] = set()
+    for _ in range(ROUNDS * max(len(graph.nodes), 1)):
+        hits = [(pair, deep) for pair, deep in scene.overlaps(moves, DEEP) if pair not in stuck]
+        if not hits:
+            break
+        pair = hits[0][0]
+        found = _moved_apart(scene, graph, boxes, floor, moves, pair)
+        if found is None:
+            stuck.add(pair)
+        else:
+            moves = found
+    names = graph.names
+    left = tuple(
+        Collision(names[i], names[k], deep) for (i, k), deep in scene.overlaps(moves, DEEP) if k < len(names)
+    )  # fmt: skip
+    far = np.linalg.norm(moves, axis=1)
+    if not far.any():
+        return Cleared(boxes, left, {})
+    return Cleared(
+        rounded_boxes(graph, _at(boxes, moves)), left, {names[i]: float(far[i]) for i in np.flatnonzero(far)}
+    )
+
+
+def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:
+    position = boxes.position.clone()
+    position[:, [0, 2]] += position.new_tensor(moves)
+    return Boxes(boxes.size, position, boxes.yaw)
+
+
+def _moved_apart(
+    scene: Scene, graph: SceneGraph, boxes: Boxes, floor: np.ndarray, moves: np.ndarray, pair: tuple[int, int]
+) -> np.ndarray | None:
+    """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere."""
+    best: tuple[float, ...] | None = None
+    found = None
+    for mover in pair:
+        if mover >= len(graph.nodes) or scene.fixed[mover]:
+            continue
+        group = scene.carried(mover)
+        space = scene.space(group, moves, GAP)
+        for way in _ways(space, scene.heading[mover]):
+            trial = moves.copy()
+            trial[group] += way
+            tried = _at(boxes, trial)
+            broken = sum(verdict.state == "broken" for verdict in relation_verdicts(graph, tried))
+            score = (broken, len(living_faults(graph, tried, floor)), scene.price(mover, way))
+            if best is None or score < best:
+                best, found = score, trial
+    return found
+
+
+def _ways(space: shapely.geometry.base.BaseGeometry, heading: float) -> list[np.ndarray]:
+    """Moves into a space: the nearest, and the nearest straight to each side of a heading."""
+    if space.is_empty:
+        return []
+    start = shapely.Point(0.0, 0.0)
+    ends = [shapely.get_coordinates(shapely.shortest_line(start, space))[1]]
+    for angle in heading + np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS:
+        ray = shapely.LineString([(0.0, 0.0), (REACH * np.sin(angle), REACH * np.cos(angle))]).intersection(space)
+        if not ray.is_empty:
+            ends.append(shapely.get_coordinates(shapely.shortest_line(start, ray))[1])
+    return ends
