@@ -6,6 +6,7 @@ import gc
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,6 +26,7 @@ TITLES = {
     "repair": "Repairing the layout",
     "shapes": "Shaping the furniture",
     "meshes": "Cleaning the meshes",
+    "settle": "Simulating the room",
     "write": "Writing the layers",
     "preview": "Drawing the preview",
 }
@@ -74,6 +76,9 @@ def generate(
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
     ] = True,
+    settle: Annotated[
+        bool, typer.Option("--settle", help="Simulate the room and put everything where it rests (extra: sim).")
+    ] = False,
     flat: Annotated[bool, typer.Option("--flat", help="Write one file instead of a folder of layers.")] = False,
     crate: Annotated[
         str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
@@ -99,6 +104,10 @@ def generate(
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")
     set_crate_version(crate)
+    if settle:
+        from echousd.settle import require_engine, settled
+
+        require_engine()
     house = () if room or flat else rooms_of(graph)
     with ExitStack() as held:
         if not house:
@@ -114,6 +123,7 @@ def generate(
             gc.enable()
         options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
         spent = {"imports": time.perf_counter() - started}
+        restless: list[str] = []
 
         def one(path: str | None, folder: Path) -> tuple[Room, Path, Path | None]:
             made = make(
@@ -121,6 +131,12 @@ def generate(
                 samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
                 options=options, fit=fit, progress=listen,
             )  # fmt: skip
+            if settle:
+                with took(spent, "settle", listen):
+                    found = settled(made)
+                moved = tuple(f"{name} stands where it comes to rest" for name in found.moved)
+                made = replace(found.room, notes=(*made.notes, *moved, *found.restless))
+                restless.extend(found.restless)
             with took(spent, "write", listen):
                 if flat:
                     root = save_flat(made, folder, force=force)
@@ -143,7 +159,7 @@ def generate(
             typer.echo(f"{stage:>10} {seconds:7.2f} s")
     for each in made:
         report(*each)
-    end(made)
+    end(made, restless)
 
 
 Made = tuple["Room", Path, Path | None]
@@ -185,9 +201,9 @@ def took(spent: dict[str, float], stage: str, listen: StageListener) -> Iterator
     spent[stage] = spent.get(stage, 0.0) + time.perf_counter() - started
 
 
-def end(made: Sequence[Made]) -> None:
-    """Exit code 1 if a room has faults."""
-    if any(room.faults for room, *_ in made):
+def end(made: Sequence[Made], restless: Sequence[str] = ()) -> None:
+    """Exit code 1 if a room has faults, or pieces that do not rest."""
+    if restless or any(room.faults for room, *_ in made):
         raise typer.Exit(1)
 
 

@@ -21,11 +21,15 @@ def approximation(category: str) -> str:
 def collider(mesh: trimesh.Trimesh, category: str) -> Collider:
     """A light mesh for collisions: a hull where the approximation is one, else the shape with few faces."""
     kind = approximation(category)
-    light = _reduced(mesh.convex_hull, HULL_FACES) if kind == "convexHull" else _reduced(mesh, FACES)
-    light = flush(light, mesh.bounds)
     if kind == "convexHull":
-        light = trimesh.convex.convex_hull(np.concatenate([light.vertices, soles(mesh)]))
-    return Collider("collider", light, kind)
+        return standing_hull(mesh)
+    return Collider("collider", flush(_reduced(mesh, FACES), mesh.bounds), kind)
+
+
+def standing_hull(mesh: trimesh.Trimesh, name: str = "collider") -> Collider:
+    """One hull of a mesh (metres) that stands on a plane, however its base is rounded."""
+    light = flush(_reduced(mesh.convex_hull, HULL_FACES), mesh.bounds)
+    return Collider(name, trimesh.convex.convex_hull(np.concatenate([light.vertices, soles(mesh)])), "convexHull")
 
 
 def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:

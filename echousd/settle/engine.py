@@ -31,12 +31,18 @@ class Course:
     overlaps: tuple[tuple[str, str, float], ...]
 
 
-def simulate(world: World, seconds: float) -> Course:
-    """Let a world fall for some seconds; raises SettleUnavailable without the extra `sim`."""
+def require_engine() -> Any:
+    """The module of MuJoCo; raises SettleUnavailable without the extra `sim`."""
     try:
         import mujoco
     except ImportError:
         raise SettleUnavailable("MuJoCo is not installed; pip install 'echousd[sim]'") from None
+    return mujoco
+
+
+def simulate(world: World, seconds: float) -> Course:
+    """Let a world fall for some seconds; raises SettleUnavailable without the extra `sim`."""
+    mujoco = require_engine()
     spec = mujoco.MjSpec()
     spec.option.timestep = STEP
     spec.option.gravity = world.gravity

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
 from echomodel.data.dressing import KINDS
 from echomodel.data.dressing import thing as solids_of
+from echousd.room.colliders import standing_hull
 from echousd.room.dressing import floors, tabletops, upholstery, walls
 from echousd.room.dressing.setting import Setting, Thing, standing
-from echousd.room.geometry import Collider, Geometry, Origin
+from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import mass_of, part_of, within_budget
 from echousd.room.room import RoomData
 from echousd.room.styles import free_name
@@ -100,11 +100,9 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
 
 
 def geometry_of(found: Thing) -> Geometry:
-    """The geometry of a thing, with one hull to bump into."""
+    """The geometry of a thing, with one hull to bump into that stands."""
     kind = KINDS[found.kind]
     solids = solids_of(found.kind, found.size, np.random.default_rng(found.variant))
     pieces = within_budget(solids, found.size, kind.faces)
     part = part_of("mesh", pieces)
-    hull = trimesh.convex.convex_hull(part.mesh.vertices)
-    collider = Collider("collider", trimesh.Trimesh(hull.vertices, hull.faces, process=False), "convexHull")
-    return Geometry((part,), (collider,), ORIGIN, mass_of(pieces))
+    return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, mass_of(pieces))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 
 from echomodel.data.dressing import usual_size
+from echousd.room.clearing.nofit import forbidden_moves
 from echousd.room.dressing.setting import Setting, Standing, Thing
 
-SINK = 0.015  # metres that a cushion sinks into a seat
+ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
+PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 
 
@@ -28,11 +31,32 @@ def cushions(setting: Setting) -> None:
             spot = seat.resting(end, size)
             if spot is None:
                 continue
-            place = host.to_room(spot[None])[0]
-            yaw = host.yaw - 0.12 * end * float(rng.uniform(0.3, 1.6))
+            turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
+            spot = _clear_of(host, spot, turn, size)
+            if spot is None:
+                continue
+            place, yaw = host.to_room(spot[None])[0], host.yaw + turn
             thing = Thing("cushion", size, place, yaw, host.name, variant)
             if setting.clear(thing, host=host.name, margin=0.0, floor=False):
                 setting.placed.append(thing)
+
+
+def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
+    """The spot (3,) or one near it where a turned cushion reaches into no solid of its seat; None = nowhere."""
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], 1)
+    ring = np.sign(ring) * np.abs(ring) ** (2 / PILLOW) / 2
+    pillow = np.concatenate([
+        np.stack([ring[:, 0] * size[0], np.full(24, y), ring[:, 1] * size[2]], 1) for y in (0.0, size[1])
+    ])  # fmt: skip
+    cos, sin = np.cos(turn), np.sin(turn)
+    stood = pillow @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]) + spot
+    taken = forbidden_moves([stood], [collider.mesh.vertices for collider in host.geometry.colliders], ASIDE)
+    free = shapely.Point(0, 0).buffer(ASIDE).difference(taken)
+    if free.is_empty:
+        return None
+    way = shapely.get_coordinates(shapely.shortest_line(shapely.Point(0, 0), free))[1]
+    return spot + np.array([way[0], 0.0, way[1]])
 
 
 class _Seat:
@@ -76,7 +100,7 @@ class _Seat:
         cost = fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)
         i, k = fits[int(np.argmin(cost))]
         under = self.height[i : i + wide, k : k + deep]
-        return np.array([self.x[i] + (wide - 1) * STEP / 2, float(np.median(under)) - SINK,
+        return np.array([self.x[i] + (wide - 1) * STEP / 2, float(np.median(under)),
                          self.z[k] + (deep - 1) * STEP / 2])  # fmt: skip
 
 

@@ -234,12 +234,11 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts += case((x0, foot, -d * 0.46), (x1, y1, d * 0.46))
             rows = choices.whole("rows", 2, 4)
             parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
-            if foot > 0.05:
-                parts += [
-                    box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
-                    for x in (x0 + 0.04, x1 - 0.04)
-                    for z in (-d * 0.42, d * 0.42)
-                ]
+            parts += [
+                box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
+                for x in (x0 + 0.04, x1 - 0.04)
+                for z in (-d * 0.42, d * 0.42)
+            ]
         if kind == "left":
             x = -sides[0] * w * 0.47
             parts += [box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025)) for s in (-1, 1)]

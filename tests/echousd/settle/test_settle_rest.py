@@ -1,0 +1,92 @@
+"""Rooms are written as they come to rest, and what does not is named."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echousd.room import RoomOptions
+from echousd.settle import settled
+
+pytestmark = pytest.mark.skipif("not __import__('importlib.util').util.find_spec('mujoco')", reason="extra sim")
+
+
+def lifted(up_axis="Y", **by):
+    room = echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(up_axis=up_axis)
+    )
+    position = room.boxes.position.clone()
+    for name, way in by.items():
+        position[room.names.index(name)] += position.new_tensor(way)
+    boxes = Boxes(room.boxes.size, position, room.boxes.yaw)
+    return replace(room, boxes=boxes, layouts=(boxes,))
+
+
+@pytest.mark.parametrize("up_axis", ["Y", "Z"])
+def test_what_stands_too_high_is_put_where_it_rests(up_axis):
+    room = lifted(up_axis, wardrobe=(0, 0.02, 0))
+    found = settled(room)
+    assert found.moved == ("wardrobe",)
+    assert found.restless == ()
+    row = room.names.index("wardrobe")
+    assert found.room.boxes.position[row, 1] == pytest.approx(0.0, abs=1e-3)
+    np.testing.assert_allclose(
+        found.room.boxes.position[row],
+        room.boxes.position[row] - room.boxes.position.new_tensor([0, 0.02, 0]),
+        atol=3e-3,
+    )
+    np.testing.assert_allclose(found.room.boxes.yaw, room.boxes.yaw, atol=0.02)
+    others = [i for i in range(len(room.names)) if i != row]
+    assert found.room.boxes.position[others].tolist() == room.boxes.position[others].tolist()
+    assert len(found.room.outcomes) == len(found.room.layouts) == 1
+
+
+def test_a_room_that_rests_is_the_same_room():
+    room = lifted()
+    assert settled(room).room is room
+
+
+def test_what_is_locked_stays_and_is_named():
+    room = lifted(wardrobe=(0, 0.02, 0))
+    nodes = tuple(node.replaced(locked=node.name == "wardrobe") for node in room.graph.nodes)
+    found = settled(replace(room, graph=room.graph.replaced(nodes=nodes)))
+    assert found.moved == ()
+    (told,) = found.restless
+    assert told.startswith("wardrobe does not rest: it ")
+
+
+def test_the_command_writes_poses_at_rest_and_names_what_falls(tmp_path, echousd_command, monkeypatch):
+    from echomodel.echo import EchoModel
+
+    class High(StandIn):
+        def sample_layout(self, graph, **more):
+            found = super().sample_layout(graph, **more)
+            found.position[0, 1] += 0.02
+            return found
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: High()))
+    small_graph().to_stage(tmp_path / "graph.usda")
+    name = small_graph().names[0]
+    options = ("--shapes", "boxes", "--no-repair", "--no-walls", "--dress", "none", "--settle")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *options)
+    assert f"note     {name} stands where it comes to rest" in done.out
+    manifest = json.loads((tmp_path / "room" / "room.json").read_text())
+    assert f"{name} stands where it comes to rest" in json.dumps(manifest)
+    assert (
+        echousd_command("check", tmp_path / "room" / "room.usda", "--settle", "--json").out.count('"restless": []') == 1
+    )
+
+
+def test_the_command_needs_the_extra_before_it_works(tmp_path, echousd_command, monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    small_graph().to_stage(tmp_path / "graph.usda")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--settle")
+    assert done.code == 2
+    assert "MuJoCo is not installed; pip install 'echousd[sim]'" in done.err
+    assert not (tmp_path / "room").exists()
