@@ -9,6 +9,7 @@ import trimesh
 
 from echomodel.data.furniture.assembly import Piece, pieces_of
 from echomodel.data.furniture.solids import FINEST, Solid
+from echousd.room.ballast import ballasted
 from echousd.room.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
@@ -58,8 +59,9 @@ def assembled(
     fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
     names = {part.body: part.name for part in parts}
     coarse = [part_of(names[body], members, body) for body, members in _bodies(low, fixed).items()] if fewer else []
+    whole = ballasted(mass_of(plain), [piece.vertices for piece in plain])
     return Geometry(
-        tuple(parts), tuple(colliders), origin, mass=mass_of(plain), joints=tuple(joints.values()),
+        tuple(parts), tuple(colliders), origin, mass=whole, joints=tuple(joints.values()),
         masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
     )  # fmt: skip
 

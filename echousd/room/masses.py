@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import shapely
 import trimesh
 from pxr import Gf, Usd, UsdPhysics
-from shapely.affinity import scale
 
-from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
+from echousd.room.ballast import LEAST_INERTIA, ballasted
 from echousd.room.geometry import Collider, Geometry, Mass
-
-LEAST_INERTIA = 1e-5  # kg m²: engines take no smaller moments well
-SOLE = 0.005  # metres: what is as near to the floor carries the piece
-STEADY = 0.75  # share of its base, drawn together about its middle, that the centre of mass of a standing piece is in
 
 
 def mass_of(geometry: Geometry, category: str) -> Mass:
@@ -25,45 +19,16 @@ def mass_of(geometry: Geometry, category: str) -> Mass:
     Arguments:
         geometry: of the piece. category: its word, which has a density of the piece's whole box.
 
-    An estimate takes the matter to fill the convex hulls of the colliders evenly; it weighs 0.2 kg at least. What would
-    topple has ballast in its base, as lamps with long arms do.
+    An estimate takes the matter to fill the convex hulls of the colliders evenly; it weighs 0.2 kg at least.
     """
-    mass = _estimated(geometry, category) if geometry.mass is None else geometry.mass
-    stands = category not in SMALL and vocabulary().category(category).support in ("floor", "table")
-    return ballasted(mass, geometry.colliders) if stands else mass
-
-
-def ballasted(mass: Mass, colliders: Iterable[Collider]) -> Mass:
-    """The mass with weight added in the middle of the base until the centre is well above it; itself where it is."""
-    points = np.concatenate([collider.mesh.vertices for collider in colliders])
-    plan = shapely.convex_hull(shapely.multipoints(points[points[:, 1] < points[:, 1].min() + SOLE][:, [0, 2]]))
-    if plan.area <= 0:
-        return mass
-    middle = shapely.get_coordinates(plan.centroid)[0]
-    centre = np.asarray(mass.centre, float)
-    out = shapely.LineString([middle, centre[[0, 2]]])
-    inside = out.intersection(scale(plan, STEADY, STEADY, origin=tuple(middle)))
-    if inside.length >= out.length * (1 - 1e-6):
-        return mass
-    added = mass.mass * (out.length / inside.length - 1)
-    sole = np.array([middle[0], points[:, 1].min(), middle[1]])
-    whole = mass.mass + added
-    moved = (mass.mass * centre + added * sole) / whole
-    turn = np.asarray(mass.axes, float)
-    tensor = turn @ np.diag(mass.inertia) @ turn.T
-    for kilograms, at in ((mass.mass, centre), (added, sole)):
-        away = at - moved
-        tensor += kilograms * (away @ away * np.eye(3) - np.outer(away, away))
-    moments, axes = np.linalg.eigh(tensor)
-    return Mass(whole, moved, np.maximum(moments, LEAST_INERTIA), axes)
-
-
-def _estimated(geometry: Geometry, category: str) -> Mass:
+    if geometry.mass is not None:
+        return geometry.mass
     size = np.ptp(geometry.mesh.bounds, axis=0)
     kilograms = round(max(0.2, float(np.prod(size)) * vocabulary().category(category).density), 2)
     middle, tensor = _spread(geometry.colliders)
     moments, axes = np.linalg.eigh(kilograms * tensor)
-    return Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes)
+    mass = Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes)
+    return ballasted(mass, [collider.mesh.vertices for collider in geometry.colliders])
 
 
 def _spread(colliders: Iterable[Collider]) -> tuple[np.ndarray, np.ndarray]:

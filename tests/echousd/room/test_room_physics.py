@@ -6,6 +6,7 @@ import trimesh
 from pxr import Usd, UsdGeom
 
 from echomodel.vocabulary import vocabulary
+from echousd.room.ballast import ballasted
 from echousd.room.colliders import collider
 from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.room.masses import mass_of, read_mass
@@ -60,3 +61,22 @@ def test_colliders_stand_on_planes_that_end_where_the_mesh_does(category):
     np.testing.assert_allclose(light.bounds, mesh.bounds, atol=1e-6)
     for height in light.bounds[:, 1]:
         assert (np.abs(light.vertices[:, 1] - height) < 1e-9).sum() >= 3
+
+
+def test_what_would_topple_has_ballast_in_its_base():
+    foot, arm = trimesh.creation.box((0.3, 0.02, 0.3)), trimesh.creation.box((1.0, 0.02, 0.02))
+    foot.apply_translation((0, 0.01, 0))
+    arm.apply_translation((0.5, 1.8, 0))
+    solids = [foot.vertices, arm.vertices]
+    light = Mass(4.0, np.array([0.4, 1.2, 0.0]), np.array([0.1, 0.2, 0.3]), np.eye(3))
+    found = ballasted(light, solids)
+    assert found.centre[0] == pytest.approx(0.75 * 0.15)
+    assert found.mass * found.centre[0] == pytest.approx(4.0 * 0.4)  # what is added stands in the middle
+    added = found.mass - 4.0
+    level = np.diag([0.1, 0.2, 0.3]) + 4.0 * added / found.mass * sum(
+        float(r @ r) * np.eye(3) - np.outer(r, r) for r in [np.array([0.4, 1.2, 0.0])]
+    )
+    np.testing.assert_allclose(tensor(found), level, atol=1e-9)
+    assert ballasted(found, solids) is found
+    steady = Mass(4.0, np.array([0.05, 0.3, 0.0]), light.inertia, light.axes)
+    assert ballasted(steady, solids) is steady
