@@ -105,11 +105,13 @@ def _change(
     wait: bool,
 ) -> None:
     """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen."""
-    from echousd.cli.generate import check_output, end, progress_bar, report, telling_faults, writing
+    from echousd.cli.generate import progress_bar, report, telling_faults
     from echousd.room.edit import edit as change
     from echousd.room.edit import touched
+    from echousd.room.output import check_output, writing
+    from echousd.room.progress import StageTimer
     from echousd.room.reading import read_room
-    from echousd.room.save import save_layers, write_preview, write_sheet
+    from echousd.room.written import write_room
 
     check_output(folder, flat=False, force=force)
     with writing(folder, flat=False, force=force, wait=wait):
@@ -125,12 +127,7 @@ def _change(
             return
         with telling_faults(), progress_bar() as listen:
             made = change(root, graph, progress=listen, **options)
-            listen("write", 0, 1)
-            written = save_layers(made, folder, force=force)
-            listen("write", 1, 1)
-            preview = write_preview(written)
-            preview = write_sheet(written) or preview
+            written = write_room(made, folder, StageTimer(listen), force=force)
     for step in steps:
         say(step)
-    report(made, written, preview)
-    end([(made, written, preview)])
+    report([written])

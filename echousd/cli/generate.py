@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +16,8 @@ from echousd.cli.output import say
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
-    from echousd.room import Room
     from echousd.room.house import Place
+    from echousd.room.written import Written
 
 TITLES = {
     "read": "Reading the graph",
@@ -97,6 +97,7 @@ def generate(
     A stage of several rooms becomes a folder for each and a root layer that composes them.
     """
     from echousd.room.manifest import check_seed
+    from echousd.room.output import check_output, set_crate_version, writing
 
     started = time.perf_counter()
     check_seed(seed)
@@ -117,125 +118,53 @@ def generate(
         gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
         try:
             from echousd.room.pipeline import generate as make
+            from echousd.room.progress import StageTimer
             from echousd.room.room import RoomOptions
-            from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
+            from echousd.room.written import write_room, write_rooms
         finally:
             gc.enable()
         options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []
 
-        def one(path: str | None, folder: Path) -> tuple[Room, Path, Path | None]:
-            made = make(
+        def one(path: str | None, folder: Path) -> Written:
+            room = make(
                 graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
                 samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
                 options=options, fit=fit, progress=listen,
             )  # fmt: skip
+            timer = StageTimer(listen)
             if settle:
-                with took(spent, "settle", listen):
-                    found = settled(made)
+                with timer.stage("settle"):
+                    found = settled(room)
                 moved = tuple(f"{name} stands where it comes to rest" for name in found.moved)
-                made = replace(found.room, notes=(*made.notes, *moved, *found.restless))
+                room = replace(found.room, notes=(*room.notes, *moved, *found.restless))
                 restless.extend(found.restless)
-            with took(spent, "write", listen):
-                if flat:
-                    root = save_flat(made, folder, force=force)
-                else:
-                    root = save_layers(made, folder, force=force, store=store)
-            preview = None
-            if not flat:
-                with took(spent, "preview", listen):
-                    preview = write_preview(root)
-                    preview = write_sheet(root) or preview
-            for stage, seconds in made.timings.items():
+            written = write_room(room, folder, timer, flat=flat, force=force, store=store)
+            for stage, seconds in (*timer.seconds.items(), *room.timings.items()):
                 spent[stage] = spent.get(stage, 0.0) + seconds
-            return made, root, preview
+            return written
 
-        made = generate_house(output, house, one, force=force, wait=wait) if house else [one(room, output)]
+        if house:
+            root, made = write_rooms(output, house, one, force=force, wait=wait)
+            say(f"house    {root}")
+        else:
+            made = [one(room, output)]
     if timings:
         total = time.perf_counter() - started
         spent |= {"other": total - sum(spent.values()), "total": total}
         for stage, seconds in spent.items():
             typer.echo(f"{stage:>10} {seconds:7.2f} s")
-    for each in made:
-        report(*each)
-    end(made, restless)
-
-
-Made = tuple["Room", Path, Path | None]
+    report(made, restless)
 
 
 def rooms_of(graph: Path) -> Sequence[Place]:
-    """The rooms of a stage that holds several."""
+    """The rooms of a stage that holds several; text is not worth loading USD for."""
     if graph.suffix.lower() not in (".usda", ".usdc", ".usd", ".usdz"):
         return ()
     from echousd.room.house import places
 
     return places(graph)
-
-
-def generate_house(
-    output: Path, house: Sequence[Place], one: Callable[[str, Path], Made], *, force: bool, wait: bool
-) -> list[Made]:
-    """Every room of a house in a folder of its own, and the layer that composes them."""
-    from echousd.room.house import check_house, write_house
-
-    root = output / f"{output.name}.usda"
-    check_house(root, force=force)
-    made = []
-    for place in house:
-        with writing(output / place.name, flat=False, force=force, wait=wait):
-            made.append(one(place.path, output / place.name))
-    write_house(root, house, {place.name: each[1] for place, each in zip(house, made, strict=True)}, force=force)
-    say(f"house    {root}")
-    return made
-
-
-@contextmanager
-def took(spent: dict[str, float], stage: str, listen: StageListener) -> Iterator[None]:
-    """Note how long a stage took, and tell the bar."""
-    started = time.perf_counter()
-    listen(stage, 0, 1)
-    yield
-    listen(stage, 1, 1)
-    spent[stage] = spent.get(stage, 0.0) + time.perf_counter() - started
-
-
-def end(made: Sequence[Made], restless: Sequence[str] = ()) -> None:
-    """Exit code 1 if a room has faults, or pieces that do not rest."""
-    if restless or any(room.faults for room, *_ in made):
-        raise typer.Exit(1)
-
-
-def check_output(output: Path, *, flat: bool, force: bool) -> None:
-    """Refuse before the long work what would be refused after it; raises ValueError."""
-    if flat:
-        if output.suffix not in (".usda", ".usdc"):
-            raise ValueError(f"{output}: with --flat the output is a file that ends in .usda or .usdc")
-        if output.exists() and not force:
-            raise ValueError(f"{output}: exists; choose another file or use --force")
-        return
-    if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
-        raise ValueError(f"{output}: the output is a folder; --flat writes one file")
-    from echousd.room.folder import check_writable
-
-    if output.exists() and not output.is_dir():
-        raise ValueError(f"{output}: is a file, the output must be a folder")
-    check_writable(output)
-
-
-@contextmanager
-def writing(output: Path, *, flat: bool, force: bool, wait: bool) -> Iterator[None]:
-    """Have the folder for this process alone, from what is read of it to what is written."""
-    if flat:
-        yield
-        return
-    from echousd.room.folder import claim
-    from echousd.room.lock import locked
-
-    with locked(output, wait=wait):
-        claim(output, force=force)
-        yield
 
 
 @contextmanager
@@ -246,19 +175,6 @@ def telling_faults() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "the room has faults")
         yield
-
-
-def set_crate_version(version: str | None) -> None:
-    """Make USD write usdc files of an older version; must come before USD writes its first one."""
-    if version is None:
-        return
-    import os
-    import re
-
-    found = re.fullmatch(r"0\.(\d{1,2})\.\d", version, re.ASCII)
-    if not found or int(found[1]) < 7:
-        raise ValueError(f"crate version is {version!r}, allowed: 0.7.0 and newer, such as 0.8.0")
-    os.environ["USD_WRITE_NEW_USDC_FILES_AS_VERSION"] = version
 
 
 @contextmanager
@@ -290,11 +206,20 @@ def progress_bar() -> Iterator[StageListener]:
         yield listen
 
 
-def report(room: Room, root: Path, preview: Path | None) -> None:
-    """Say what was made and what the graph asked for in vain."""
-    say(f"room     {root}")
-    if preview is not None:
-        say(f"preview  {preview}")
+def report(made: Sequence[Written], restless: Sequence[str] = ()) -> None:
+    """Say what was made and what the graphs asked for in vain; exit code 1 for faults and pieces that do not rest."""
+    for each in made:
+        tell_room(each)
+    if restless or any(each.room.faults for each in made):
+        raise typer.Exit(1)
+
+
+def tell_room(written: Written) -> None:
+    """Say what became of a room."""
+    room = written.room
+    say(f"room     {written.root}")
+    if written.preview is not None:
+        say(f"preview  {written.preview}")
     for number, found in enumerate(room.outcomes):
         counts, several = found.counts(), len(room.outcomes) > 1
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"

@@ -107,7 +107,7 @@ def test_older_crate_version_for_older_hosts(graph, tmp_path):
     import sys
 
     code = (
-        "import sys; from echousd.cli.generate import set_crate_version; set_crate_version('0.8.0');"
+        "import sys; from echousd.room.output import set_crate_version; set_crate_version('0.8.0');"
         "from small_room import *; import echousd;"
         "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', repair=False);"
         "room.save(sys.argv[1], preview=False)"

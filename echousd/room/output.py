@@ -1,0 +1,51 @@
+"""Where a room goes, a folder of layers or one flat file: refused before the long work what would be refused after it.
+
+Loads neither pxr nor torch, so that a wrong command line is told at once.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from echousd.room.folder import check_writable, claim
+from echousd.room.lock import locked
+
+
+def check_output(output: Path, *, flat: bool, force: bool) -> None:
+    """Refuse before the long work what would be refused after it; raises ValueError."""
+    if flat:
+        if output.suffix not in (".usda", ".usdc"):
+            raise ValueError(f"{output}: with --flat the output is a file that ends in .usda or .usdc")
+        if output.exists() and not force:
+            raise ValueError(f"{output}: exists; choose another file or use --force")
+        return
+    if output.suffix in (".usda", ".usdc", ".usd", ".usdz"):
+        raise ValueError(f"{output}: the output is a folder; --flat writes one file")
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"{output}: is a file, the output must be a folder")
+    check_writable(output)
+
+
+@contextmanager
+def writing(output: Path, *, flat: bool, force: bool, wait: bool) -> Iterator[None]:
+    """Have the folder for this process alone, from what is read of it to what is written."""
+    if flat:
+        yield
+        return
+    with locked(output, wait=wait):
+        claim(output, force=force)
+        yield
+
+
+def set_crate_version(version: str | None) -> None:
+    """Make USD write usdc files of an older version; must come before USD writes its first one."""
+    if version is None:
+        return
+    found = re.fullmatch(r"0\.(\d{1,2})\.\d", version, re.ASCII)
+    if not found or int(found[1]) < 7:
+        raise ValueError(f"crate version is {version!r}, allowed: 0.7.0 and newer, such as 0.8.0")
+    os.environ["USD_WRITE_NEW_USDC_FILES_AS_VERSION"] = version
