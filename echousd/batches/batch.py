@@ -15,6 +15,7 @@ from echousd.batches.journal import Journal, fault_of, read_journals, room_diges
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
 from echousd.batches.run import BatchProgress, Run
+from echousd.naming import free_name
 from echousd.room.folder import check_writable
 from echousd.room.lock import locked
 
@@ -212,11 +213,8 @@ def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
         if not fault_of(folder, row, stored):
             valid.add(entry.id)
         elif folder.is_dir() and room_digest(folder) != row["sha256"]:
-            aside = out / STATE / "set_aside" / f"{entry.id}_{int(row['when'])}"
-            aside.parent.mkdir(parents=True, exist_ok=True)
-            number = 0
-            while aside.exists():
-                number += 1
-                aside = aside.with_name(f"{entry.id}_{int(row['when'])}_{number}")
-            folder.rename(aside)
+            aside = out / STATE / "set_aside"
+            aside.mkdir(parents=True, exist_ok=True)
+            there = {other.name for other in aside.iterdir()}
+            folder.rename(aside / free_name(f"{entry.id}_{int(row['when'])}", there))
     return frozenset(valid)

@@ -14,6 +14,7 @@ import echousd
 from echomodel.files import whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
 from echousd.batches.sources import find_graphs
+from echousd.naming import as_identifier
 
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
@@ -171,6 +172,4 @@ def _entry(raw: dict[str, Any]) -> Entry:
 
 def _word(name: str) -> str:
     """A file's name as the beginning of an identifier of bounded length."""
-    from echousd.room.save import as_identifier
-
     return as_identifier(name)[:60]

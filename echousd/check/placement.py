@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, inside
+from echousd.repair.geometry import Floor, axes, floor_from_polygon, inside
 from echousd.repair.repair import DEFAULT_HEIGHT, floor_of_room
 from echousd.stage.contents import RoomContents, RoomObject
 
@@ -63,7 +64,7 @@ def _beyond(thing: RoomObject, floor: Floor) -> float:
 
 
 def _footprint(thing: RoomObject) -> np.ndarray:
-    return corners(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
+    return footprints(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
 
 
 def _air_below(thing: RoomObject, others: Sequence[RoomObject]) -> float:

@@ -44,6 +44,7 @@ def edit(
         str | None, typer.Option(help="Of new objects: parts, sdf or boxes; default: what the room is made of.")
     ] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    faces: Annotated[int, typer.Option(help="Face budget of each new mesh.", min=100)] = 5000,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
     ] = True,
@@ -61,7 +62,7 @@ def edit(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
-    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair}
+    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces}
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,

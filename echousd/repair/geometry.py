@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.roomboxes import footprints
+
 COLUMNS = 6
 
 
@@ -30,14 +32,6 @@ def axes(yaw: np.ndarray) -> np.ndarray:
     """(n, 2, 2) float: unit vectors in (x, z) of the width axis [:, 0] and of the front [:, 1]."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), 1)
-
-
-def corners(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(n, 4, 2) float: footprint corners in (x, z), in order around the box."""
-    u = axes(yaw)
-    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.5
-    half = signs[None] * size[:, None, [0, 2]]
-    return position[:, None, [0, 2]] + half @ u
 
 
 def spread(gradient: np.ndarray, ends: np.ndarray, n: int) -> np.ndarray:
@@ -203,7 +197,7 @@ def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.nda
     Returns: the rows, and the object that each row is about (r,) int.
     """
     n, u = len(size), axes(yaw)
-    corner = corners(size, position, yaw)
+    corner = footprints(size, position, yaw)
     distance, gradient = inside(floor, corner.reshape(-1, 2))
     who = np.repeat(np.arange(n), 4)
     lever = corner.reshape(-1, 2) - position[who][:, [0, 2]]

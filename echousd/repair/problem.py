@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.repair.geometry import Floor, axes, corners, floor_from_polygon, pair_gaps, pair_indices
+from echousd.repair.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
 
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
@@ -204,7 +205,7 @@ def lean(
     along = end - start
     length = np.linalg.norm(along, axis=1)
     along = along / length[:, None]
-    corner = corners(size, position, yaw)
+    corner = footprints(size, position, yaw)
     for i, word in enumerate(categories):
         row = vocabulary().category(word)
         leaning = (row.wall and carrier[i] == ON_FLOOR) or row.support == "wall"

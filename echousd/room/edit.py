@@ -15,6 +15,7 @@ from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan_of
+from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
@@ -24,7 +25,7 @@ from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.source import FACES, ShapeRequest
-from echousd.room.styles import asset_names, free_name, style_groups
+from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import layout_outcome, warn_of_faults
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from echomodel.files import flush
+from echousd.naming import free_name
 from echousd.room.journal import (
     STAGING,
     Journal,
@@ -131,13 +132,12 @@ def recover(folder: Path) -> None:
 
 def backup_name(folder: Path, path: str) -> str:
     """`layers/layout.edited.usda` for `layers/layout.usda`, or the first free one of `.edited_2`, `.edited_3` ..."""
-    place, number = Path(path), 1
-    while True:
-        word = "edited" if number == 1 else f"edited_{number}"
-        name = place.with_name(f"{place.stem}.{word}{place.suffix}")
-        if not os.path.lexists(folder / name):
-            return name.as_posix()
-        number += 1
+    place = Path(path)
+
+    def name(word: str) -> str:
+        return place.with_name(f"{place.stem}.{word}{place.suffix}").as_posix()
+
+    return name(free_name("edited", lambda word: os.path.lexists(folder / name(word))))
 
 
 def tell_kept(folder: Path, path: str, kept: str) -> None:

@@ -148,6 +148,6 @@ def write_palettes(stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[st
         variants.AddVariant(harmony)
         variants.SetVariantSelection(harmony)
         with variants.GetVariantEditContext():
-            for name, look in table.items():
+            for name, look in sorted(table.items()):  # bytes must not show the order of a set
                 tint_material(stage, f"{LOOKS}/{name}", looks[chosen][name], look)
     variants.SetVariantSelection(chosen)

@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from scipy import ndimage, sparse
+from scipy import ndimage
+from trimesh import smoothing
 
 from echomodel.data.tsdf import mesh_from_tsdf
 
 SMALLEST = 0.004  # solids below this share of the largest one are noise
-PASS_BAND, SHRINK, SWELL = 6, 0.5, -0.53  # Taubin (1995): rounds, lambda, mu; low frequencies such as thin legs stay
-FACES = 5000
+ROUNDS, SHRINK, SWELL = 6, 0.5, 0.53  # Taubin (1995): lambda, -mu; low frequencies such as thin legs stay
+FACES, LEAST_FACES = 5000, 100
 FINEST, COARSENINGS = 1 / 1200, 11  # first tolerance in diagonals of the mesh; it grows to a twentieth
 
 
@@ -40,10 +41,11 @@ def mesh_from_shape(grid: Any, size: Any, *, faces: int = FACES) -> CleanMesh:
         raise ValueError(f"size is {extent.tolist()}, need three positive numbers of metres")
     if np.ndim(grid) != 3:
         raise ValueError(f"TSDF has shape {np.shape(grid)}, need a cube (n, n, n)")
-    if faces < 100:
-        raise ValueError(f"face budget is {faces}, need at least 100")
+    if faces < LEAST_FACES:
+        raise ValueError(f"face budget is {faces}, need at least {LEAST_FACES}")
     mesh = mesh_from_tsdf(largest_solids(np.asarray(grid, np.float32)))
-    mesh.vertices = taubin(mesh) * extent
+    smoothing.filter_taubin(mesh, SHRINK, SWELL, iterations=2 * ROUNDS)
+    mesh.vertices *= extent
     mesh = decimate(mesh, faces)
     if not len(mesh.faces):
         raise ValueError(f"nothing is left of its noisy surface with {faces} faces")
@@ -65,20 +67,6 @@ def largest_solids(grid: np.ndarray) -> np.ndarray:
     cavity = ((air != air[0, 0, 0]) & (air > 0))[1:-1, 1:-1, 1:-1]
     out[cavity] = -np.maximum(np.abs(out[cavity]), 0.05)
     return out
-
-
-def taubin(mesh: trimesh.Trimesh, rounds: int = PASS_BAND) -> np.ndarray:
-    """(v, 3) vertices after smoothing that does not shrink: each round one step inwards and a larger one outwards."""
-    points = np.asarray(mesh.vertices, float)
-    edges = np.asarray(mesh.edges_unique)
-    n = len(points)
-    ones = np.ones(2 * len(edges))
-    adjacency = sparse.csr_matrix((ones, (edges.T.ravel(), edges[:, ::-1].T.ravel())), shape=(n, n))
-    degree = np.maximum(np.asarray(adjacency.sum(1)), 1)
-    for _ in range(rounds):
-        for step in (SHRINK, SWELL):
-            points = points + step * (adjacency @ points / degree - points)
-    return points
 
 
 def decimate(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:

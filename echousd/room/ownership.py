@@ -7,11 +7,11 @@ from pathlib import Path, PurePosixPath
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
+from echousd.naming import free_name
 from echousd.room.folder import backup_name
 from echousd.room.journal import STAGING, digest, digest_of
 from echousd.room.paths import coarse_file, component_file, payload_file
 from echousd.room.room import RoomData
-from echousd.room.styles import free_name
 from echousd.room.within import inside
 
 LAYER_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")

@@ -15,6 +15,7 @@ from pxr import Sdf, Usd
 
 import echousd
 from echousd.flattening import flat_layer
+from echousd.naming import as_identifier
 from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
@@ -100,12 +101,6 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     for layer in filter(None, (Sdf.Layer.Find(str(folder / path)) for path in changed)):
         layer.Reload()  # this process holds it open, as it was before
     return folder / root
-
-
-def as_identifier(word: str) -> str:
-    """A file's or folder's name as a USD identifier."""
-    name = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in word) or "room"
-    return name if not name[0].isdigit() else f"_{name}"
 
 
 def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:

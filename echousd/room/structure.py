@@ -11,7 +11,7 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSemantics
 from echousd.room import assets
 from echousd.room.finishes.harmonies import linear
 from echousd.room.looks import Look
-from echousd.room.paths import SHELL
+from echousd.room.paths import SHELL, piece_name
 from echousd.room.room import RoomData
 from echousd.room.shell import floor_mesh
 from echousd.room.surface import Surface, surface
@@ -52,7 +52,7 @@ def shell_prims(room: RoomData) -> list[ShellPrim]:
     """All parts of a room's shell, walls before what is in them."""
     corners = room.graph.room.corners
     plan = room.floor if corners is None else corners
-    slab = Piece("Floor_mesh", "floor", floor_mesh(room.floor))
+    slab = Piece(piece_name("Floor", "mesh"), "floor", floor_mesh(room.floor))
     parts = [ShellPart("Floor", "floor", (slab,))]
     if room.options.walls:
         parts += walls(plan, room.height, room.graph.room.openings)

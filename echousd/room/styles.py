@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from echomodel.vocabulary import vocabulary
+from echousd.naming import free_name
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -24,30 +27,26 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     A group without a name is called `set_<its first object>`. Objects of no group have the style `room`, so that a room
     looks of one piece.
     """
-    parent = {node.name: node.name for node in graph.nodes}
-
-    def root(name: str) -> str:
-        while parent[name] != name:
-            parent[name] = parent[parent[name]]
-            name = parent[name]
-        return name
-
-    by_style: dict[str, str] = {}
-    for node in graph.nodes:
+    place = {node.name: number for number, node in enumerate(graph.nodes)}
+    alike: list[tuple[int, int]] = []
+    by_style: dict[str, int] = {}
+    for number, node in enumerate(graph.nodes):
         if node.style:
-            parent[root(node.name)] = root(by_style.setdefault(node.style, node.name))
+            alike.append((number, by_style.setdefault(node.style, number)))
     for relation in graph.relations:
         if "style" in vocabulary().predicate(relation.predicate).unites:
-            parent[root(relation.subject)] = root(relation.object)
-    members: dict[str, list[str]] = {}
-    for node in graph.nodes:
-        members.setdefault(root(node.name), []).append(node.name)
+            alike.append((place[relation.subject], place[relation.object]))
+    links = coo_array((np.ones(len(alike)), np.array(alike, int).reshape(-1, 2).T), shape=(len(place), len(place)))
+    group_of = connected_components(links, directed=False)[1].tolist() if place else []
+    members: dict[int, list[str]] = {}
+    for node, number in zip(graph.nodes, group_of, strict=True):
+        members.setdefault(number, []).append(node.name)
     style_of = {node.name: node.style for node in graph.nodes}
     out: dict[str, str] = {}
     for node in graph.nodes:
         if node.name in out:
             continue
-        group = members[root(node.name)]
+        group = members[group_of[place[node.name]]]
         named = next((style_of[name] for name in group if style_of[name]), None)
         if named is None and len(group) == 1:
             out[node.name] = ROOM_STYLE
@@ -139,14 +138,6 @@ def asset_names(owners: Mapping[str, str], categories: Mapping[str, str]) -> dic
             named[owner] = free_name(categories[owner], taken)
             taken.add(named[owner])
     return {name: named.get(owner, owner) for name, owner in owners.items()}
-
-
-def free_name(word: str, taken: Container[str]) -> str:
-    """The word itself, or the first of `word_2`, `word_3` ... that is not taken."""
-    name, number = word, 2
-    while name in taken:
-        name, number = f"{word}_{number}", number + 1
-    return name
 
 
 def _agree(i: int, j: int, size: np.ndarray, occupancy: np.ndarray | None) -> bool:

@@ -12,6 +12,7 @@ import trimesh
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echousd.room import fittings
 from echousd.room.fittings import WALL
+from echousd.room.paths import piece_name
 from echousd.room.shell import THICKNESS
 
 
@@ -51,10 +52,10 @@ def walls(polygon: np.ndarray, height: float, openings: Sequence[Opening] = ()) 
         name = f"Wall_{edge + 1}"
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
-        pieces = [Piece(f"{name}_mesh", "wall", _placed(_wall(polygon, edge, height, here), frame))]
+        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, height, here), frame))]
         boards = fittings.skirting(here, float(length))
         if boards is not None:
-            pieces.append(Piece(f"{name}_skirting", "trim", _placed(boards, frame), solid=False))
+            pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         left_first = signed_area(polygon) > 0
         inner = [_filled(name, opening, frame, float(length), height, left_first) for opening in here]
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
@@ -66,7 +67,7 @@ def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
     flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))
     slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
     slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] + height, -slab.vertices[:, 1]], 1)
-    return ShellPart("Ceiling", "ceiling", (Piece("Ceiling_mesh", "ceiling", slab),))
+    return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", slab),))
 
 
 def outline(polygon: np.ndarray) -> np.ndarray:
@@ -130,7 +131,9 @@ def _filled(
             made.append(("leaf", "leaf", fittings.door_leaf(opening), True))
             made.append(("handle", "rail", fittings.door_handle(opening, left_first), False))
     label = "window" if opening.kind == "window" else "door"
-    pieces = [Piece(f"{name}_{what}", look, _placed(m, frame), solid) for what, look, m, solid in made if m is not None]
+    pieces = [
+        Piece(piece_name(name, what), look, _placed(m, frame), solid) for what, look, m, solid in made if m is not None
+    ]
     return ShellPart(name, label, tuple(pieces))
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom
 
-from echomodel.roomboxes import RoomBoxes
+from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.vocabulary import UnknownWord, normalised, vocabulary
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.units import metres_per_unit, up_axis
@@ -111,7 +112,8 @@ def foreign_graph(stage: Usd.Stage | str | os.PathLike[str], room_type: str | No
             skipped["no bounds"] += 1
             continue
         prims.PruneChildren()
-        name = _unused(prim.GetName(), nodes)
+        ascii_name = prim.GetName().encode("ascii", "replace").decode().replace("?", "_")
+        name = free_name(Tf.MakeValidIdentifier(ascii_name), nodes)
         nodes[name] = Node(name, category, size=box.size, position=box.position, yaw=box.yaw)
     if skipped:
         told = ", ".join(f"{reason} ({count})" for reason, count in skipped.most_common(8))
@@ -178,22 +180,11 @@ def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:
     return Gf.BBox3d(whole, to_world) if not whole.IsEmpty() else cache.ComputeWorldBound(prim)
 
 
-def _unused(name: str, taken: dict[str, Node]) -> str:
-    base = valid = Tf.MakeValidIdentifier(name.encode("ascii", "replace").decode().replace("?", "_"))
-    number = 2
-    while valid in taken:
-        valid = f"{base}_{number}"
-        number += 1
-    return valid
-
-
 def _corners(floor: Box | None) -> tuple[tuple[float, float], ...] | None:
     if floor is None or floor.size[0] * floor.size[2] < 1e-6:
         return None
-    (width, _, depth), (x, _, z) = floor.size, floor.position
-    cos, sin = math.cos(floor.yaw), math.sin(floor.yaw)
-    local = ((-width / 2, -depth / 2), (width / 2, -depth / 2), (width / 2, depth / 2), (-width / 2, depth / 2))
-    return tuple((x + a * cos + b * sin, z - a * sin + b * cos) for a, b in local)
+    plan = footprints(np.array([floor.size]), np.array([floor.position]), np.array([floor.yaw]))[0]
+    return tuple((x, z) for x, z in plan.tolist())
 
 
 def _room_type(words: list[str], categories: list[str]) -> str:

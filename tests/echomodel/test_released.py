@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from published_shapes import fit_to_box, mesh_from_grid, vertex_points
 
-from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, coverage, emd_matrix, vertex_points
+from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, coverage, emd_matrix
 from echomodel.released.bounds import read_bounds, statistics_from_bounds
 from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, released, shape_unet
 from echomodel.released.encoder import SceneGraphTensors
 from echomodel.released.gcn import TripletGCN
 from echomodel.released.model import GraphChange, ReleasedModel
-from echomodel.released.placing import fit_to_box, mesh_from_grid
 from echomodel.released.sampling import node_budget
 from echomodel.released.scene import published_scene
 from echomodel.released.shape import ShapeUNet

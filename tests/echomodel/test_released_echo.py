@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from published_shapes import fit_to_box, mesh_from_grid
 
 from echomodel.boxes import Boxes
 from echomodel.checkpoint import class_names, convert, write_released
@@ -18,7 +19,6 @@ from echomodel.released.bounds import statistics_from_bounds
 from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echomodel.released.echo import ReleasedEcho, floor_relations
 from echomodel.released.model import ReleasedModel
-from echomodel.released.placing import fit_to_box, mesh_from_grid
 from echomodel.released.tables import LayoutTables
 from echomodel.vocabulary import vocabulary
 from echousd.room.meshing import mesh_from_shape

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import torch
 from parity_numbers import Numbers, close
+from published_shapes import box_corners, fit_to_box
 
 from echomodel.boxes import Boxes
 from echomodel.metrics.pointsets import compare_sets
 from echomodel.released.bounds import statistics_from_bounds
-from echomodel.released.placing import box_corners, fit_to_box
 
 
 def test_boxes() -> None:

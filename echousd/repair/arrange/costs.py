@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from echomodel.roomboxes import footprints
 from echomodel.rules.sets import APART
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.outlook import missing, unseen
@@ -44,9 +45,8 @@ def depths(size: np.ndarray, poses: Poses, others: np.ndarray, position: np.ndar
 def beyond(setting: Setting, size: np.ndarray, poses: Poses) -> np.ndarray:
     """(K,) float: how far a box at each pose leaves the floor, metres."""
     u = axes(poses.yaw)
-    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * 0.5
-    corners = poses.position[:, None, [0, 2]] + (signs * size[[0, 2]])[None] @ u
-    out = -inside(setting.floor, corners.reshape(-1, 2))[0].reshape(len(poses), 4).min(1)
+    corners = footprints(np.broadcast_to(size, (len(poses), 3)), poses.position, poses.yaw).reshape(-1, 2)
+    out = -inside(setting.floor, corners)[0].reshape(len(poses), 4).min(1)
     if len(setting.floor.reflex):
         offset = setting.floor.reflex[None] - poses.position[:, None, [0, 2]]
         local = np.abs(np.einsum("kad,kmd->kma", u, offset)) - size[[0, 2]] / 2

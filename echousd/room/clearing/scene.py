@@ -12,9 +12,9 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.repair.geometry import corners
 from echousd.repair.problem import carriers
 from echousd.repair.repair import DEFAULT_HEIGHT
 from echousd.room.clearing.nofit import Solids, depth, forbidden_moves
@@ -145,7 +145,7 @@ def scene_of(
         yaw,
         np.array([kind.role == "seat" for kind in kinds]),
         np.sqrt(size[:, 0] * size[:, 2]),
-        [shapely.Polygon(corner) for corner in corners(size, position, yaw)],
+        [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
         shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
     )

@@ -9,13 +9,13 @@ import numpy as np
 
 from echomodel.data.dressing import KINDS
 from echomodel.data.dressing import thing as solids_of
+from echousd.naming import free_name
 from echousd.room.colliders import standing_hull
 from echousd.room.dressing import floors, tabletops, upholstery, walls
 from echousd.room.dressing.setting import Setting, Thing, standing
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import mass_of, part_of, within_budget
 from echousd.room.room import RoomData
-from echousd.room.styles import free_name
 
 ORIGIN = Origin("dressing")
 RULES = (

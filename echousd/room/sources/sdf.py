@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.boxes import Boxes
 from echousd.room.geometry import Geometry, Origin
-from echousd.room.meshing import mesh_from_shape
+from echousd.room.meshing import LEAST_FACES, mesh_from_shape
 from echousd.room.reproducible import one_thread, rounded_grids
 from echousd.room.sources.solid import solid_geometry
 from echousd.room.sources.source import ShapeRequest, Shapes, per_asset
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
 ORIGIN = Origin("sdf")
+TRIES = 6  # simplifications until the cut mesh is within its budget
 
 
 class SignedDistances:
@@ -38,12 +39,28 @@ class SignedDistances:
         def make(row: int) -> Geometry:
             node = request.graph.nodes[row]
             try:
-                mesh = mesh_from_shape(grids[row], size[row], faces=request.faces).mesh
+                return within_budget(grids[row], size[row], node.category, request.faces)
             except ValueError as error:
                 raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
-            return solid_geometry(mesh, node.category, ORIGIN)
 
         return per_asset(request, make, lambda row: grids[row] < 0)
+
+
+def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:
+    """The geometry of a shape with at most `faces` triangles once it is cut along the borders of its materials.
+
+    Arguments: as for `mesh_from_shape`, raises what it raises. A budget of a few hundred may be too small for the cuts
+    alone; the best that was found is given then.
+    """
+    asked, best = faces, None
+    for _ in range(TRIES):
+        found = solid_geometry(mesh_from_shape(grid, size, faces=asked).mesh, category, ORIGIN)
+        best = found if best is None or found.faces < best.faces else best
+        if found.faces <= faces or asked == LEAST_FACES:
+            break
+        asked = max(LEAST_FACES, int(0.99 * asked * faces / found.faces))
+    assert best is not None
+    return best
 
 
 def sampled_grids(request: ShapeRequest) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import torch
 from scipy.optimize import linear_sum_assignment
 from torch import Tensor
@@ -109,34 +108,6 @@ def compare_sets(samples: Tensor, references: Tensor, *, emd: bool = False) -> d
     scores = coverage(between)
     scores.update(one_nearest_neighbour(distance(references, references), between.t(), distance(samples, samples)))
     return scores
-
-
-def vertex_points(vertices: np.ndarray, count: int = 5000, seed: int = 42) -> Tensor:
-    """The published object sample: `count` mesh vertices (not surface points), centred and scaled to the cube [-1, 1].
-
-    Arguments:
-        vertices: (V, 3) float, metres. count: points; drawn with replacement where the mesh has fewer vertices.
-        seed: of the draw.
-
-    Returns:
-        (count, 3) float32.
-
-    Raises:
-        ValueError: no vertex, or all in one place.
-    """
-    vertices = np.asarray(vertices, np.float64).reshape(-1, 3)
-    if not len(vertices):
-        raise ValueError("mesh has no vertices")
-    # The published stream is the legacy generator's; parity of the drawn subset needs the same one.
-    legacy = np.random.RandomState(seed)
-    enough = len(vertices) >= count
-    index = legacy.permutation(len(vertices))[:count] if enough else legacy.choice(len(vertices), count)
-    points = vertices[index]
-    points = points - points.mean(0)
-    scale = float(np.abs(points).max())
-    if scale == 0:
-        raise ValueError("mesh has all its vertices in one place")
-    return torch.from_numpy((points / scale).astype(np.float32))
 
 
 def _small(one: Tensor, others: Tensor) -> bool:

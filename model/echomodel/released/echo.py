@@ -18,9 +18,8 @@ from echomodel.graph import GraphBatch
 from echomodel.protocols import touched_nodes
 from echomodel.released.editing import pack_changes, pack_scenes
 from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.grids import DISTANCE, published_grids, turned_back
+from echomodel.released.grids import DISTANCE, LEVEL, published_grids, turned_back
 from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
-from echomodel.released.placing import LEVEL
 from echomodel.released.scene import published_scene
 from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 DISTANCE = 4 / 64  # our grids hold distances over 4 voxels, the published ones in sides of the grid
+LEVEL = 0.02  # the published iso value of the truncated distance
 
 
 def published_grids(grids: Tensor, side: int = 64) -> Tensor:

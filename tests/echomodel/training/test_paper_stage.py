@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from published_shapes import fit_to_box
 
 from echomodel.checkpoint import load_released
 from echomodel.data.build import build_data
@@ -15,7 +16,6 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.released.echo import ReleasedEcho
 from echomodel.released.grids import DISTANCE, published_grids, turned_back
 from echomodel.released.model import ReleasedModel
-from echomodel.released.placing import fit_to_box
 from echomodel.released.tables import LayoutTables
 from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.logs import read_log

@@ -23,7 +23,8 @@ CODE = textwrap.dedent("""
     from echousd.graph import load_graph
     from echousd.room.compose import room_files
     graph = load_graph(sys.argv[3])
-    room = echousd.generate(graph, seed=3, steps=3, faces=400)
+    options = echousd.RoomOptions(walls=True, dress="some")
+    room = echousd.generate(graph, seed=3, steps=3, faces=400, options=options)
     assert torch.get_num_threads() == int(sys.argv[2])
     for path, content in sorted(room_files(room).items()):
         print(path, hashlib.sha256(content).hexdigest())

@@ -12,10 +12,11 @@ from small_room import StandIn, small_graph
 from stopped_disk import stopped_disk
 
 import echousd
+from echousd.naming import as_identifier
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.folder import STAGING
-from echousd.room.save import as_identifier, save_flat, write_preview
+from echousd.room.save import save_flat, write_preview
 
 
 def make(seed=0, shift=0.5, graph=None, **more):

@@ -12,7 +12,10 @@ import echousd
 from echousd.room import sources
 from echousd.room.edit import edit
 from echousd.room.geometry import Collider, Geometry, Origin, Part
+from echousd.room.meshing import mesh_from_shape
 from echousd.room.reading import read_room
+from echousd.room.sources.sdf import within_budget
+from echousd.room.sources.solid import solid_geometry
 from echousd.room.sources.source import Shapes, per_asset
 from echousd.stage import open_stage
 
@@ -128,3 +131,23 @@ def test_pieces_have_names_of_their_own():
     with pytest.raises(ValueError, match=r"pieces \['top', 'top', 'top_hull', 'foot_hull'\], need parts and colliders"):
         replace(made, parts=(made.parts[0], made.parts[0]))
     assert Shapes({"a": "b", "b": "b"}, {"b": made}).owners["a"] == "b"
+
+
+def bed_grid() -> np.ndarray:
+    """Signed distances of a bumpy slab with a headboard: many faces, and materials that meet inside."""
+    x, y, z = np.meshgrid(*[np.linspace(-1, 1, 64)] * 3, indexing="ij")
+    bumps = 0.03 * np.sin(11 * x) * np.sin(13 * z)
+    slab = np.maximum.reduce([np.abs(x) - 0.9, y + 0.1 + bumps, -y - 0.9, np.abs(z) - 0.9])
+    head = np.maximum.reduce([np.abs(x) - 0.9, np.abs(y) - 0.9, z + 0.7, -z - 0.9])
+    return (np.minimum(slab, head) * 8).clip(-1, 1).astype(np.float32)
+
+
+@pytest.mark.parametrize("faces", [600, 2000])
+def test_faces_are_counted_after_the_cut_along_materials(faces):
+    grid, size = bed_grid(), np.array([1.6, 1.0, 2.0])
+    uncut = mesh_from_shape(grid, size, faces=faces).mesh
+    assert solid_geometry(uncut, "double_bed", ORIGIN).faces > faces
+    found = within_budget(grid, size, "double_bed", faces)
+    assert 0.7 * faces < found.faces <= faces
+    assert found.watertight
+    assert len(found.parts[0].slots) > 1
