@@ -19,7 +19,7 @@ from echousd.textures import TextureError, read_image
 @dataclass(frozen=True)
 class Paint:
     """A UsdPreviewSurface in short: linear colours; the colour's texture as resolved path, its shader's prim
-    path and what it is multiplied with."""
+    path, what it is multiplied with, and the primvar that it is laid out by."""
 
     name: str = "grey"
     color: tuple[float, float, float] = (0.55, 0.55, 0.55)
@@ -29,6 +29,8 @@ class Paint:
     texture: str = ""
     image: str = ""
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    opacity: float = 1.0
+    st: str = "st"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +70,11 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
     for form in forms(stage.GetPseudoRoot(), cache, _visible):
         prim = form.prim
-        part = shapes[prim] if prim in shapes else _triangles(prim)
+        part = shapes[prim] if prim in shapes else _part(prim, known)
         if form.above is not None:
             shapes[prim] = part
         if part is not None:
-            face, triangles, normals, st = part
-            paints = tuple(_paints(prim, face, known))
+            triangles, normals, st, paints = part
             component = (
                 _component(prim)
                 if form.above is None
@@ -115,33 +116,48 @@ def _component(prim: Usd.Prim) -> str:
     return prim.GetName()
 
 
-def _triangles(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None] | None:
-    """Fan triangles of a surface: the face of the prim that each came from, corners, corner normals, st."""
+def fans(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Polygons with `counts` (f,) int corners as triangles: (t,) int polygon and (t, 3) int corners of each."""
+    first = np.cumsum(counts) - counts
+    many = np.clip(counts - 2, 0, None)
+    face = np.repeat(np.arange(len(counts)), many)
+    step = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
+    return face, np.stack([first[face], first[face] + step + 1, first[face] + step + 2], 1)
+
+
+def _part(
+    prim: Usd.Prim, known: dict[str, Paint]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, tuple[tuple[Paint, np.ndarray], ...]] | None:
+    """Triangles of a surface: corners, corner normals, st and paints."""
     surface = polygons(prim)
     points, counts, index = surface.points, surface.counts, surface.indices
     if not (counts > 2).any():
         return None
-    first = np.cumsum(counts) - counts
-    fans = np.clip(counts - 2, 0, None)
-    face = np.repeat(np.arange(len(counts)), fans)
-    step = np.arange(len(face)) - np.repeat(np.cumsum(fans) - fans, fans)
-    corner = np.stack([first[face], first[face] + step + 1, first[face] + step + 2], 1)
+    face, corner = fans(counts)
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     triangles = points[index[corner]]
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
     normals = np.repeat(flat[:, None], 3, axis=1)
+    paints = tuple(_paints(prim, surface.face[face], known))
     if surface.normals is not None:
-        return surface.face[face], triangles, surface.normals[index[corner]], None
+        return triangles, surface.normals[index[corner]], None, paints
     if not prim.IsA(UsdGeom.Mesh):
-        return face, triangles, normals, None
+        return triangles, normals, None, paints
     mesh = UsdGeom.Mesh(prim)
-    authored = _corner_values(mesh, "normals", 3, index, len(points), face, corner)
+    where = (index, len(points), face, corner)
+    authored = _corner_values(mesh, "normals", 3, *where)
     if authored is not None:
         length = np.linalg.norm(authored, axis=-1, keepdims=True)
         normals = np.where(length > 1e-9, authored / np.maximum(length, 1e-9), normals)
-    return face, triangles, normals, _corner_values(mesh, "st", 2, index, len(points), face, corner)
+    st = _corner_values(mesh, "st", 2, *where)
+    for paint, faces in paints:
+        other = _corner_values(mesh, paint.st, 2, *where) if paint.st != "st" else None
+        if other is not None:
+            st = np.zeros((len(face), 3, 2)) if st is None else np.array(st)
+            st[faces] = other[faces]
+    return triangles, normals, st, paints
 
 
 def _corner_values(
@@ -210,8 +226,8 @@ def _surface(material: UsdShade.Material) -> Paint:
         return Paint()
     found: dict[str, Usd.Attribute] = {}
     texture = shown = ""
-    tint = (1.0, 1.0, 1.0)
-    for name in ("diffuseColor", "emissiveColor", "roughness", "metallic"):
+    tint, laid_out = (1.0, 1.0, 1.0), "st"
+    for name in ("diffuseColor", "emissiveColor", "roughness", "metallic", "opacity"):
         source = shader.GetInput(name)
         if not source:
             continue
@@ -221,6 +237,7 @@ def _surface(material: UsdShade.Material) -> Paint:
             file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
             texture = str(file.resolvedPath) if file else ""
             shown = str(image.GetPath()) if texture else ""
+            laid_out = _primvar_of(image)
             if texture and image.GetInput("scale"):
                 tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
         elif not connected:
@@ -234,7 +251,23 @@ def _surface(material: UsdShade.Material) -> Paint:
         texture,
         shown,
         tint,
+        values.number(found.get("opacity"), 1.0),
+        laid_out,
     )
+
+
+def _primvar_of(image: UsdShade.Shader) -> str:
+    """Name of the primvar that an image is laid out by, `st` where it does not say."""
+    shader, entry = image, "st"
+    for _ in range(2):  # a UsdTransform2d may stand between
+        source = shader.GetInput(entry) if shader else None
+        found = source.GetConnectedSources()[0] if source and source.HasConnectedSource() else []
+        shader, entry = UsdShade.Shader(found[0].source.GetPrim()) if found else None, "in"
+        name = shader.GetInput("varname") if shader else None
+        attributes = name.GetValueProducingAttributes() if name else []
+        if attributes:
+            return next(iter(values.texts(attributes[0])), "st")
+    return "st"
 
 
 def rgb(found: Any, default: Any) -> Any:

@@ -123,10 +123,16 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
 
 
 def _own_faces(mesh: Drawable) -> list[tuple[Paint, np.ndarray]]:
+    """Materials of a mesh with the triangles that show them, each material once."""
+    order = {paint: number for number, (paint, _) in reversed(list(enumerate(mesh.paints)))}
     owner = np.zeros(len(mesh.triangles), int)
-    for number, (_, faces) in enumerate(mesh.paints):
-        owner[faces] = number
-    return [(p, np.flatnonzero(owner == n)) for n, (p, _) in enumerate(mesh.paints) if (owner == n).any()]
+    for paint, faces in mesh.paints:
+        owner[faces] = order[paint]
+    return [(p, np.flatnonzero(owner == n)) for p, n in sorted(order.items(), key=_number) if (owner == n).any()]
+
+
+def _number(entry: tuple[Paint, int]) -> int:
+    return entry[1]
 
 
 def _part(mesh: Drawable, faces: np.ndarray, material: Any) -> trimesh.Trimesh:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from echousd.bare import without_physics
 from echousd.drawables import rgb
@@ -30,6 +30,7 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
         for attribute in prim.GetAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Double3 and attribute.GetName().startswith("xformOp:"):
                 _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
+    _bind_directly(stage)
     _drop_unused_materials(stage)
     images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
     take_assets(layer, package)
@@ -64,6 +65,25 @@ def _paint_plain(image: Usd.Prim) -> None:
             colored.ClearConnections()
             colored.Set(color)
     image.SetActive(False)
+
+
+def _bind_directly(stage: Usd.Stage) -> None:
+    """Bind every surface to the material that it shows, where a collection binds it: web viewers ask the prim alone."""
+    owners = [p for p in stage.TraverseAll() if UsdShade.MaterialBindingAPI(p).GetCollectionBindingRels()]
+    shown = [p for p in stage.TraverseAll() if p.IsA(UsdGeom.Gprim) or p.IsA(UsdGeom.Subset)] if owners else []
+    found = [(prim, UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]) for prim in shown]
+    for prim in owners:
+        for bound in UsdShade.MaterialBindingAPI(prim).GetCollectionBindingRels():
+            name = bound.GetName().rpartition(":")[2]
+            prim.RemoveProperty(bound.GetName())
+            for part in ("includes", "excludes", "expansionRule", "includeRoot"):
+                prim.RemoveProperty(f"collection:{name}:{part}")
+            prim.RemoveAPI(Usd.CollectionAPI, name)
+        if not UsdShade.MaterialBindingAPI(prim).GetDirectBindingRel().HasAuthoredTargets():
+            prim.RemoveAPI(UsdShade.MaterialBindingAPI)
+    for prim, material in found:
+        if material and UsdShade.MaterialBindingAPI(prim).GetDirectBinding().GetMaterialPath() != material.GetPath():
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
 
 
 def _drop_unused_materials(stage: Usd.Stage) -> None:

@@ -52,11 +52,14 @@ def read_image(path: str) -> np.ndarray:
 
     Raises TextureError for what `texture_bytes` refuses, what is no image, and more than `MAX_PIXELS` pixels.
     """
+    content = texture_bytes(path)
+    return np.full((1, 1, 3), GREY, np.uint8) if content is None else decoded(content, path)
+
+
+def decoded(content: bytes, path: str) -> np.ndarray:
+    """(h, w, 3) uint8 sRGB of an encoded image; raises TextureError, which calls it `path`, as `read_image` does."""
     from PIL import Image
 
-    content = texture_bytes(path)
-    if content is None:
-        return np.full((1, 1, 3), GREY, np.uint8)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is below
         try:

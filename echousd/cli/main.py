@@ -33,6 +33,7 @@ TOPICS: tuple[str, ...] = (
     "edit",
     "render",
     "export",
+    "texture",
     "check",
     "train",
     "convert",

@@ -96,7 +96,7 @@ def merged_root(path: Path, current: bytes, fresh: bytes) -> bytes:
     axes = [Usd.Stage.Open(layer, Usd.Stage.LoadNone).GetMetadata("upAxis") for layer in (theirs, ours)]
     if axes[0] != axes[1]:
         raise ValueError(f"{path}: edited by hand and {axes[0]}-up; a {axes[1]}-up room needs another folder")
-    present = list(theirs.subLayerPaths)
+    present = [path for path in theirs.subLayerPaths if path in ours.subLayerPaths or not path.startswith("./layers/")]
     theirs.subLayerPaths = present + [layer for layer in ours.subLayerPaths if layer not in present]
     theirs.customLayerData = {**theirs.customLayerData, **ours.customLayerData}
     return theirs.ExportToString().encode("utf-8")

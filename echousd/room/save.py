@@ -19,7 +19,7 @@ from echousd.naming import as_identifier
 from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
-from echousd.room import ownership
+from echousd.room import ownership, paintings
 from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
@@ -72,8 +72,9 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
         left.unlink(missing_ok=True)
     files = room_files(room, shelf)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
-    owned = {path: folders.digest(content) for path, content in files.items()}
     current = ownership.read(folder, root)
+    unfit = paintings.refitted(folder, root, files, current)
+    owned = {path: folders.digest(content) for path, content in files.items()}
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
         files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
     for path in (path for files_of in room.carried.values() for path in files_of):
@@ -89,11 +90,13 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
-    last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [root, manifest]
+    last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [paintings.UNFIT, root, manifest]
     changed = folders.write_together(folder, files, last=last, remove=stale)
     for path, name in kept.items():
         if name:
             folders.tell_kept(folder, path, name)
+    for told in unfit:
+        warnings.warn(told, stacklevel=3)
     for path in gone:
         if path not in stale and (folder / path).is_file():
             why = f"{needed[path]} refers to it" if path in needed else "it was edited"

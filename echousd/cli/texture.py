@@ -1,0 +1,87 @@
+"""`echousd texture`: a room as a job for a texturing tool, and what it painted back into the room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from echousd.cli.output import say
+
+if TYPE_CHECKING:
+    from echousd.texturing import Job
+
+texture_app = typer.Typer(no_args_is_help=True)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the topic."""
+    app.add_typer(
+        texture_app, name="texture", help="To texturing tools (SceneTex, Hunyuan3D-Paint, MVPainter) and back."
+    )
+
+
+@texture_app.command(
+    "export", epilog="Example: echousd texture export out/bedroom/bedroom.usda -o out/job --for scenetex"
+)
+def export(
+    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the job.", show_default=False)],
+    tool: Annotated[str, typer.Option("--for", help="scenetex, hunyuan, mvpainter or generic.", show_default=False)],
+    prompt: Annotated[str, typer.Option(help="Words for the room; default: from its graph.")] = "",
+    dressing: Annotated[str, typer.Option(help="Small things: none, grouped as one object, or each.")] = "none",
+    resolution: Annotated[
+        int | None,
+        typer.Option(help="Texels along an object's picture; default 2048 (SceneTex: 4096 for all).", min=64),
+    ] = None,
+    layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a job that lies there, its results too.")] = False,
+) -> None:
+    """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
+    from echousd.texturing import export_job
+
+    job = export_job(
+        room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, force=force
+    )
+    say(f"job      {output / 'job.json'}")
+    say(f"objects  {len(job.objects)}, prompt {job.prompt!r}")
+    _tell(job)
+
+
+@texture_app.command("import", epilog="Example: echousd texture import out/bedroom/bedroom.usda out/job --name oil")
+def import_(
+    room: Annotated[Path, typer.Argument(help="Root layer of the room that was exported.", show_default=False)],
+    job: Annotated[Path, typer.Argument(help="Folder of the job, painted.", show_default=False)],
+    name: Annotated[str, typer.Option(help="Of the look; default: the tool's.")] = "",
+    skip: Annotated[list[str] | None, typer.Option(help="Object that keeps its look; may be repeated.")] = None,
+    preview: Annotated[bool, typer.Option("--preview/--no-preview", help="Draw the room's picture anew.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Replace a look of that name.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+) -> None:
+    """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
+    from echousd.texturing import import_look
+
+    look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
+    say(f"look     {look.layer}")
+    say(f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without")
+    for words, what in ((look.unpainted, "no result, keeps its look"), (look.skipped, "left out, keeps its look")):
+        for word in words:
+            say(f"{word}: {what}")
+
+
+def _tell(job: Job) -> None:
+    """What will not look as one expects."""
+    from echousd.texturing.scenetex import ANCHORED
+
+    for name, why in job.left_out.items():
+        say(f"left out {name}: {why}", err=True)
+    if not job.one_picture:
+        return
+    for thing in job.objects:
+        if thing.visible is None:
+            say('visible texels were not counted, that needs Embree: pip install "echousd[render]"', err=True)
+            return
+        if thing.visible < ANCHORED:
+            what = f"{thing.visible} visible texels, fewer than {ANCHORED}: SceneTex gives it no style of its own"
+            say(f"{thing.name}: {what}", err=True)

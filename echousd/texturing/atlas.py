@@ -1,0 +1,150 @@
+"""Texture coordinates without overlaps in the unit square (xatlas), for one object or for all in one picture."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Mesh = tuple[np.ndarray, np.ndarray]
+PADDING = 4  # texels between charts
+DIGITS = 7  # of a texture coordinate in a job's files
+
+
+@dataclass(frozen=True, eq=False)
+class Unwrapped:
+    """Triangles with texture coordinates, vertices split at seams.
+
+    Arguments:
+        points: (v, 3) float, metres. st: (v, 2) float in [0, 1], `DIGITS` digits. faces: (t, 3) int, in the order of
+            the triangles that were unwrapped.
+    """
+
+    points: np.ndarray
+    st: np.ndarray
+    faces: np.ndarray
+
+    @property
+    def corners(self) -> np.ndarray:
+        """(t, 3, 2) float, the texture coordinates of each triangle."""
+        return self.st[self.faces]
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(t, 3, 3) float, metres."""
+        return self.points[self.faces]
+
+
+def unwrap(objects: Sequence[Sequence[Mesh]], resolution: int, padding: int = PADDING) -> list[Unwrapped]:
+    """Lay objects out in one picture, charts apart from each other.
+
+    Arguments:
+        objects: for every object its meshes: (t, 3, 3) float corners of triangles, metres, and (t, 3) int vertices.
+        resolution: texels along the picture's sides, roughly: charts may fill a part of it.
+        padding: texels between charts.
+
+    Raises ValueError where xatlas is not installed.
+    """
+    try:
+        import xatlas
+    except ImportError as error:
+        raise ValueError(f'texture jobs need xatlas ({error}): pip install "echousd[texture]"') from None
+    atlas = xatlas.Atlas()
+    boards = [_boards(meshes) for meshes in objects]
+    for board in (board for pieces in boards for board in pieces):
+        # In centimetres: xatlas leaves out triangles of less than 1e-7 square units.
+        atlas.add_mesh((100 * board.points).astype(np.float32), board.faces.astype(np.uint32))
+    pack = xatlas.PackOptions()
+    pack.resolution, pack.padding, pack.bilinear = resolution, padding, True
+    atlas.generate(pack_options=pack)
+    # Charts lie on texels of a picture that is seldom square; the square one has its longer side.
+    width, height = max(atlas.width, 1), max(atlas.height, 1)
+    scale = np.array([width, height]) / max(width, height)
+    out, number = [], 0
+    for pieces in boards:
+        points, st, count = [], [], 0
+        faces = np.zeros((sum(len(board.faces) for board in pieces), 3), int)
+        for board in pieces:
+            origin, index, laid = atlas[number]  # xatlas keeps the order of the faces
+            points.append(board.points[np.asarray(origin, int)])
+            st.append(np.clip(np.round(np.asarray(laid, float) * scale, DIGITS), 0.0, 1.0))
+            faces[board.triangles] = np.asarray(index, int).reshape(-1, 3) + count
+            count, number = count + len(points[-1]), number + 1
+        out.append(Unwrapped(np.concatenate(points), np.concatenate(st), faces))
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Board:
+    """A connected part of an object: (v, 3) points, (f, 3) faces, and (f,) which triangles of the object they are."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    triangles: np.ndarray
+
+
+def _boards(meshes: Sequence[Mesh]) -> list[_Board]:
+    """The connected parts of an object; xatlas would join what touches, and lay one over the other."""
+    out, before = [], 0
+    for corners, vertices in meshes:
+        flat = vertices.reshape(-1)
+        _, first, index = np.unique(flat, return_index=True, return_inverse=True)
+        faces = index.reshape(-1, 3)
+        pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
+        links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(first), len(first)))
+        label = connected_components(links, directed=False)[1][faces[:, 0]]
+        for board in np.unique(label):
+            own = np.flatnonzero(label == board)
+            used, local = np.unique(faces[own].ravel(), return_inverse=True)
+            points = corners.reshape(-1, 3)[first[used]]
+            out.append(_Board(points, local.reshape(-1, 3), own + before))
+        before += len(vertices)
+    return out
+
+
+def layout_digest(st: np.ndarray) -> str:
+    """Digest of texture coordinates, (t, 3, 2) float, to `DIGITS` digits."""
+    whole = np.rint(np.asarray(st, float) * 10**DIGITS).astype("<i8")
+    return hashlib.blake2b(np.ascontiguousarray(whole).tobytes(), digest_size=16).hexdigest()
+
+
+def texels(st: np.ndarray, resolution: int) -> float:
+    """How many texels of a square picture triangles cover, (t, 3, 2) float."""
+    a, b = st[:, 1] - st[:, 0], st[:, 2] - st[:, 0]
+    return float(np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2) * resolution**2
+
+
+def texel_faces(st: np.ndarray, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The texels whose centres lie in triangles (t, 3, 2): (n,) triangle, (n, 3) barycentric, (n, 2) int row, column.
+
+    A texel that several triangles cover comes several times. Row 0 is the upper edge of the picture, t = 1.
+    """
+    corners = st * resolution - 0.5  # in texels, centres at whole numbers
+    low = np.maximum(np.ceil(corners.min(1) - 1e-6), 0).astype(int)
+    high = np.minimum(np.floor(corners.max(1) + 1e-6), resolution - 1).astype(int)
+    span = np.maximum(high - low + 1, 0)
+    count = span.prod(1)
+    face = np.repeat(np.arange(len(st)), count)
+    step = np.arange(len(face)) - np.repeat(np.cumsum(count) - count, count)
+    column = low[face, 0] + step % np.maximum(span[face, 0], 1)
+    row = low[face, 1] + step // np.maximum(span[face, 0], 1)
+    bary = barycentric(corners[face], np.stack([column, row], 1))
+    inside = (bary >= -1e-9).all(1)
+    place = np.stack([resolution - 1 - row[inside], column[inside]], 1)
+    return face[inside], bary[inside], place
+
+
+def barycentric(triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n, 3) float, barycentric coordinates of points (n, 2) in triangles (n, 3, 2); -1 where there is no area."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    u, v, w = b - a, c - a, points - a
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    safe = np.where(np.abs(area) > 1e-12, area, 1.0)
+    second = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / safe
+    third = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / safe
+    out = np.stack([1 - second - third, second, third], 1)
+    return np.where(np.abs(area)[:, None] > 1e-12, out, -1.0)

@@ -1,0 +1,174 @@
+"""A painted job brought back into its room: files checked, then written as one step."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Sdf
+
+from echousd.room import folder as folders
+from echousd.room import ownership, paintings
+from echousd.room.lock import locked
+from echousd.room.manifest import find_manifest
+from echousd.room.save import write_preview
+from echousd.stage.files import layer_bytes, open_stage
+from echousd.stage.values import reading
+from echousd.surfaces import Surfaces, read_surfaces
+from echousd.texturing.job import Job, read_job
+from echousd.texturing.painted import look_files
+from echousd.texturing.results import read_results
+
+NAME = re.compile(r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")
+ROOTS = (".usda", ".usd", ".usdc")
+
+
+@dataclass(frozen=True)
+class ImportedLook:
+    """What an import did.
+
+    Arguments:
+        name: of the look, a variant of `looks` on the room. layer: its file.
+        painted: names of the objects that have a picture now. unpainted: those of the job without a result.
+        skipped: those that were left out as asked.
+    """
+
+    name: str
+    layer: Path
+    painted: tuple[str, ...]
+    unpainted: tuple[str, ...]
+    skipped: tuple[str, ...]
+
+
+def import_look(
+    room: str | Path,
+    job: str | Path,
+    *,
+    name: str = "",
+    skip: tuple[str, ...] = (),
+    preview: bool = True,
+    force: bool = False,
+    wait: bool = False,
+) -> ImportedLook:
+    """Bring what a texturing tool made of a job back as a look of the room.
+
+    Written are `looks/<name>.usda`, the room's strongest sublayer from then on, and beside it the pictures and the
+    texture coordinates `st_<name>`; the variant set `looks` on the room has `made` (as it was) and `<name>`.
+
+    Arguments:
+        room: root layer of the room that the job was made of. job: the job's folder.
+        name: of the look, "" = the tool's.
+        skip: names of objects that keep their look.
+        preview: draw the room's picture anew.
+        force: replace a look of that name.
+        wait: for another process that writes the folder, else raise.
+
+    Raises ValueError, nothing written, for results that are missing or cannot be used, for a name that is taken, and
+    for objects that are not what they were when the job was made, by their names.
+    """
+    room, folder = Path(room), Path(job)
+    if room.suffix not in ROOTS:
+        raise ValueError(f"{room}: allowed: a room's root layer, {', '.join(ROOTS)}")
+    task = read_job(folder)
+    name = name or task.tool
+    if not NAME.match(name) or name == paintings.MADE:
+        raise ValueError(
+            f"name is {name!r:.80}, allowed: letters, digits and _, not beginning with a digit, not {paintings.MADE!r}"
+        )
+    top = room.parent
+    with locked(top, wait=wait):
+        folders.recover(top)
+        layer = f"{paintings.FOLDER}/{name}.usda"
+        if (top / layer).exists() and not force:
+            raise ValueError(f"{top / layer}: exists; choose another --name or use --force")
+        stage = open_stage(room)
+        with reading(stage):
+            surfaces = read_surfaces(stage, dressing=task.dressing)
+            _compare(task, surfaces, skip)
+            results = read_results(folder, task)
+            for word in skip:
+                results.objects.pop(word, None)
+            if not results.objects:
+                raise ValueError(f"{folder}: every object with a result is left out (--skip); nothing to import")
+            files = look_files(stage, surfaces, results, name, task.tool, task.dressing)
+        shared = {path for thing in surfaces.objects for piece in thing.pieces for path in piece.instances}
+        files |= _attached(room, layer, shared)
+        order = [f"{paintings.FOLDER}/{name}/st.usdc", layer, paintings.UNFIT, room.name, f"{room.stem}.json"]
+        changed = folders.write_together(top, files, last=[path for path in order if path in files], remove=[])
+        for loaded in filter(None, (Sdf.Layer.Find(str(top / path)) for path in changed)):
+            loaded.Reload()  # this process holds it open, as it was before
+        if preview and find_manifest(top, room.stem):
+            write_preview(room)
+    names = [thing.name for thing in task.objects]
+    painted = tuple(word for word in names if word in results.objects)
+    unpainted = tuple(word for word in names if word not in results.objects and word not in skip)
+    return ImportedLook(name, top / layer, painted, unpainted, tuple(skip))
+
+
+def _compare(job: Job, surfaces: Surfaces, skip: tuple[str, ...]) -> None:
+    """Raises ValueError that names every object of the job that the room does not hold as it was."""
+    names = {thing.name for thing in job.objects}
+    unknown = [word for word in skip if word not in names]
+    if unknown:
+        raise ValueError(f"--skip names {', '.join(unknown)}, allowed: {', '.join(sorted(names))}")
+    now = {thing.name: thing for thing in surfaces.objects}
+    gone = [thing.name for thing in job.objects if thing.name not in now and thing.name not in skip]
+    changed = [
+        thing.name
+        for thing in job.objects
+        if thing.name in now
+        and thing.name not in skip
+        and (now[thing.name].topology != thing.topology or now[thing.name].path != thing.path)
+    ]
+    told = [f"{', '.join(words)} {what}" for words, what in ((gone, "is gone"), (changed, "has other meshes")) if words]
+    if told:
+        raise ValueError(
+            f"not the room that the job was made of: {' and '.join(told)}; export again, or leave out with --skip"
+        )
+
+
+def _attached(room: Path, layer: str, shared: set[str]) -> dict[str, bytes]:
+    """The root layer with the look as its strongest sublayer; the manifest, which knows the root as ours if it was."""
+    top, out = room.parent, dict[str, bytes]()
+    current = ownership.read(top, room.name)
+    root = Sdf.Layer.OpenAsAnonymous(str(room))
+    mine = f"./{layer}"
+    root.subLayerPaths = [mine, *(path for path in root.subLayerPaths if path != mine)]
+    for path in shared:
+        over = root.GetPrimAtPath(path)
+        if over and over.HasInfo("instanceable"):
+            over.instanceable = False  # a root layer's own opinion is stronger than the look's
+    binary = (current or b"").startswith(b"PXR-USDC")
+    fresh = layer_bytes(root, ".usdc" if binary else ".usda")
+    out[room.name] = fresh
+    manifest = find_manifest(top, room.stem)
+    listing = f"{room.stem}.json"
+    if manifest and manifest["name"] == room.stem and current is not None:
+        owned = dict(manifest["files"])
+        if owned.get(room.name) == folders.digest(current):
+            owned[room.name] = folders.digest(fresh)
+        unfit = ownership.read(top, paintings.UNFIT)
+        if unfit is not None and owned.get(paintings.UNFIT) == folders.digest(unfit):
+            out[paintings.UNFIT] = _fitting_again(unfit, layer)
+            owned[paintings.UNFIT] = folders.digest(out[paintings.UNFIT])
+        content = json.loads((top / listing).read_bytes())
+        out[listing] = (json.dumps({**content, "files": dict(sorted(owned.items()))}, indent=1) + "\n").encode()
+    return out
+
+
+def _fitting_again(unfit: bytes, layer: str) -> bytes:
+    """The layer of what fits no longer without what it says of a look that is imported anew."""
+    found = Sdf.Layer.CreateAnonymous(".usda")
+    found.ImportFromString(unfit.decode("utf-8"))
+    name = Path(layer).stem
+    paths: list[Sdf.Path] = []
+    found.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    mine = (f"material:binding:collection:{name}", f"primvars:{paintings.primvar(name)}")
+    for path in paths:
+        if path.IsPropertyPath() and path.name.removesuffix(":indices") in mine:
+            prim = found.GetPrimAtPath(path.GetPrimPath())
+            if prim and path.name in prim.properties:
+                del prim.properties[path.name]
+    return layer_bytes(found, ".usda")

@@ -1,0 +1,234 @@
+"""A room as a job for a texturing tool."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+from pxr import Usd, UsdGeom
+
+from echousd.stage.contents import room_frame
+from echousd.stage.files import open_stage
+from echousd.stage.layouts import showing_layout
+from echousd.stage.read import the_room
+from echousd.stage.values import reading
+from echousd.surfaces import Painted, Surfaces, read_surfaces
+from echousd.texturing import scenetex
+from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
+from echousd.texturing.glb import glb_bytes
+from echousd.texturing.job import JOB, RESULTS, TOOLS, Job, job_bytes
+from echousd.texturing.obj import obj_bytes
+from echousd.texturing.painters import SCRIPTS
+from echousd.texturing.prompts import object_prompt, room_prompt
+from echousd.texturing.viewpoints import FIELDS, SEEN_FROM, SPHERE, free_point, sphere_cameras, visible_shares
+
+RESOLUTION = 2048  # of a picture of one object
+IMAGE = 512  # pixels of an object's picture
+LEVELS = (-20.0, 0.0, 20.0)  # elevations of the job's cameras, degrees
+
+
+def export_job(
+    room: str | Path,
+    out: str | Path,
+    tool: str,
+    *,
+    prompt: str = "",
+    dressing: str = "none",
+    resolution: int | None = None,
+    layout: int | None = None,
+    force: bool = False,
+) -> Job:
+    """Write a room as a job for a texturing tool: meshes with texture coordinates, cameras, prompts and `job.json`.
+
+    Arguments:
+        room: root layer of a room.
+        out: the job's folder.
+        tool: `scenetex` (the whole room, one picture of 4096), `hunyuan`, `mvpainter` (object by object, with pictures
+            of them) or `generic` (object by object).
+        prompt: words for the whole room, "" = from its graph.
+        dressing: small things: `none` of them, `grouped` as one object, or `each`.
+        resolution: texels along a picture of one object; SceneTex's is 4096.
+        layout: number of the layout, None = the one that the room shows.
+        force: replace a job that lies there.
+
+    Raises ValueError for another tool, a folder in the way, a room that does not open, and where xatlas (for pictures:
+    Embree) is not installed; nothing is written then. The job says in `left_out` what cannot be painted, and why.
+    """
+    out = Path(out)
+    if tool not in TOOLS:
+        raise ValueError(f"tool is {tool!r}, allowed: {', '.join(TOOLS)}")
+    if resolution is not None and not 64 <= resolution <= 8192:
+        raise ValueError(f"resolution is {resolution} texels, allowed: 64 to 8192")
+    if tool == "scenetex" and resolution not in (None, scenetex.RESOLUTION):
+        raise ValueError(f"resolution is {resolution} texels, allowed for scenetex: {scenetex.RESOLUTION}")
+    _check_free(out, force)
+    stage = open_stage(room)
+    with showing_layout(stage, layout), reading(stage):
+        surfaces = read_surfaces(stage, dressing=dressing)
+        job, files = _made(stage, surfaces, tool, prompt, dressing, resolution)
+    _write_folder(out, {**files, JOB: job_bytes(job)})
+    return job
+
+
+def _made(
+    stage: Usd.Stage, surfaces: Surfaces, tool: str, prompt: str, dressing: str, resolution: int | None
+) -> tuple[Job, dict[str, bytes]]:
+    """The job and its files."""
+    together = tool == "scenetex"
+    texture = scenetex.RESOLUTION if together else resolution or RESOLUTION
+    frames = {thing.name: np.eye(4) if together else _frame(stage, thing) for thing in surfaces.objects}
+    meshes = [[(_moved(p.world, frames[thing.name]), p.vertices) for p in thing.pieces] for thing in surfaces.objects]
+    laid = unwrap(meshes, texture) if together else [unwrap([each], texture)[0] for each in meshes]
+    kept, left = _whole(surfaces, laid)
+    objects, laid = [surfaces.objects[number] for number in kept], [laid[number] for number in kept]
+    if not objects:
+        raise ValueError(f"nothing to paint; {'; '.join(f'{name}: {why}' for name, why in left.items())}")
+    at, space = free_point(surfaces)
+    distance = min(SPHERE, max(space - 0.05, 0.05))
+    around = sphere_cameras(at, distance, SEEN_FROM // len(LEVELS), LEVELS, FIELDS[1])
+    shares = visible_shares(objects, laid, around)
+    words, every = prompt or room_prompt(surfaces), [object_prompt(thing, surfaces) for thing in objects]
+    files: dict[str, bytes] = {}
+    name = Path(stage.GetRootLayer().realPath or "room").stem
+    if together:
+        files |= scenetex.scenetex_files(name, words, every, objects, laid, at, distance)
+    entries = []
+    for number, (thing, mesh) in enumerate(zip(objects, laid, strict=True)):
+        path = scenetex.mesh_path(number, thing, name) if together else f"meshes/{thing.name}.obj"
+        files[path] = obj_bytes(mesh, thing.name)
+        image = ""
+        if tool in SCRIPTS:
+            image = f"imgs/{thing.name}.png"
+            files[f"glbs/{thing.name}.glb"], files[image] = glb_bytes(mesh, thing.name), _picture(stage, thing)
+        covered = int(texels(mesh.corners, texture))
+        entries.append({
+            "name": thing.name, "path": thing.path, "kind": thing.kind, "category": thing.category,
+            "style": thing.style, "prompt": every[number], "mesh": path, "image": image,
+            "triangles": len(mesh.faces), "topology": thing.topology, "layout": layout_digest(mesh.corners),
+            "texels": covered, "visible": None if shares is None else int(shares[number] * covered),
+            "to_room": np.linalg.inv(frames[thing.name]).round(6).tolist(),
+        })  # fmt: skip
+    if tool in SCRIPTS:
+        files["run.sh"] = SCRIPTS[tool].encode()
+    files[f"{RESULTS}/README.txt"] = _expected(tool).encode()
+    cameras = [asdict(camera) for camera in around]
+    job = Job.model_validate({
+        "tool": tool, "room": name, "palette": surfaces.palette, "prompt": words, "resolution": texture,
+        "one_picture": together, "dressing": dressing, "cameras": cameras, "objects": entries, "left_out": left,
+    })  # fmt: skip
+    return job, files
+
+
+def _whole(surfaces: Surfaces, laid: Sequence[Unwrapped]) -> tuple[list[int], dict[str, str]]:
+    """Numbers of the objects that can be painted, and why others cannot.
+
+    A polygon whose triangles were cut apart has two texture coordinates at one corner, which no primvar can hold.
+    """
+    kept, left = [], dict(surfaces.left_out)
+    for number, (thing, mesh) in enumerate(zip(surfaces.objects, laid, strict=True)):
+        start = cut = 0
+        for piece in thing.pieces:
+            st = mesh.corners[start : start + len(piece.corners)].reshape(-1, 2)
+            start += len(piece.corners)
+            corner = piece.corners.reshape(-1)
+            first = np.zeros((piece.size, 2))
+            first[corner[::-1]] = st[::-1]
+            cut += int((np.abs(first[corner] - st).max(1) > 1e-6).any())
+        if cut:
+            left[thing.name] = "has polygons that a seam cuts, triangulate its meshes"
+        else:
+            kept.append(number)
+    return kept, left
+
+
+def _frame(stage: Usd.Stage, thing: Painted) -> np.ndarray:
+    """(4, 4) float, the room to the object's frame: its box's bottom centre, its front along +Z."""
+    corners = thing.triangles.reshape(-1, 3)
+    yaw = 0.0
+    if thing.kind == "things":
+        room, cache = the_room(stage, None).room, UsdGeom.XformCache()
+        own = room_frame(room, cache) @ np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(thing.path))).T
+        front = own[:3, :3] @ (0.0, 0.0, 1.0)
+        yaw = float(np.arctan2(front[0], front[2])) if np.hypot(front[0], front[2]) > 1e-3 else 0.0
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    turned = corners @ turn.T
+    low, high = turned.min(0), turned.max(0)
+    out = np.eye(4)
+    out[:3, :3], out[:3, 3] = turn, -np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    return out
+
+
+def _moved(triangles: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    return np.asarray(triangles @ frame[:3, :3].T + frame[:3, 3])
+
+
+def _picture(stage: Usd.Stage, thing: Painted) -> bytes:
+    """PNG of the object alone, as it looks now."""
+    from echousd.render import render_stage
+
+    mask = Usd.StagePopulationMask([thing.path])
+    alone = Usd.Stage.OpenMasked(stage.GetRootLayer(), stage.GetSessionLayer(), mask)
+    alone.ExpandPopulationMask()
+    for prim in alone.GetPrimAtPath(thing.path).GetParent().GetAllChildren():
+        if str(prim.GetPath()) != thing.path:
+            prim.SetActive(False)
+    out = io.BytesIO()
+    render_stage(alone, size=IMAGE, rays=1).save(out, "PNG")
+    return out.getvalue()
+
+
+def _expected(tool: str) -> str:
+    """What belongs into the folder of results."""
+    one = "scene.png, one picture of 4096 x 4096 (what is found below outputs/ will do, the highest step)"
+    many = (
+        "<object>.glb with the same triangles, its own texture coordinates and one base colour image; or <object>.png "
+        "(.jpg) laid out as meshes/<object>.obj is, and <object>_metal_rough.png (roughness in green, metal in blue), "
+        "<object>_normal.png if there are any; or <object>.obj beside them with other texture coordinates. Objects "
+        "without a result keep their look."
+    )
+    return (one if tool == "scenetex" else many) + "\n"
+
+
+def _check_free(out: Path, force: bool) -> None:
+    if out.exists() and not out.is_dir():
+        raise ValueError(f"{out}: is a file, the job must be a folder")
+    if out.is_dir() and any(out.iterdir()):
+        ours = (out / JOB).is_file()
+        if not (ours and force):
+            more = "use --force to replace it, results included" if ours else "choose another folder"
+            raise ValueError(f"{out}: holds {'a job' if ours else 'other things'} already; {more}")
+
+
+def _write_folder(out: Path, files: dict[str, bytes]) -> None:
+    """The folder appears whole; raises ValueError where it cannot be written."""
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        beside = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+        try:
+            for path, content in files.items():
+                place = beside / path
+                place.parent.mkdir(parents=True, exist_ok=True)
+                place.write_bytes(content)
+                if place.suffix == ".sh":
+                    place.chmod(0o755)
+            beside.chmod(0o777 & ~_umask())
+            if out.is_dir():
+                shutil.rmtree(out)
+            beside.replace(out)
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
+    except OSError as error:
+        raise ValueError(f"{out}: cannot be written ({error.strerror or error}); nothing was changed") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

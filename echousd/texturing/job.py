@@ -1,0 +1,134 @@
+"""A texture job on disk: its `job.json`, read back with doubt, as it may have been to other machines."""
+
+from __future__ import annotations
+
+import json
+import stat
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from echousd.room.within import inside
+from echousd.texturing.atlas import Unwrapped, layout_digest
+from echousd.texturing.obj import read_obj
+
+TOOLS = ("scenetex", "hunyuan", "mvpainter", "generic")
+JOB = "job.json"
+LARGEST = 32 * 2**20  # bytes of a job.json
+RESULTS = "results"
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=200)]
+Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
+Row = tuple[float, float, float, float]
+
+
+class JobCamera(BaseModel):
+    """A camera: name, camera to world as rows (it looks along its -Z, +Y up, metres), field of view in degrees."""
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    matrix: tuple[Row, Row, Row, Row]
+    fov: float
+
+
+class JobObject(BaseModel):
+    """One object of a job.
+
+    Arguments:
+        name, path, kind, category, style: see `Painted`. prompt: words for it.
+        mesh: its OBJ in the job. image: a picture of it there, "" without one.
+        triangles: of the mesh. topology, layout: digests of the room's meshes and of the texture coordinates.
+        texels: of its picture that it covers. visible: how many of them a camera sees, None = not counted.
+        to_room: (4, 4) rows, the mesh's frame to the room's, metres.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    name: Name
+    path: str
+    kind: Literal["stuff", "things"]
+    category: str
+    style: str
+    prompt: str
+    mesh: str
+    image: str = ""
+    triangles: Annotated[int, Field(gt=0)]
+    topology: Digest
+    layout: Digest
+    texels: int
+    visible: int | None = None
+    to_room: tuple[Row, Row, Row, Row]
+
+
+class Job(BaseModel):
+    """What `job.json` holds.
+
+    Arguments:
+        tool: whom it is for. room, palette, prompt: what is painted.
+        resolution: texels along a picture. one_picture: all objects share one.
+        dressing: what was asked for of the small things.
+        cameras: in order. objects: stuff first, in order. left_out: name -> why it is not in the job.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    echousd_texture_job: Literal[1] = 1
+    tool: Literal["scenetex", "hunyuan", "mvpainter", "generic"]
+    room: str
+    palette: str
+    prompt: str
+    resolution: Annotated[int, Field(ge=64, le=16384)]
+    one_picture: bool
+    dressing: Literal["none", "grouped", "each"]
+    cameras: tuple[JobCamera, ...]
+    objects: Annotated[tuple[JobObject, ...], Field(min_length=1)]
+    left_out: dict[str, str] = {}
+
+
+def read_job(folder: Path) -> Job:
+    """The job in a folder; raises ValueError that names the file and the field."""
+    path = folder / JOB
+    try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode) or found.st_size > LARGEST:
+            raise ValueError(f"{path}: not a regular file of at most {LARGEST} bytes, allowed: a job of texture export")
+        job = Job.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise ValueError(
+            f"{path}: cannot be read ({error.strerror or error}), allowed: the folder of texture export"
+        ) from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise ValueError(f"{path}: {where}: {first['msg']}, found {first['input']!r:.80}") from None
+    for thing in job.objects:
+        inside(folder, thing.mesh, f"{path}: objects.{thing.name}.mesh")
+    names = [thing.name for thing in job.objects]
+    twice = next((name for name in names if names.count(name) > 1), "")
+    if twice:
+        raise ValueError(f"{path}: objects: {twice!r} comes twice, allowed: each name once")
+    return job
+
+
+def job_bytes(job: Job) -> bytes:
+    """The `job.json` of a job."""
+    return (json.dumps(job.model_dump(), indent=1) + "\n").encode()
+
+
+def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:
+    """The mesh that a job gave out; raises ValueError, with the object's name, for one that was changed since."""
+    path = inside(folder, thing.mesh, f"{folder / JOB}: objects.{thing.name}.mesh")
+    mesh = read_obj(path)
+    if len(mesh.faces) != thing.triangles:
+        raise ValueError(
+            f"object {thing.name!r}: {path} has {len(mesh.faces)} triangles, {thing.triangles} were exported; "
+            f"put what a tool changed into {RESULTS}/"
+        )
+    if layout_digest(mesh.corners) != thing.layout:
+        raise ValueError(
+            f"object {thing.name!r}: {path} has other texture coordinates than were exported; put what a tool changed "
+            f"into {RESULTS}/"
+        )
+    return mesh

@@ -1,0 +1,170 @@
+"""What a tool made of a job: for every object its picture, and its texture coordinates where the tool made its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from echousd.room.within import check_links
+from echousd.textures import TextureError, decoded, texture_bytes
+from echousd.texturing.atlas import Unwrapped
+from echousd.texturing.glb import read_glb
+from echousd.texturing.job import JOB, RESULTS, Job, JobObject, job_mesh
+from echousd.texturing.matching import texture_coordinates
+from echousd.texturing.obj import read_obj
+from echousd.texturing.scenetex import OUTPUTS
+
+IMAGES = (".png", ".jpg", ".jpeg")
+STEP = re.compile(r"^texture_(\d{1,9})\.png$")
+SCENE = "scene"
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came back for one object.
+
+    Arguments:
+        st: (t, 3, 2) float, where the job's triangles lie in the pictures.
+        images: `color`, perhaps `metal_rough` and `normal` -> name of a picture in `Results.pictures`.
+    """
+
+    st: np.ndarray
+    images: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What came back: object name -> result, and name of a picture (with its ending) -> encoded image."""
+
+    objects: dict[str, Result]
+    pictures: Mapping[str, bytes]
+
+
+def read_results(folder: Path, job: Job) -> Results:
+    """The results in a job's folder; objects without one are left out.
+
+    Raises ValueError that names the file or the object for results that cannot be used, and where there are none.
+    """
+    found = _one_picture(folder, job) if job.one_picture else _many_pictures(folder, job)
+    if not found.objects:
+        place = (
+            f"{RESULTS}/scene.png or {OUTPUTS}/*/vsd/*/texture_<step>.png"
+            if job.one_picture
+            else (f"{RESULTS}/<object>.glb or {RESULTS}/<object>.png")
+        )
+        raise ValueError(f"{folder}: no results, expected {place}; paint the job first (see {folder / JOB})")
+    return found
+
+
+def _one_picture(folder: Path, job: Job) -> Results:
+    """SceneTex: a picture of everything."""
+    picture = _beside(folder, f"{RESULTS}/{SCENE}", IMAGES) or _last_step(folder)
+    if picture is None:
+        return Results({}, {})
+    name, content = image_of(texture_bytes(str(picture)) or b"", str(picture), SCENE)
+    objects = {}
+    for number, thing in enumerate(job.objects):
+        given = job_mesh(folder, thing)
+        own = picture.parent / "meshes" / thing.kind / f"{number}_{thing.name}.obj"
+        st = given.corners
+        if own.is_file():
+            check_links(folder, own, f"object {thing.name!r}")
+            back = read_obj(own)
+            st = _aligned(given, back, thing)
+        # Its pictures' first and last texels lie on the borders 0 and 1, and not half a texel inside.
+        objects[thing.name] = Result((st * (job.resolution - 1) + 0.5) / job.resolution, {"color": name})
+    return Results(objects, {name: content})
+
+
+def _aligned(given: Unwrapped, back: Unwrapped, thing: JobObject) -> np.ndarray:
+    """Texture coordinates of a mesh that came back, face by face where the order is the same."""
+    if len(given.faces) == len(back.faces) and np.abs(given.triangles - back.triangles).max() < 1e-4:
+        return np.clip(back.corners, 0.0, 1.0)
+    return texture_coordinates(given, back, thing.name)
+
+
+def _many_pictures(folder: Path, job: Job) -> Results:
+    objects: dict[str, Result] = {}
+    pictures: dict[str, bytes] = {}
+    for thing in job.objects:
+        mesh = _beside(folder, f"{RESULTS}/{thing.name}", (".glb",)) or _beside(
+            folder, f"{RESULTS}/glbs/{thing.name}", (".glb",)
+        )
+        if mesh is not None:
+            painted = read_glb(mesh)
+            if "color" not in painted.images:
+                raise ValueError(f"object {thing.name!r}: {mesh} has no base colour image")
+            st, raw = _aligned(job_mesh(folder, thing), painted.mesh, thing), dict(painted.images)
+            source = str(mesh)
+        else:
+            picture = _beside(folder, f"{RESULTS}/{thing.name}", IMAGES)
+            if picture is None:
+                continue
+            own = _beside(folder, f"{RESULTS}/{thing.name}", (".obj",))
+            given = job_mesh(folder, thing)
+            st = given.corners if own is None else _aligned(given, read_obj(own), thing)
+            raw, source = {"color": texture_bytes(str(picture)) or b""}, str(picture)
+            for slot in ("metal_rough", "normal"):
+                more = _beside(folder, f"{RESULTS}/{thing.name}_{slot}", IMAGES)
+                if more is not None:
+                    raw[slot] = texture_bytes(str(more)) or b""
+        images = {}
+        for slot, content in raw.items():
+            stem = thing.name if slot == "color" else f"{thing.name}_{slot}"
+            images[slot], encoded = image_of(content, f"{source} ({slot})", stem)
+            pictures[images[slot]] = encoded
+        objects[thing.name] = Result(st, images)
+    return Results(objects, pictures)
+
+
+def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:
+    """Name and bytes of a picture that was read with doubt: PNG and JPEG as they are, others as PNG.
+
+    Raises TextureError, which calls it `where`, for what is no image or too large.
+    """
+    import io
+
+    from PIL import Image
+
+    if not content:
+        raise TextureError(f"{where}: an empty file, allowed: an image")
+    pixels = decoded(content, where)
+    if content.startswith(b"\x89PNG\r\n\x1a\n"):
+        return f"{stem}.png", content
+    if content.startswith(b"\xff\xd8"):
+        return f"{stem}.jpg", content
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "PNG")
+    return f"{stem}.png", out.getvalue()
+
+
+def _beside(folder: Path, stem: str, endings: tuple[str, ...]) -> Path | None:
+    """The first file of a name in the job, links inside it only."""
+    for ending in endings:
+        path = folder / f"{stem}{ending}"
+        if path.is_symlink() or path.exists():
+            check_links(folder, path, f"{folder}: {stem}{ending}")
+            if not path.is_file():
+                raise ValueError(f"{path}: not a regular file, allowed: a result of the tool")
+            return path
+    return None
+
+
+def _last_step(folder: Path) -> Path | None:
+    """The picture of the highest step of any run, of the run that was written to last among equals."""
+    found = []
+    for path in _steps(folder):
+        step = STEP.match(path.name)
+        if step and path.is_file():
+            check_links(folder, path, f"{folder}: {path.relative_to(folder)}")
+            found.append((int(step[1]), path.stat().st_mtime, str(path)))
+    return Path(max(found)[2]) if found else None
+
+
+def _steps(folder: Path) -> Iterator[Path]:
+    yield from (folder / OUTPUTS).glob("*/vsd/*/texture_*.png")
+    yield from (folder / RESULTS).glob("texture_*.png")

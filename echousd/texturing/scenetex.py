@@ -1,0 +1,117 @@
+"""What SceneTex reads of a job: cameras, meshes of stuff and things, its own parametrisation, a script to run it."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import yaml
+
+from echousd.surfaces import Painted
+from echousd.texturing.atlas import Unwrapped
+from echousd.texturing.obj import obj_bytes
+from echousd.texturing.viewpoints import AZIMUTHS, ELEVATIONS, FIELDS
+
+RESOLUTION = 4096
+ANCHORED = 512  # visible texels that an object needs, or it loses its style
+STAMP = "echousd"
+OUTPUTS = "outputs"
+
+
+def scene_id(room: str) -> str:
+    """Name of the scene below `data/scenes`."""
+    return f"{room}/room"
+
+
+def mesh_path(number: int, thing: Painted, room: str) -> str:
+    """Path of an object's OBJ in the job, which is its path in SceneTex's folder too."""
+    return f"data/scenes/{scene_id(room)}/meshes/{thing.kind}/{number}_{thing.name}.obj"
+
+
+def run_folder(prompt: str) -> str:
+    """Where SceneTex writes a run of ours, in the job."""
+    return f"{OUTPUTS}/{'_'.join(prompt.split(' '))}/vsd/{STAMP}"
+
+
+def scenetex_files(
+    room: str, prompt: str, prompts: Sequence[str], objects: Sequence[Painted], laid: Sequence[Unwrapped],
+    at: np.ndarray, distance: float,
+) -> dict[str, bytes]:  # fmt: skip
+    """Path in the job -> content, of everything but `job.json`.
+
+    Arguments:
+        room, prompt: of the job. prompts: of the objects. objects: stuff first. laid: them in one picture.
+        at: (3,) float, the point that cameras look through. distance: of the cameras from it, metres.
+    """
+    scene = f"data/scenes/{scene_id(room)}"
+    config, seeded = {}, {}
+    files: dict[str, bytes] = {f"{scene}/cameras/sphere.yaml": _sphere(at, distance)}
+    run = f"{run_folder(prompt)}/meshes"
+    for number, (thing, mesh, words) in enumerate(zip(objects, laid, prompts, strict=True)):
+        path = mesh_path(number, thing, room)
+        entry = {"name": thing.name, "type": thing.kind, "path": path, "prompt": words}
+        config[str(number)] = entry
+        seeded[str(number)] = {**entry, "num_vertices": len(mesh.points)}
+        files[path] = obj_bytes(mesh, thing.name)
+        files[f"{run}/{thing.kind}/{number}_{thing.name}.obj"] = obj_bytes(mesh, thing.name, material=False)
+    files[f"{scene}/meshes/scene_config.json"] = _json(config)
+    files[f"{run}/scene_config.json"] = _json(seeded)
+    files[f"{run}/scene.obj"] = obj_bytes(_joined(laid), "scene", material=False)
+    files["run.sh"] = _script(room, prompt)
+    return files
+
+
+def _joined(laid: Sequence[Unwrapped]) -> Unwrapped:
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in laid)])
+    faces = [mesh.faces + start for mesh, start in zip(laid, starts, strict=False)]
+    return Unwrapped(
+        np.concatenate([mesh.points for mesh in laid]),
+        np.concatenate([mesh.st for mesh in laid]),
+        np.concatenate(faces),
+    )
+
+
+def _sphere(at: np.ndarray, distance: float) -> bytes:
+    space = {
+        "dist": {"min": round(distance, 4), "max": round(distance, 4), "num_linspace": 1},
+        "elev": {"min": ELEVATIONS[0], "max": ELEVATIONS[1], "num_linspace": 10},
+        "azim": {"min": AZIMUTHS[0], "max": AZIMUTHS[1], "num_linspace": 100},
+        "fov": {"min": FIELDS[0], "max": FIELDS[1], "num_linspace": 5},
+        "at": [[float(v) for v in at]],
+    }
+    return yaml.safe_dump(space, sort_keys=False).encode()
+
+
+def _json(found: Mapping[str, object]) -> bytes:
+    return (json.dumps(found, indent=4) + "\n").encode()
+
+
+def _script(room: str, prompt: str) -> bytes:
+    scene, words = shlex.quote(scene_id(room)), shlex.quote(prompt)
+    top = shlex.quote(room)
+    return f"""#!/usr/bin/env bash
+# Paints this job with SceneTex (a GPU of 48 GB, its own environment; its licence is CC BY-NC-SA):
+#   SCENETEX=/path/to/SceneTex ./run.sh
+# then: echousd texture import ROOM.usda THIS_FOLDER
+set -euo pipefail
+job=$(cd "$(dirname "${{BASH_SOURCE[0]}}")" && pwd)
+cd "${{SCENETEX:?set SCENETEX to the folder of its checkout}}"
+
+# It reads scenes below its own folder.
+mkdir -p data/scenes
+ln -sfn "$job"/data/scenes/{top} data/scenes/{top}
+# The weights that it names have moved on their hub.
+sed -i 's#"runwayml/stable-diffusion-v1-5"#"stable-diffusion-v1-5/stable-diffusion-v1-5"#' models/modules/guidance.py
+# It opens a picture that its repository does not hold.
+mkdir -p samples/textures
+[ -e samples/textures/dummy.png ] || python -c "from PIL import Image as I; I.new('RGB', (64, 64)).save(
+    'samples/textures/dummy.png')"
+# It stacks as many anchors from every object: no more than the fewest visible texels that it accepts.
+sed 's/^num_anchors:.*/num_anchors: {ANCHORED}/' config/template.yaml > "$job/config.yaml"
+
+# It logs in to a service: not needed. The run's folder holds our texture coordinates already (meshes/).
+WANDB_MODE=offline python scripts/train_texture.py --config "$job/config.yaml" --stamp {STAMP} \\
+    --log_dir "$job/{OUTPUTS}" --prompt {words} --scene_id {scene}
+""".encode()

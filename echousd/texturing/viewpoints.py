@@ -1,0 +1,124 @@
+"""Cameras for a painter: a sphere of views from free space in the room, and which texels they see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+
+from echousd.surfaces import Painted, Surfaces
+from echousd.texturing.atlas import Unwrapped, texel_faces
+
+HEIGHT = 1.4  # metres, of the point that cameras look through
+SPHERE = 0.5  # metres from it
+ELEVATIONS, AZIMUTHS = (-30.0, 30.0), (-180.0, 180.0)  # degrees
+FIELDS = (45.0, 75.0)  # of view, degrees
+SEEN_FROM = 48  # cameras that texels are counted with
+SAMPLES = 1500  # points of an object
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera: (4, 4) camera to world as rows (it looks along its -Z, +Y up, metres), field of view in degrees."""
+
+    name: str
+    matrix: tuple[tuple[float, float, float, float], ...]
+    fov: float
+
+
+def free_point(surfaces: Surfaces) -> tuple[np.ndarray, float]:
+    """(3,) float, the point at `HEIGHT` that is furthest from everything, and how far that is in plan, metres."""
+    points = [thing.triangles.reshape(-1, 3) for thing in surfaces.objects if thing.kind != "stuff"]
+    floor = [t.triangles.reshape(-1, 3) for t in surfaces.objects if t.category == "floor"]
+    plan = np.concatenate(floor or points or [t.triangles.reshape(-1, 3) for t in surfaces.objects])[:, [0, 2]]
+    shape = shapely.MultiPoint(plan).convex_hull
+    corners = surfaces.graph.room.corners
+    if corners is not None and shapely.Polygon(corners).is_valid:
+        shape = shapely.Polygon(corners)
+    low_x, low_z, high_x, high_z = shape.bounds
+    grid = np.stack(np.meshgrid(np.linspace(low_x, high_x, 33), np.linspace(low_z, high_z, 33)), -1).reshape(-1, 2)
+    apart = shapely.distance(shapely.points(grid), shape.boundary)
+    apart[~shapely.contains_xy(shape, grid)] = -1.0
+    tall = np.concatenate([np.zeros((0, 2)), *(_between(cloud, HEIGHT - 0.5, HEIGHT + 0.5) for cloud in points)])
+    if len(tall):
+        apart = np.minimum(apart, cKDTree(tall).query(grid)[0])
+    best = int(apart.argmax())
+    return np.array([grid[best, 0], HEIGHT, grid[best, 1]]).round(4), float(max(apart[best], 0.05))
+
+
+def _between(corners: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Plan of points on triangles between two heights."""
+    a = corners.reshape(-1, 3, 3)
+    weights = np.array([[i, j, 6 - i - j] for i in range(7) for j in range(7 - i)]) / 6
+    points = np.einsum("kc,tcx->tkx", weights, a).reshape(-1, 3)
+    return points[(points[:, 1] > low) & (points[:, 1] < high)][:, [0, 2]]
+
+
+def sphere_cameras(
+    at: np.ndarray, distance: float, azimuths: int, elevations: Sequence[float], fov: float
+) -> list[Camera]:
+    """Cameras on a sphere around `at` that look through it, elevation by elevation; azimuth 0 stands at +Z."""
+    found: list[Camera] = []
+    for up in elevations:
+        for step in range(azimuths):
+            around = AZIMUTHS[0] + (AZIMUTHS[1] - AZIMUTHS[0]) * step / azimuths
+            e, a = np.radians(up), np.radians(around)
+            eye = at + distance * np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
+            back = (eye - at) / np.linalg.norm(eye - at)
+            right = np.cross((0.0, 1.0, 0.0), back)
+            right /= np.linalg.norm(right)
+            matrix = np.eye(4)
+            matrix[:3] = np.stack([right, np.cross(back, right), back, eye], 1)
+            rows = tuple(tuple(round(float(v), 6) + 0.0 for v in row) for row in matrix)
+            found.append(Camera(f"view_{len(found):03d}", rows, fov))  # type: ignore[arg-type]
+    return found
+
+
+def visible_shares(
+    objects: Sequence[Painted], laid: Sequence[Unwrapped], cameras: Sequence[Camera]
+) -> list[float] | None:
+    """For every object the share of its texels that a camera sees past all others; None where Embree is missing."""
+    try:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+    except ImportError:
+        return None
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, np.ascontiguousarray(np.concatenate([t.triangles for t in objects]), np.float32))
+    shares = []
+    for thing, mesh in zip(objects, laid, strict=True):
+        points, normals = _samples(thing.triangles, mesh.corners)
+        seen = np.zeros(len(points), bool)
+        for camera in cameras:
+            matrix = np.array(camera.matrix)
+            local = (points - matrix[:3, 3]) @ matrix[:3, :3]
+            half = np.tan(np.radians(camera.fov) / 2) * -local[:, 2]
+            ask = np.flatnonzero(~seen & (local[:, 2] < -0.01) & (np.abs(local[:, :2]) < half[:, None]).all(1))
+            if not len(ask):
+                continue
+            way = matrix[:3, 3] - points[ask]
+            side = np.where((way * normals[ask]).sum(1, keepdims=True) < 0, -1.0, 1.0)
+            start = points[ask] + 1e-3 * side * normals[ask]
+            distance = np.linalg.norm(way, axis=1)
+            free = scene.run(
+                np.ascontiguousarray(start, np.float32),
+                np.ascontiguousarray(way / distance[:, None], np.float32),
+                np.ascontiguousarray(distance - 2e-3, np.float32),
+                query="OCCLUDED",
+            )
+            seen[ask[free != 0]] = True
+        shares.append(float(seen.mean()) if len(seen) else 0.0)
+    return shares
+
+
+def _samples(triangles: np.ndarray, st: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points at texels of an object, evenly in its picture, and the normals there, (n, 3) float each."""
+    low, high = st.reshape(-1, 2).min(0), st.reshape(-1, 2).max(0)
+    extent = max(float((high - low).max()), 1e-9)
+    face, bary, _ = texel_faces((st - low) / extent, int(np.sqrt(3 * SAMPLES)))
+    points = np.einsum("nc,ncx->nx", bary, triangles[face])
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])[face]
+    return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -1,0 +1,213 @@
+"""Rooms out to a painter and back: every point of a surface gets its colour, through each tool's own files."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from painter import color_at, errors_in_texels, filled, in_room, paint, painted
+from pxr import UsdShade, UsdValidation
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.check import check_room
+from echousd.export import export
+from echousd.room import RoomOptions
+from echousd.room.paintings import primvar
+from echousd.stage import open_stage
+from echousd.texturing import export as texturing_export
+from echousd.texturing import export_job, import_look, scenetex
+from echousd.texturing.atlas import Unwrapped, texel_faces
+from echousd.texturing.glb import glb_bytes
+from echousd.texturing.job import job_mesh
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    """A room of parts with walls, a window and small things."""
+    data = echousd.generate("samples/study.usda", seed=3, drafts=1, options=RoomOptions(walls=True, dress="some"))
+    return data.save(tmp_path_factory.mktemp("rooms") / "study", preview=False)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    return data.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+def copied(root, tmp_path):
+    return shutil.copytree(root.parent, tmp_path / root.parent.name) / root.name
+
+
+@pytest.fixture
+def small_pictures(monkeypatch):
+    monkeypatch.setattr(scenetex, "RESOLUTION", 1024)
+
+
+@pytest.mark.parametrize(("tool", "dressing"), [("scenetex", "none"), ("generic", "grouped")])
+def test_every_point_gets_its_colour_back(room, tool, dressing, tmp_path, small_pictures):
+    root = copied(room, tmp_path)
+    job = export_job(root, tmp_path / "job", tool, dressing=dressing, resolution=None if tool == "scenetex" else 512)
+    assert not job.left_out
+    assert {thing.kind for thing in job.objects} == {"stuff", "things"}
+    paint(tmp_path / "job")
+    look = import_look(root, tmp_path / "job", name="rainbow", preview=False)
+    assert set(look.painted) == {thing.name for thing in job.objects}
+    wrong = errors_in_texels(root, job)
+    assert len(wrong) > 400 * len(job.objects) / 2
+    assert np.quantile(wrong, 0.99) < 0.75  # half a texel's diagonal: pictures are looked up at the nearest texel
+    assert wrong.max() < 2.5  # where a chart ends
+    report = check_room(root)
+    assert not report.errors
+    assert not report.warnings
+
+
+def test_charts_are_unique_and_inside(room, tmp_path):
+    job = export_job(room, tmp_path / "job", "generic", resolution=512)
+    for thing in job.objects:
+        corners = job_mesh(tmp_path / "job", thing).corners
+        assert corners.min() >= 0
+        assert corners.max() <= 1
+        _, bary, place = texel_faces(corners, 512)
+        inner = place[(bary > 1e-6).all(1)]
+        assert len(np.unique(inner, axis=0)) == len(inner), thing.name
+
+
+def test_scenetex_files_are_as_it_reads_them(small, tmp_path, small_pictures):
+    job = export_job(small, tmp_path / "job", "scenetex")
+    scene = tmp_path / "job/data/scenes/bedroom/room"
+    config = json.loads((scene / "meshes/scene_config.json").read_text())
+    assert list(config) == [str(number) for number in range(len(job.objects))]
+    assert {entry["type"] for entry in config.values()} == {"stuff", "things"}
+    sphere = yaml.safe_load((scene / "cameras/sphere.yaml").read_text())
+    assert all(set(sphere[word]) == {"min", "max", "num_linspace"} for word in ("dist", "elev", "azim", "fov"))
+    assert np.shape(sphere["at"]) == (1, 3)
+    run = tmp_path / "job" / scenetex.run_folder(job.prompt) / "meshes"
+    seeded = json.loads((run / "scene_config.json").read_text())
+    whole = (run / "scene.obj").read_text().splitlines()
+    assert sum(entry["num_vertices"] for entry in seeded.values()) == sum(line.startswith("v ") for line in whole)
+    for number, entry in config.items():
+        assert entry["path"].startswith(f"data/scenes/bedroom/room/meshes/{entry['type']}/")
+        lines = (tmp_path / "job" / entry["path"]).read_text().splitlines()
+        assert sum(line.startswith("usemtl") for line in lines) == 1
+        assert all(len(line.split()) == 4 for line in lines if line.startswith("f "))
+        assert (run / entry["type"] / f"{number}_{entry['name']}.obj").is_file()
+    assert "stable-diffusion-v1-5/stable-diffusion-v1-5" in (tmp_path / "job/run.sh").read_text()
+    # as trimesh reads it there, triangles come in our order and in the room's own metres
+    thing = job.objects[-1]
+    there = trimesh.load(tmp_path / "job" / thing.mesh, force="mesh")
+    assert np.allclose(there.triangles, in_room(job_mesh(tmp_path / "job", thing), thing), atol=1e-5)
+
+
+def test_scenetex_may_lay_out_anew(small, tmp_path, small_pictures):
+    root = copied(small, tmp_path)
+    job = export_job(root, tmp_path / "job", "scenetex")
+    run = tmp_path / "job" / scenetex.run_folder(job.prompt)
+    whole = None
+    for number, thing in enumerate(job.objects):  # its own meshes, all turned by a quarter in the picture
+        mesh = job_mesh(tmp_path / "job", thing)
+        turned = Unwrapped(mesh.points, np.stack([1 - mesh.st[:, 1], mesh.st[:, 0]], 1), mesh.faces)
+        (run / "meshes" / thing.kind / f"{number}_{thing.name}.obj").write_bytes(
+            scenetex.obj_bytes(turned, thing.name, material=False)
+        )
+        whole = painted((turned.corners * 1023 + 0.5) / 1024, in_room(mesh, thing), 1024, whole)
+    filled(np.full((1024, 1024, 3), 0.1)).save(run / "texture_100.png")
+    filled(whole).save(run / "texture_29900.png")
+    import_look(root, tmp_path / "job", preview=False)
+    assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
+
+
+def exported_again(mesh, thing, resolution, rng):
+    """A glb as exporters write it: vertices split and shuffled, triangles re-ordered, another atlas, turned, scaled."""
+    order = rng.permutation(len(mesh.faces))
+    begin = rng.integers(0, 3, len(order))
+    corners = (begin[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(order))[:, None]
+    triangles, st = mesh.triangles[order][rows, corners], mesh.corners[order][rows, corners]
+    st = 0.02 + 0.96 * np.stack([st[..., 1], 1 - st[..., 0]], -1)  # turned and shrunk in the picture
+    shuffle = rng.permutation(3 * len(order))
+    points, laid = np.empty((3 * len(order), 3)), np.empty((3 * len(order), 2))
+    points[shuffle], laid[shuffle] = triangles.reshape(-1, 3), st.reshape(-1, 2)
+    to_room = np.array(thing.to_room)
+    picture = painted(st, triangles @ to_room[:3, :3].T + to_room[:3, 3], resolution)
+    points = points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T * 0.37 + (0.1, 0.2, 0.3)  # z up
+    return glb_bytes(Unwrapped(points, laid, shuffle.reshape(-1, 3)), thing.name, filled(picture))
+
+
+@pytest.mark.parametrize("tool", ["hunyuan", "mvpainter"])
+def test_glb_comes_back_in_any_order(small, tool, tmp_path, monkeypatch):
+    monkeypatch.setattr(texturing_export, "IMAGE", 48)
+    root = copied(small, tmp_path)
+    job = export_job(root, tmp_path / "job", tool, resolution=512)
+    assert {path.stem for path in (tmp_path / "job/glbs").iterdir()} == {thing.name for thing in job.objects}
+    assert {path.stem for path in (tmp_path / "job/imgs").iterdir()} == {thing.name for thing in job.objects}
+    rng = np.random.default_rng(1)
+    folder = tmp_path / "job/results" if tool == "hunyuan" else tmp_path / "job/results/glbs"
+    folder.mkdir(exist_ok=True)
+    for thing in job.objects:
+        content = exported_again(job_mesh(tmp_path / "job", thing), thing, 512, rng)
+        (folder / f"{thing.name}.glb").write_bytes(content)
+    look = import_look(root, tmp_path / "job", preview=False)
+    assert len(look.painted) == len(job.objects)
+    wrong = errors_in_texels(root, job)
+    assert np.quantile(wrong, 0.99) < 0.75
+    assert wrong.max() < 2.5
+
+
+def bound(stage, path):
+    return str(UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPath())
+
+
+def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
+    root = copied(small, tmp_path)
+    before = bound(open_stage(root), "/Room/Objects/wardrobe/wardrobe_mesh")
+    job = export_job(root, tmp_path / "job", "generic", resolution=256)
+    paint(tmp_path / "job")
+    import_look(root, tmp_path / "job", name="first", preview=False)
+    import_look(root, tmp_path / "job", name="second", preview=False)
+    stage = open_stage(root)
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("looks")
+    assert sorted(variants.GetVariantNames()) == ["first", "made", "second"]
+    for name, material in (("second", "/Room/Looks/second_wardrobe"), ("first", "/Room/Looks/first_wardrobe")):
+        variants.SetVariantSelection(name)
+        assert bound(stage, "/Room/Objects/wardrobe/wardrobe_mesh") == material
+        assert stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_mesh").HasAttribute(f"primvars:{primvar(name)}")
+    variants.SetVariantSelection("made")
+    assert bound(stage, "/Room/Objects/wardrobe/wardrobe_mesh") == before
+    stage.Reload()
+    assert variants.GetVariantSelection() == "second"
+    every = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    assert [error.GetMessage() for error in UsdValidation.ValidationContext(every).Validate(stage)] == []
+    scene = trimesh.load(export(root, tmp_path / "room.glb"))
+    images = [part.visual.material.baseColorTexture for part in scene.geometry.values()]
+    assert sum(image is not None and image.size == (256, 256) for image in images) == len(job.objects)
+    flat = open_stage(export(root, tmp_path / "room.usdz"))
+    mesh = flat.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_mesh")
+    binding = UsdShade.MaterialBindingAPI(mesh)
+    assert str(binding.GetDirectBinding().GetMaterialPath()) == "/Room/Looks/second_wardrobe"
+    assert not any(UsdShade.MaterialBindingAPI(p).GetCollectionBindingRels() for p in flat.TraverseAll())
+    assert not check_room(tmp_path / "room.usdz").errors
+
+
+def test_shared_instances_get_a_picture_each(small, tmp_path):
+    root = copied(small, tmp_path)
+    twins = [f"/Room/Objects/nightstand_{side}" for side in ("left", "right")]
+    for path, layer in zip(twins, (root, root.parent / "layers/geometry.usda"), strict=True):
+        stage = open_stage(layer)
+        stage.GetPrimAtPath(path).SetInstanceable(True)
+        stage.GetRootLayer().Save()
+    job = export_job(root, tmp_path / "job", "generic", resolution=512)
+    paint(tmp_path / "job")
+    import_look(root, tmp_path / "job", preview=False)
+    stage = open_stage(root)
+    assert not any(stage.GetPrimAtPath(path).IsInstanceable() for path in twins)
+    assert len({bound(stage, f"{path}/nightstand_mesh") for path in twins}) == 2
+    assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
+
+
+def test_colours_are_a_function_of_the_place():
+    points = np.random.default_rng(0).random((50, 3))
+    assert color_at(points).shape == (50, 3)
+    assert len(np.unique(color_at(points).round(3), axis=0)) == 50
