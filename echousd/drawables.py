@@ -151,12 +151,13 @@ def _part(
     if authored is not None:
         length = np.linalg.norm(authored, axis=-1, keepdims=True)
         normals = np.where(length > 1e-9, authored / np.maximum(length, 1e-9), normals)
-    st = _corner_values(mesh, "st", 2, *where)
-    for paint, faces in paints:
-        other = _corner_values(mesh, paint.st, 2, *where) if paint.st != "st" else None
-        if other is not None:
-            st = np.zeros((len(face), 3, 2)) if st is None else np.array(st)
-            st[faces] = other[faces]
+    tables = {name: _corner_values(mesh, name, 2, *where) for name in {"st", *(paint.st for paint, _ in paints)}}
+    st = tables["st"]
+    if any(table is not None for name, table in tables.items() if name != "st"):
+        st = np.zeros((len(face), 3, 2))
+        for paint, faces in paints:  # later ones win
+            table = tables[paint.st] if tables[paint.st] is not None else tables["st"]
+            st[faces] = 0.0 if table is None else table[faces]
     return triangles, normals, st, paints
 
 

@@ -134,7 +134,8 @@ def refitted(folder: Path, root: str, files: dict[str, bytes], current: bytes | 
     if not paths:
         return []
     looks = read_looks(folder, paths)
-    with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
+    # Beside the folder, so that what its layers refer to outside of it (a store) is found.
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.resolve().parent) as scratch:
         for path, content in {**files, root: _alone(files[root], files)}.items():
             place = Path(scratch) / path
             place.parent.mkdir(parents=True, exist_ok=True)

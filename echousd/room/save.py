@@ -95,8 +95,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     for path, name in kept.items():
         if name:
             folders.tell_kept(folder, path, name)
-    for told in unfit:
-        warnings.warn(told, stacklevel=3)
+    for fault in unfit:
+        warnings.warn(fault, stacklevel=3)
     for path in gone:
         if path not in stale and (folder / path).is_file():
             why = f"{needed[path]} refers to it" if path in needed else "it was edited"
