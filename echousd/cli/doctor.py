@@ -16,6 +16,7 @@ EXTRAS = (
     ("sim", ("mujoco",), "simulating rooms (check --settle)"),
     ("texture", ("xatlas",), "texture coordinates"),
     ("validate", ("usd_validation_nvidia",), "NVIDIA's rules in `echousd check`"),
+    ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
     ("batch", ("pyarrow",), "Parquet tables of `echousd batch`"),
     ("text", ("open_clip",), "text features of the released models"),
     ("train", ("tensorboard", "h5py"), "training"),

@@ -41,8 +41,9 @@ def edit(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
-        str | None, typer.Option(help="Of new objects: parts, sdf or boxes; default: what the room is made of.")
+        str | None, typer.Option(help="Of new objects: parts, sdf, library, boxes; default: as the room is made.")
     ] = None,
+    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     faces: Annotated[int, typer.Option(help="Face budget of each new mesh.", min=100)] = 5000,
     repair: Annotated[
@@ -62,7 +63,7 @@ def edit(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
-    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces}
+    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces, "assets": assets}
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,

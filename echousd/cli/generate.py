@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 TITLES = {
     "read": "Reading the graph",
     "load": "Loading the model",
+    "assets": "Choosing models",
     "layout": "Placing the furniture",
     "repair": "Repairing the layout",
     "shapes": "Shaping the furniture",
@@ -57,7 +58,15 @@ def generate(
     model: Annotated[Path | None, typer.Option(hidden=True, help="The same as --weights.")] = None,
     shapes: Annotated[
         str | None,
-        typer.Option(help="parts: built of parts, with doors and drawers; sdf: free shapes; boxes. Default: parts."),
+        typer.Option(
+            help="parts: built of parts, with doors and drawers; sdf: free shapes; library: models of --assets; "
+            "boxes. Default: parts."
+        ),
+    ] = None,
+    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
+    stretch: Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)] = 1.15,
+    licenses: Annotated[
+        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
     ] = None,
     samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
     drafts: Annotated[
@@ -117,6 +126,7 @@ def generate(
         listen = held.enter_context(progress_bar())
         gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
         try:
+            from echousd.assets.choose import asked_of
             from echousd.room.pipeline import generate as make
             from echousd.room.progress import StageTimer
             from echousd.room.room import RoomOptions
@@ -124,6 +134,7 @@ def generate(
         finally:
             gc.enable()
         options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
+        wishes = asked_of(assets, stretch=stretch, licences=licenses)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []
 
@@ -131,7 +142,7 @@ def generate(
             room = make(
                 graph, room=path, seed=seed, shapes=shapes, model=weights or model, preset=preset, repair=repair,
                 samples=samples, drafts=drafts, earlier=None if flat else folder, steps=steps, faces=faces,
-                options=options, fit=fit, progress=listen,
+                options=options, fit=fit, progress=listen, assets=wishes,
             )  # fmt: skip
             timer = StageTimer(listen)
             if settle:

@@ -34,6 +34,7 @@ TOPICS: tuple[str, ...] = (
     "render",
     "export",
     "texture",
+    "assets",
     "check",
     "train",
     "convert",

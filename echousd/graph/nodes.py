@@ -107,6 +107,8 @@ class Node(PlainModel):
         position: (x, y, z) centre of the bottom face in the room frame, metres, where fixed.
         yaw: radians about +Y, where fixed (a text may be in degrees, such as `90 deg`); at 0 the front looks along +Z.
         locked: the object stays as it is when the room is generated again.
+        source: where its geometry comes from, one of `echousd.graph.fields.SOURCES`; None = as the room's.
+        asset: a model of one's own (a file, relative to that of the graph) or the id of one in a library.
         attributes: free data, identifiers to texts, numbers or booleans.
     """
 
@@ -117,10 +119,20 @@ class Node(PlainModel):
     position: field.Position = None
     yaw: field.Angle = None
     locked: field.Flag = False
+    source: field.Source = None
+    asset: field.AssetName = None
     attributes: field.Attributes = Field(default_factory=dict)
 
     def __init__(self, name: str, category: str, **fields: Any) -> None:
         super().__init__(name=name, category=category, **fields)
+
+    @model_validator(mode="after")
+    def _sourced(self) -> Node:
+        if self.asset is None and self.source == "own":
+            raise GraphError("source is 'own' without an asset, allowed: asset, the file of the model", ("source",))
+        if self.asset is not None and self.source not in (None, "own", "library"):
+            raise GraphError(f"asset is given, but source is {self.source!r}, allowed: own or library", ("source",))
+        return self
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:

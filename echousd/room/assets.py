@@ -87,7 +87,7 @@ def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, 
         UsdGeom.Xform.Define(stage, f"/{name}/{piece_name(name, body)}")
     for path, form in forms.items():
         write_mesh(stage, f"/{name}{path}", form)
-    for collider in geometry.colliders:
+    for collider in () if geometry.theirs_collides else geometry.colliders:
         every = np.arange(len(collider.mesh.faces))
         form = surface(collider.mesh, {"collider": every})
         guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
@@ -140,11 +140,12 @@ def component_layer(
             variants.AddVariant(level)
         variants.SetVariantSelection(LEVELS[0])
     palette, bindings = palette_for(style), slot_paths(f"/{name}", slots)
-    write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
+    if bindings:
+        write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
     for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
         UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
     write_asset_physics(stage, name, category, geometry, most_used(geometry))
-    return without_stage(stage, lambda layer: _add_arcs(layer, name, coarse=bool(geometry.coarse)))
+    return without_stage(stage, lambda layer: _add_arcs(layer, name, geometry))
 
 
 def most_used(geometry: Geometry) -> list[str]:
@@ -170,12 +171,14 @@ def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
     return out
 
 
-def _add_arcs(layer: Sdf.Layer, name: str, *, coarse: bool) -> None:
+def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
     """The payloads, and a class whose opinions, in whatever stage, reach all users of the asset."""
     classes = Sdf.PrimSpec(layer, CLASSES, Sdf.SpecifierClass)
     Sdf.PrimSpec(classes, name, Sdf.SpecifierClass)
     layer.GetPrimAtPath(f"/{name}").inheritPathList.prependedItems.append(Sdf.Path(f"/{CLASSES}/{name}"))
-    if coarse:
+    if geometry.theirs_collides:
+        return
+    if geometry.coarse:
         # a payload inside a variant is stronger than the one beside it, so that its meshes win
         variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LEVELS[1]].primSpec
         variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from echousd.room import assets, cameras, lights, looks, materials, physics, she
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
+from echousd.room.originals import attribution, component
 from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
@@ -38,17 +40,19 @@ class Asset:
     files: Mapping[str, bytes]
 
 
-def room_files(room: RoomData, shelf: Shelf | None = None) -> dict[str, bytes]:
+def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None = None) -> dict[str, bytes]:
     """Relative path -> content of everything that a room consists of, except the preview and the manifest.
 
     Arguments:
         shelf: takes assets and images, which are not among the files then.
+        folder: where the room will lie, which paths of models outside of it are relative to; None = the present one.
     """
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
     for name, user in room.asset_users.items():
-        made[name] = _asset(room, name, user)
+        made[name] = _asset(room, name, user, shelf.place if shelf else (folder or Path.cwd()) / "assets" / name)
         files.update(made[name].files)
+    files |= attribution.files(room)
     dressing = dress(room)
     small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
     for asset in small.values():
@@ -253,11 +257,16 @@ def _add_sublayers(layer: Sdf.Layer, names: Sequence[str]) -> None:
     layer.subLayerPaths = [f"./layers/{name}.usda" for name in names]
 
 
-def _asset(room: RoomData, name: str, user: str) -> Asset:
+def _asset(room: RoomData, name: str, user: str, folder: Path) -> Asset:
     geometry = room.geometry[user]
+    if name in room.carried and geometry.original is not None:
+        return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
+    if geometry.original is not None:
+        data = _asset_data(room, name, geometry)
+        return Asset(name, {}, component.files(name, room.graph.node(user).category, geometry, data, folder))
     return _written(room, name, room.graph.node(user).category, room.styles[user], geometry)
 
 
@@ -275,12 +284,9 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
     slots = {part: tuple(form.groups) for part, form in forms.items()}
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
-    data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
-    data["asset_license"] = geometry.origin.licence
-    if geometry.origin.credit:
-        data["asset_credit"] = geometry.origin.credit
+    data = _asset_data(room, name, geometry)
     payload = assets.geometry_layer(name, forms, geometry, data)
-    component = assets.component_layer(name, category, style, extent, slots, geometry, data)
+    layer = assets.component_layer(name, category, style, extent, slots, geometry, data)
     coarse = {
         piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
         for part in geometry.coarse
@@ -289,9 +295,18 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
     files = {
         **low,
         payload_file(name): layer_bytes(payload, ".usdc"),
-        component_file(name): layer_bytes(component, ".usda"),
+        component_file(name): layer_bytes(layer, ".usda"),
     }
     return Asset(name, slots, files)
+
+
+def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]:
+    """The customLayerData of an asset's layers."""
+    data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
+    data["asset_license"] = geometry.origin.licence
+    if geometry.origin.credit:
+        data["asset_credit"] = geometry.origin.credit
+    return data
 
 
 def _slots(asset: Asset) -> set[str]:

@@ -13,7 +13,9 @@ from echomodel.boxes import Boxes
 from echomodel.loading import load_model
 from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
-from echousd.graph import SceneGraph
+from echousd.assets.choose import AssetWishes, wishes_of
+from echousd.assets.record import Vector
+from echousd.graph import Node, SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
@@ -24,6 +26,15 @@ from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
+from echousd.room.sources.mixing import check_sources, mixed_shapes
+from echousd.room.sources.retrieval import (
+    Retrieved,
+    anchored,
+    given_pieces,
+    retrieved,
+    source_of,
+    with_given_sizes,
+)
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
@@ -44,6 +55,7 @@ def edit(
     steps: int | None = None,
     faces: int = FACES,
     progress: StageListener | None = None,
+    assets: AssetWishes | str | Path | None = None,
 ) -> Room:
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -56,56 +68,75 @@ def edit(
             those of the room.
         seed: of the new randomness.
         shapes: as for `generate`; None = what the room is made of.
-        model, repair, steps, faces, progress: as for `generate`.
+        model, repair, steps, faces, progress, assets: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
     check_seed(seed)
-    source, timer = None if shapes is None else shape_source(shapes), StageTimer(progress)
+    if shapes is not None:
+        shape_source(shapes)
+    timer, wishes = StageTimer(progress), wishes_of(assets)
     with timer.stage("read"):
         saved = read_room(root)
-    graph = with_plan_of(graph, saved.graph)
-    fresh, moving = touched(saved.graph, graph)
+    beside = Path(root).parent
+    graph = with_plan_of(anchored(graph, beside), saved.graph)
+    fresh, moving = touched(anchored(saved.graph, beside), graph)
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
-    layouts: list[Boxes] = []
     pins: list[SceneGraph] = []
     notes: tuple[str, ...] = ()
+    given = Retrieved()
     if fresh or moving:
         with timer.stage("load"):
             model_used = load_model(model)
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
             made_of = saved.manifest["shapes"]
-            source = source or shape_source(made_of if made_of in ("parts", "sdf") else default_source(model_used))
-            source.check(model_used)
+            again = made_of in ("parts", "sdf") or (made_of == "library" and wishes.library is not None)
+            shapes = shapes or (made_of if again else default_source(model_used))
+            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
+            given = given_pieces(graph, shapes, wishes, fresh)
         change = graph_edit(saved.graph, graph)
-    for number, before in enumerate(saved.layouts):
-        pinned = _pinned(graph, saved.graph, before, fresh, moving)
-        if layouts:  # one furniture in all layouts
-            pinned = with_sizes(pinned, layouts[0])
-        pins.append(pinned)
-        if model_used is None:
-            layouts.append(_boxes_of(pinned))
-            continue
-        (found,) = sample_boxes(model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer)
-        found, told = finished_boxes(pinned, found, styles, repair, timer)
-        layouts.append(found)
-        notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
+
+    def laid_out(sizes: Mapping[str, Vector]) -> list[Boxes]:
+        nonlocal notes
+        layouts: list[Boxes] = []
+        pins.clear()
+        for number, before in enumerate(saved.layouts):
+            pinned = with_given_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
+            if layouts:  # one furniture in all layouts
+                pinned = with_sizes(pinned, layouts[0])
+            pins.append(pinned)
+            if model_used is None:
+                layouts.append(_boxes_of(pinned))
+                continue
+            (found,) = sample_boxes(
+                model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer
+            )  # fmt: skip
+            found, told = finished_boxes(pinned, found, styles, repair, timer)
+            layouts.append(found)
+            notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
+        return layouts
+
+    layouts, models = laid_out(given.sizes), given
+    if fresh and shapes is not None:
+        models = retrieved(graph, layouts[0], styles, shapes, wishes, seed, given, among=fresh)
+        layouts = laid_out(models.sizes) if models.sizes != given.sizes else layouts
+        notes = (*models.notes, *notes)
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
-    assets = {name: saved.assets[name] for name in geometry}
-    if fresh and source is not None:
+    names = {name: saved.assets[name] for name in geometry}
+    if fresh and shapes is not None:
         wanted = tuple(name for name in graph.names if name in fresh)
         request = ShapeRequest(
-            graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer
+            graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer, models
         )
-        made = source.shapes(request)
+        made = mixed_shapes(request, shapes)
         geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
-        assets |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
-    assets = _own_names({name: assets[name] for name in graph.names}, fresh, saved)
+        names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
+    names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
@@ -117,7 +148,7 @@ def edit(
         graph=graph,
         boxes=layouts[0],
         geometry=geometry,
-        assets=assets,
+        assets=names,
         floor=floor,
         layouts=tuple(layouts),
         outcomes=outcomes,
@@ -131,7 +162,7 @@ def edit(
             manifest.get("dress", "none"),
         ),
         timings=timer.seconds,
-        carried={asset: saved.carried[asset] for name, asset in assets.items() if name not in fresh},
+        carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
     )
     warn_of_faults(room)
     return room
@@ -141,13 +172,17 @@ def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
     """Names of objects that need a box and a shape, and of objects that only need another place."""
     diff = before.diff(after)
     fresh = {node.name for node in diff.added}
-    fresh |= {new.name for old, new in diff.changed if (old.category, old.size) != (new.category, new.size)}
+    fresh |= {new.name for old, new in diff.changed if _made_of(old) != _made_of(new)}
     moving = {relation.subject for relation in diff.related}
     moving |= {new.name for old, new in diff.changed if (old.position, old.yaw) != (new.position, new.yaw)}
     on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
     for _ in on:  # what stands on something goes with it, and what stands on that
         moving |= {subject for subject, carrier in on if carrier in moving | fresh}
     return fresh, {name for name in moving - fresh if not after.node(name).locked}
+
+
+def _made_of(node: Node) -> tuple[object, ...]:
+    return node.category, node.size, node.source, node.asset
 
 
 def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:

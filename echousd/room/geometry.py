@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from echomodel.data.furniture.solids import Joint
+from echousd.room.originals.original import Original
 from echousd.room.surface import CREASE
 
 FRAME = "frame"  # the body that holds the joints
@@ -24,11 +25,14 @@ class Origin:
         source: name of the shape source, see `echousd.room.sources`.
         licence: SPDX identifier of its licence.
         credit: who must be named, empty where nobody must.
+        asset: file or id of the model that it is, empty for what EchoUSD made. sha256: of the model's file.
     """
 
     source: str
     licence: str = LICENCE
     credit: str = ""
+    asset: str = ""
+    sha256: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +99,7 @@ class Geometry:
         masses: body -> what it weighs, for every body of a piece with joints.
         coarse: the parts once more with few faces, of the same names, bodies and slots; empty = there are none.
         description: numbers from which a furniture program makes the piece again, empty = there are none.
+        original: somebody else's model that the piece is; its parts and colliders only tell what it looks like.
     """
 
     parts: tuple[Part, ...]
@@ -105,6 +110,7 @@ class Geometry:
     masses: Mapping[str, Mass] = field(default_factory=dict)
     coarse: tuple[Part, ...] = ()
     description: tuple[float, ...] = ()
+    original: Original | None = None
 
     def __post_init__(self) -> None:
         names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]
@@ -119,6 +125,11 @@ class Geometry:
         whole = trimesh.util.concatenate([part.mesh for part in self.parts])
         assert isinstance(whole, trimesh.Trimesh)
         return whole
+
+    @property
+    def theirs_collides(self) -> bool:
+        """Whether it is somebody else's model with colliders of its own."""
+        return self.original is not None and self.original.colliders
 
     @property
     def faces(self) -> int:

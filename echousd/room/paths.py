@@ -50,6 +50,11 @@ def component_file(asset: str) -> str:
     return f"assets/{asset}/{asset}.usda"
 
 
+def original_file(asset: str, path: str) -> str:
+    """Path in the room's folder of a file of somebody else's model that the asset holds."""
+    return f"assets/{asset}/original/{path}"
+
+
 def asset_files(asset: str) -> tuple[str, ...]:
     """Paths of all files of an asset in the room's folder; the coarse geometry may be missing."""
     return payload_file(asset), component_file(asset), coarse_file(asset)

@@ -41,7 +41,7 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
     """
     root = f"/{asset}"
     lies = category in SMALL and SMALL[category].lies  # cloth is carried by what is below it
-    for collider in () if lies else geometry.colliders:
+    for collider in () if lies or geometry.theirs_collides else geometry.colliders:
         guide = stage.OverridePrim(piece_path(root, asset, collider.name, collider.body))
         UsdPhysics.CollisionAPI.Apply(guide)
         UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)
@@ -49,7 +49,8 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
     volume = sum(max(float(collider.mesh.convex_hull.volume), 1e-6) for collider in geometry.colliders)
     slot = next(iter(slots), "wood")
     bind_contact(stage, root, f"{root}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
-    if movable(category):
+    theirs = geometry.original is not None and geometry.original.bodies
+    if movable(category) and not theirs:
         _make_body(stage.GetPrimAtPath(root), mass, articulated=bool(geometry.joints))
 
 

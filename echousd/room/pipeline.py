@@ -9,6 +9,7 @@ from echomodel.boxes import Boxes
 from echomodel.loading import check_preset, load_model
 from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
+from echousd.assets.choose import AssetWishes, wishes_of
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
@@ -21,6 +22,8 @@ from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
+from echousd.room.sources.mixing import check_sources, mixed_shapes, sources_of
+from echousd.room.sources.retrieval import anchored, given_pieces, retrieved, with_given_sizes
 from echousd.room.sources.source import FACES, ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
@@ -51,6 +54,7 @@ def generate(
     options: RoomOptions | None = None,
     progress: StageListener | None = None,
     drawn: Boxes | None = None,
+    assets: AssetWishes | str | Path | None = None,
 ) -> Room:
     """Make a room from a scene graph.
 
@@ -62,7 +66,8 @@ def generate(
         room: prim path of one room where the file holds several.
         seed: of all randomness, 0 to 2^63 - 1; equal arguments give equal rooms.
         shapes: where geometry comes from, a name of `echousd.room.sources`: `parts`, furniture built from the model's
-            descriptions, `sdf`, the model's shape branch, or plain `boxes`; None = `parts` where the model can.
+            descriptions, `sdf`, the model's shape branch, plain `boxes`, or `library`, models of `assets`; None =
+            `parts` where the model can. An object of the graph may say otherwise (`source`, `asset`).
         model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
             the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
@@ -77,6 +82,7 @@ def generate(
         options: how the room is written.
         progress: called with (stage, done, total).
         drawn: the first draft of the first layout, where it was sampled already (`echousd.room.packed`).
+        assets: index of a library (`echousd assets index`), or what is asked of one.
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -84,7 +90,8 @@ def generate(
 
     Warns (`RoomWarning`) of relations that are broken and of furniture that collides; `Room.faults` lists them.
     """
-    source = None if shapes is None else shape_source(shapes)
+    if shapes is not None:
+        shape_source(shapes)
     if samples < 1 or samples > 1000:
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
     if drafts is not None and not 1 <= drafts <= 64:
@@ -94,23 +101,27 @@ def generate(
     check_seed(seed)
     check_preset(model, preset)
     timer = StageTimer(progress)
-    file = ""
+    file, beside = "", Path.cwd()
+    wishes = wishes_of(assets)
     if not isinstance(graph, SceneGraph):
         from echousd.graph import load_graph
 
-        file = Path(graph).name
+        file, beside = Path(graph).name, Path(graph).parent
         with timer.stage("read"):
             read = Path(graph)
             graph, homeless = with_locked_places(load_graph(read, room), None if room else read, earlier)
     else:
         graph, homeless = with_locked_places(graph, earlier)
+    graph = anchored(graph, beside)
     if len(graph.nodes) > MAX_OBJECTS:
         raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
     with timer.stage("load"):
         echo = load_model(model, preset)
         shapes = shapes or default_source(echo)
-        source = source or shape_source(shapes)
-        source.check(echo)
+        check_sources([shapes, *sources_of(graph, shapes).values()], echo)
+    with timer.stage("assets"):
+        given = given_pieces(graph, shapes, wishes)
+    sizes = dict(given.sizes)
     check_doors(graph)
     graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
     crowded = check_space(graph)
@@ -122,16 +133,26 @@ def generate(
         styles = style_groups(graph)
         first = drawn if drawn is not None and len(drawn) == len(graph.nodes) else None  # none of them left out
         return best_boxes(
-            echo, graph, styles, seed=seed, drafts=drafts, repair=repair, drawn=first, steps=steps, timer=timer
-        )
+            echo, with_given_sizes(graph, sizes), styles, seed=seed, drafts=drafts, repair=repair, drawn=first,
+            steps=steps, timer=timer,
+        )  # fmt: skip
 
-    if fit == "drop":
-        graph, (boxes, notes), more = fitted(graph, arranged)
+    def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
+        if fit == "drop":
+            graph, (boxes, notes), more = fitted(graph, arranged)
+            return graph, boxes, notes, more
+        return graph, *arranged(graph), ()
+
+    graph, boxes, notes, more = laid_out(graph)
+    left_out = (*left_out, *more)
+    with timer.stage("assets"):
+        models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given)
+    if models.sizes != sizes:  # real sizes shape the layout
+        sizes |= models.sizes
+        graph, boxes, notes, more = laid_out(graph)
         left_out = (*left_out, *more)
-    else:
-        boxes, notes = arranged(graph)
     styles = style_groups(graph)
-    notes = (*left_out, *echo.unlearned(graph_batch(graph)), *notes)
+    notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
         found, _ = best_boxes(
@@ -143,7 +164,8 @@ def generate(
     if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     graph = with_placed_openings(graph, plan, seed)
-    made = source.shapes(ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer))
+    request = ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer, retrieved=models)
+    made = mixed_shapes(request, shapes)
     geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
     options, floor = options or RoomOptions(), room_floor(graph, layouts)
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)

@@ -20,7 +20,8 @@ from echousd.room.geometry import LICENCE, Collider, Geometry, Origin, Part
 from echousd.room.joints import read_joints
 from echousd.room.manifest import find_manifest
 from echousd.room.masses import read_mass
-from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, coarse_file, piece_of
+from echousd.room.originals.reading import read_original
+from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, component_file, piece_of
 from echousd.room.stored import asset_from, shelf_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
@@ -68,9 +69,8 @@ def read_room(root: str | Path) -> SavedRoom:
     made: dict[str, Geometry] = {}
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
-        found = made.get(asset) or _geometry(
-            stage.GetPrimAtPath(f"{OBJECTS}/{node.name}"), asset, node.category, manifest
-        )
+        read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
+        found = made.get(asset) or read(stage.GetPrimAtPath(f"{OBJECTS}/{node.name}"), asset, node.category, manifest)
         if asset is None or found is None:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:
@@ -78,12 +78,11 @@ def read_room(root: str | Path) -> SavedRoom:
             if shelf is not None and f"assets/{asset}" in shelf.keys:
                 carried[asset] = asset_from(shelf, asset)
             else:
-                files = {path: inside(root.parent, path, f"asset {asset!r}") for path in asset_files(asset)}
-                carried[asset] = {
-                    path: file.read_bytes()
-                    for path, file in files.items()
-                    if path != coarse_file(asset) or file.exists()
-                }
+                recorded = (path for path in manifest["files"] if path.startswith(f"assets/{asset}/"))
+                paths = dict.fromkeys((*asset_files(asset), *recorded))
+                files = {path: inside(root.parent, path, f"asset {asset!r}") for path in paths}
+                must = component_file(asset)
+                carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
     sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)

@@ -25,6 +25,7 @@ from echousd.room.geometry import Geometry
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
 from echousd.room.room import LayoutOutcome, RoomData
+from echousd.room.sources.retrieval import beside
 from echousd.room.stored import Shelf, shelf_of
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
@@ -70,7 +71,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     room = replace(room, assets=ownership.free_assets(folder, room, recorded))
     for left in folder.glob(f".{room.name}.png.*.partial"):  # of a run that was killed at its preview
         left.unlink(missing_ok=True)
-    files = room_files(room, shelf)
+    room = replace(room, graph=beside(room.graph, folder))
+    files = room_files(room, shelf, folder)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     current = ownership.read(folder, root)
     unfit = paintings.refitted(folder, root, files, current)
@@ -234,7 +236,8 @@ def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
     origin = geometry.origin
     credit = {"credit": origin.credit} if origin.credit else {}
     facts = {"faces": geometry.faces, "watertight": geometry.watertight}
-    return {**facts, "source": origin.source, "licence": origin.licence, **credit}
+    asset = {"asset": origin.asset, "sha256": origin.sha256} if origin.asset else {}
+    return {**facts, "source": origin.source, "licence": origin.licence, **credit, **asset}
 
 
 def _digest(folder: Path, path: str) -> str:

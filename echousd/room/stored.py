@@ -39,6 +39,11 @@ class Shelf:
                 f"{self.store.root}: on another drive than {self.folder}, allowed: a store on the same"
             ) from None
 
+    @property
+    def place(self) -> Path:
+        """Where an asset will lie, whatever its key: as deep in the store."""
+        return Path(os.path.realpath(self.store.root)) / "00" / "0"
+
     def put(self, files: Mapping[str, bytes]) -> None:
         """Put the assets and images among a room's files (relative path -> content) into the store."""
         units: dict[str, dict[str, bytes]] = {}

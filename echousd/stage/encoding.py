@@ -60,6 +60,8 @@ SIZE = "echo:size"
 POSITION = "echo:position"
 YAW = "echo:yaw"
 LOCKED = "echo:locked"
+SOURCE = "echo:source"
+ASSET = "echo:asset"
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
@@ -84,6 +86,8 @@ VALUE_TYPES = {
     POSITION: _TYPES.Double3,
     YAW: _TYPES.Double,
     LOCKED: _TYPES.Bool,
+    SOURCE: _TYPES.Token,
+    ASSET: _TYPES.String,
     LABELS: _TYPES.TokenArray,
 }
 
@@ -124,6 +128,10 @@ def node_values(node: Node) -> dict[str, Any]:
         values[YAW] = float(node.yaw)
     if node.locked:
         values[LOCKED] = True
+    if node.source is not None:
+        values[SOURCE] = node.source
+    if node.asset is not None:
+        values[ASSET] = node.asset
     for key, value in node.attributes.items():
         values[FREE + key] = value
     return values

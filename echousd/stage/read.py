@@ -228,6 +228,8 @@ _FIELDS = {
     usd.POSITION: "position",
     usd.YAW: "yaw",
     usd.LOCKED: "locked",
+    usd.SOURCE: "source",
+    usd.ASSET: "asset",
 }
 
 

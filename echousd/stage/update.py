@@ -108,7 +108,7 @@ class _Editor:
         if old is not None and old.category == new.category:
             del values[usd.LABELS], values[usd.CATEGORY]
         free = [a.GetName() for a in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1])]
-        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.LOCKED, *free)
+        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.LOCKED, usd.SOURCE, usd.ASSET, *free)
         return self.value_edits(prim, values, names)
 
     def new_node(self, node: Node) -> list[Edit]:

@@ -14,6 +14,8 @@ MODULES = {
     "parts": "echousd.room.sources.parts",
     "sdf": "echousd.room.sources.sdf",
     "boxes": "echousd.room.sources.boxes",
+    "library": "echousd.room.sources.library",
+    "own": "echousd.room.sources.own",
 }
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from echousd.room.geometry import Geometry
 from echousd.room.progress import StageTimer
+from echousd.room.sources.retrieval import Retrieved
 from echousd.room.styles import shared_assets
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class ShapeRequest:
         kept: geometry of the objects that stay as they are (of an edited room).
         change: how the graph was edited, None = not at all.
         timer: is told of the stages.
+        retrieved: the models of other people that were chosen for objects.
     """
 
     graph: SceneGraph
@@ -49,6 +51,7 @@ class ShapeRequest:
     kept: Mapping[str, Geometry] = field(default_factory=dict)
     change: GraphEdit | None = None
     timer: StageTimer = field(default_factory=StageTimer)
+    retrieved: Retrieved = field(default_factory=Retrieved)
 
     @property
     def rows(self) -> list[int]:

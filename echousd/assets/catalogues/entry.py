@@ -1,0 +1,60 @@
+"""What a catalogue says of a model before its file is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from echousd.assets.model_file import ModelFile
+
+Told = Callable[[str], None]  # is told of what cannot be read, one line each
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One model on offer.
+
+    Arguments:
+        key: unique in the catalogue. file: where it lies.
+        name: what it is called. words: of its class, the surest first. group: the shelf it lies on.
+        category: of the vocabulary, where the catalogue says it for certain.
+        dims: width, height, depth in metres after `turn`, None where only the mesh knows.
+        metres: per unit, None where the file or its size says.
+        turn: (3, 3) the model's axes to the object frame, None where nobody says. front_known: whether `turn` tells the
+            front and not only what is up.
+        placement: as in `AssetRecord`, "" where the category says it.
+    """
+
+    key: str
+    file: ModelFile
+    name: str = ""
+    words: tuple[str, ...] = ()
+    group: str = ""
+    category: str = ""
+    dims: np.ndarray | None = None
+    metres: float | None = None
+    turn: np.ndarray | None = None
+    front_known: bool = False
+    licence: str = ""
+    author: str = ""
+    placement: str = ""
+    tags: tuple[str, ...] = ()
+    extra: Mapping[str, str] = field(default_factory=dict)
+
+
+class Catalogue(Protocol):
+    """A kind of library; a catalogue is a module of this package with one instance named `CATALOGUE`."""
+
+    title: str
+
+    def holds(self, folder: Path) -> bool:
+        """Whether a path is a library of this kind."""
+        ...
+
+    def entries(self, folder: Path, tell: Told) -> list[Entry]:
+        """Its models; what cannot be read is told, not raised."""
+        ...

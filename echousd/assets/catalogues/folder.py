@@ -1,0 +1,62 @@
+"""Any folder of models: named as their files or folders, with the licence of a text beside them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.licences import licence_beside
+from echousd.assets.model_file import MODELS, ModelFile
+
+GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
+
+
+class PlainFolder:
+    """The catalogue of every folder that is no other."""
+
+    title = "a folder of models"
+
+    def holds(self, folder: Path) -> bool:
+        """Every folder and model file is one."""
+        return folder.is_dir() or folder.suffix.lower() in MODELS
+
+    def entries(self, folder: Path, tell: Told) -> list[Entry]:
+        """One entry for each model file; parts that a USD model consists of are left to it."""
+        if folder.is_file():
+            return [self._entry(folder, folder.parent)]
+        files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
+        files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
+        parts = parts_of_others(files)
+        return [self._entry(file, folder) for file in files if file not in parts]
+
+    def _entry(self, file: Path, top: Path) -> Entry:
+        key = file.relative_to(top).as_posix()
+        stem = file.stem if file.stem.lower() not in GENERIC else file.parent.name
+        name = re.sub(r"[_\-.]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem)).strip()
+        licence, author = licence_beside(file.parent, top)
+        group = file.parent.name if file.parent != top else ""
+        return Entry(key, ModelFile(file, top), name, group=group, licence=licence, author=author)
+
+
+def parts_of_others(files: list[Path]) -> set[Path]:
+    """Layers that another layer of a list refers to: payloads, sublayers, parts of one model."""
+    from pxr import Sdf, Tf
+
+    known = {file.resolve(): file for file in files}
+    found: set[Path] = set()
+    for file in files:
+        if file.suffix.lower() not in (".usd", ".usda", ".usdc"):
+            continue
+        try:
+            layer = Sdf.Layer.OpenAsAnonymous(str(file))
+        except Tf.ErrorException:
+            continue
+        for name in layer.GetCompositionAssetDependencies():
+            other = (file.parent / name).resolve()
+            if other in known and known[other] != file:
+                found.add(known[other])
+    return found
+
+
+CATALOGUE = PlainFolder()

@@ -1,0 +1,56 @@
+"""Sweet Home 3D: `.sh3f` archives of OBJ models with a catalogue of names, sizes, creators and licences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from echomodel.data.catalogues import MeshEntry, read_library
+from echomodel.data.meshes import class_by_name, reviewed
+from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.model_file import ModelFile
+
+SUFFIX = ".sh3f"
+
+
+class SweetHome:
+    """Libraries of Sweet Home 3D."""
+
+    title = "Sweet Home 3D"
+
+    def holds(self, folder: Path) -> bool:
+        """A library, or a folder with libraries somewhere below it."""
+        return folder.suffix == SUFFIX or (folder.is_dir() and any(folder.rglob(f"*{SUFFIX}")))
+
+    def entries(self, folder: Path, tell: Told) -> list[Entry]:
+        """All models; those that were looked at for this project have the class that was found by eye."""
+        libraries = [folder] if folder.is_file() else sorted(folder.rglob(f"*{SUFFIX}"))
+        found: list[Entry] = []
+        for library in libraries:
+            try:
+                found += [_entry(entry) for entry in read_library(library)]
+            except (ValueError, KeyError, OSError) as error:
+                tell(f"{library}: {error}")
+        return found
+
+
+def _entry(entry: MeshEntry) -> Entry:
+    assert entry.size is not None
+    category = class_by_name(entry.name, entry.group, entry.size)
+    known = reviewed().get(entry.key, {})
+    category = "" if known.get("use") == "0" else known.get("class", category)
+    return Entry(
+        entry.key,
+        ModelFile(entry.source, entry.source.parent, entry.member),
+        entry.name,
+        words=(),
+        group=entry.group,
+        category=category,
+        dims=entry.size,
+        turn=entry.turn,
+        front_known=True,
+        licence=entry.licence,
+        author=entry.creator,
+    )
+
+
+CATALOGUE = SweetHome()

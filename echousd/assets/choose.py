@@ -1,0 +1,220 @@
+"""Which model of a library stands for which object: by category, fit in the box, style; none repeated needlessly."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from echomodel.vocabulary import Category, vocabulary
+from echousd.assets.licences import allowed
+from echousd.assets.record import AssetRecord
+from echousd.assets.table import Library, read_library
+
+STRETCH = 1.15  # largest factor by which a model may be made longer or shorter along an axis
+EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
+OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
+AGAIN, BEYOND, UNSURE, UNLIKE = 0.6, 3.0, 0.5, 0.25
+
+
+@dataclass(frozen=True)
+class AssetWishes:
+    """What is asked of a library.
+
+    Arguments:
+        library: where models come from, None = only pieces of one's own.
+        stretch: see `STRETCH`; models with joints or colliders of their own are never stretched.
+        licences: which are allowed (`echousd.assets.licences.allowed`), empty = all.
+        text: words that the models shall be like, "" = none.
+    """
+
+    library: Library | None = None
+    stretch: float = STRETCH
+    licences: tuple[str, ...] = ()
+    text: str = ""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.stretch) and 1 <= self.stretch <= 4):
+            raise ValueError(f"stretch is {self.stretch:g}, allowed: 1 to 4")
+
+    @cached_property
+    def shelves(self) -> dict[str, Shelf]:
+        """Category -> the models that may be chosen for it."""
+        if self.library is None:
+            return {}
+        found = {}
+        for category, records in self.library.by_category.items():
+            kept = [record for record in records if not self.licences or allowed(record.licence, self.licences)]
+            if kept:
+                found[category] = Shelf(tuple(kept))
+        return found
+
+
+def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishes:
+    """What is asked, from an index's file or as it is; raises ValueError for a file that is no index."""
+    if isinstance(assets, AssetWishes):
+        return assets
+    return AssetWishes() if assets is None else AssetWishes(read_library(assets))
+
+
+def asked_of(assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None) -> AssetWishes:
+    """What the options of a command ask for; raises ValueError for an option that is not allowed."""
+    words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
+    if licences is not None and not words:
+        raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
+    return AssetWishes(None if assets is None else read_library(assets), stretch, words)
+
+
+@dataclass(frozen=True, eq=False)
+class Shelf:
+    """The models of one category; `sizes` is (n, 3) float, metres."""
+
+    records: tuple[AssetRecord, ...]
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """(n, 3) float, metres."""
+        return np.array([record.dims for record in self.records])
+
+    @cached_property
+    def doubts(self) -> np.ndarray:
+        """(n,) float, what is not known for sure of category and front."""
+        return np.array([2 - record.confidence - record.front_confidence for record in self.records])
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One object that needs a model: its name, category, style, box (3) in metres, and who shares its model."""
+
+    name: str
+    category: str
+    style: str
+    size: tuple[float, float, float]
+    shares: str = ""
+
+
+@dataclass
+class Choice:
+    """What was chosen: object name -> model; `missing` are the objects that the library has nothing for."""
+
+    chosen: dict[str, AssetRecord] = field(default_factory=dict)
+    missing: list[str] = field(default_factory=list)
+
+
+def choose(
+    wishes: AssetWishes,
+    asked: Sequence[Asked],
+    seed: int,
+    *,
+    kept: Mapping[str, AssetRecord] | None = None,
+    nearness: Mapping[str, Mapping[str, float]] | None = None,
+) -> Choice:
+    """A model for each object; equal arguments give equal choices.
+
+    Arguments:
+        asked: objects in the order in which they choose; those of one `shares` get one model.
+        kept: object name -> model that is chosen already. nearness: object name -> id of a model -> cost of its shape
+            against the one that was generated (`--shapes guided`).
+    """
+    out = Choice(dict(kept or {}))
+    groups: dict[str, AssetRecord] = {}
+    styles: dict[str, list[AssetRecord]] = {}
+    for one in asked:
+        if one.name in out.chosen:
+            groups.setdefault(one.shares or one.name, out.chosen[one.name])
+            styles.setdefault(one.style, []).append(out.chosen[one.name])
+    used = {record.id for record in out.chosen.values()}
+    for one in asked:
+        if one.name in out.chosen:
+            continue
+        found = groups.get(one.shares) if one.shares else None
+        if found is None:
+            near = (nearness or {}).get(one.name)
+            found = _best(wishes, one, used, styles.get(one.style, ()), f"{seed} {one.shares or one.name}", near)
+        if found is None:
+            out.missing.append(one.name)
+            continue
+        out.chosen[one.name] = found
+        if one.shares:
+            groups[one.shares] = found
+        styles.setdefault(one.style, []).append(found)
+        used.add(found.id)
+    return out
+
+
+def fits(record: AssetRecord, size: Sequence[float] | np.ndarray, stretch: float) -> bool:
+    """Whether a model fills a box (3) without being stretched by more than allowed along any axis."""
+    limit = 1.0 + 1e-6 if record.rigid else stretch
+    ratio = np.abs(np.log(np.asarray(size, float) / np.array(record.dims)))
+    return bool(ratio.max() <= math.log(limit) + 1e-6)
+
+
+def _best(
+    wishes: AssetWishes,
+    one: Asked,
+    used: set[str],
+    company: Sequence[AssetRecord],
+    seed: str,
+    nearness: Mapping[str, float] | None,
+) -> AssetRecord | None:
+    ranked: list[tuple[float, str, AssetRecord]] = []
+    for category, cost in _shelves_for(one.category, wishes):
+        shelf = wishes.shelves[category]
+        ratio = np.abs(np.log(np.array(one.size) / shelf.sizes))
+        costs = cost + ratio.mean(1) + BEYOND * np.maximum(ratio - math.log(wishes.stretch), 0).sum(1)
+        costs += UNSURE * shelf.doubts
+        for number in np.argsort(costs, kind="stable")[:64]:
+            record = shelf.records[number]
+            total = float(costs[number]) + (AGAIN if record.id in used else 0.0) + UNLIKE * _unlike(record, company)
+            total += (nearness or {}).get(record.id, 0.0)
+            ranked.append((total, record.id, record))
+    if not ranked:
+        return None
+    ranked.sort(key=lambda entry: entry[:2])
+    good = [entry for entry in ranked if entry[0] <= ranked[0][0] + EQUALLY_GOOD]
+    return random.Random(seed).choice(good)[2] if nearness is None else ranked[0][2]
+
+
+def _shelves_for(word: str, wishes: AssetWishes) -> list[tuple[str, float]]:
+    """Categories whose models may stand for one, with what that costs; the nearest kind that there is."""
+    row = vocabulary().category(word)
+    found = [(word, 0.0)] if word in wishes.shelves else []
+    for kin, cost in ((_same_word, OTHER_WORD), (_same_family, OTHER_FAMILY)):
+        if found:
+            break
+        found = [(c.name, cost) for c in vocabulary().categories if c.name in wishes.shelves and kin(row, c)]
+    return found
+
+
+def _same_word(one: Category, other: Category) -> bool:
+    near = {one.name, other.name}
+    general = {"chair", "dining_chair", "dressing_chair"}, {"sofa", "multi_seat_sofa"}, {"table", "dining_table"}
+    return one.sgfront == other.sgfront or any(near <= words for words in general)
+
+
+def _same_family(one: Category, other: Category) -> bool:
+    return (one.coarse, one.role, one.support) == (other.coarse, other.role, other.support)
+
+
+def _unlike(record: AssetRecord, company: Sequence[AssetRecord]) -> float:
+    """0 where a model is like those of its style group by author, words and materials, 1 where nothing is alike."""
+    if not company:
+        return 0.0
+    own = _words(record)
+    shares = []
+    for other in company:
+        words = _words(other)
+        alike = len(own & words) / max(min(len(own), len(words)), 1)
+        shares.append(max(alike, 0.5 if record.author and record.author == other.author else 0.0))
+    return 1.0 - sum(shares) / len(shares)
+
+
+def _words(record: AssetRecord) -> set[str]:
+    text = " ".join([*record.tags, *record.materials]).lower().replace("_", " ")
+    return {word for word in text.split() if len(word) > 2 and word.isalpha()}

@@ -1,0 +1,103 @@
+"""What a model is, by what it is called and how large it is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+import numpy as np
+
+from echomodel.data.furniture.sizes import size_statistics
+from echomodel.data.meshes import class_by_name
+from echomodel.vocabulary import normalised, vocabulary
+
+LABELLED, CALLED, MEANT, SHELVED = 0.97, 0.9, 0.75, 0.55  # confidence in a category by where its word stands
+UNITS = (1.0, 0.01, 0.001, 0.0254)  # metres of units that models come in, the likeliest first
+SLACK = 1.6  # how far beyond the sizes that 90 % of real ones have a size is still believed
+
+
+def category_of(
+    labels: Iterable[str], name: str, group: str = "", dims: Sequence[float] | np.ndarray | None = None
+) -> tuple[str, float]:
+    """(category, confidence) of a model, ("", 0.0) where nothing tells.
+
+    Arguments:
+        labels: words of its class, the surest first. name: what it is called. group: the shelf that it lies on.
+        dims: (3) metres, where they are known.
+    """
+    for label in labels:
+        found = known_word(label)
+        if found:
+            return _refined(found, dims), LABELLED * _likeliness(found, dims)
+    for text, confidence in ((name, CALLED), (group, SHELVED)):
+        found = known_word(text) or _within(text)
+        if found:
+            return _refined(found, dims), confidence * _likeliness(found, dims)
+        guessed = class_by_name(re.sub(r"[_\-]+", " ", text), "", np.ones(3) if dims is None else dims)
+        if guessed:
+            return guessed, (MEANT if text == name else SHELVED) * _likeliness(guessed, dims)
+    return "", 0.0
+
+
+@cache
+def _words() -> dict[str, str]:
+    """Every name and alias of a category -> the category."""
+    rows = vocabulary().categories
+    return {word: row.name for row in rows for word in row.aliases} | {row.name: row.name for row in rows}
+
+
+@cache
+def known_word(text: str) -> str:
+    """The category that a text is the name or an alias of, "" where it is none."""
+    words = _words()
+    word = re.sub(r"_?\d+$", "", normalised(text))
+    for form in (word, word.removesuffix("s")):
+        try:
+            return words[form]
+        except KeyError:
+            continue
+    return ""
+
+
+def _within(text: str) -> str:
+    """The longest name or alias of a category among the words of a text, the last where several are as long."""
+    words = [word for word in normalised(re.sub(r"\d+", " ", text)).split("_") if word]
+    for length in range(min(len(words), 4), 0, -1):
+        for start in range(len(words) - length, -1, -1):
+            found = known_word("_".join(words[start : start + length]))
+            if found:
+                return found
+    return ""
+
+
+def _refined(category: str, dims: Sequence[float] | np.ndarray | None) -> str:
+    """A general word made as particular as the size allows: a table that nobody can sit at is a coffee table."""
+    if dims is None or category not in ("table", "sofa"):
+        return category
+    return class_by_name(category, "", dims) or category
+
+
+def _likeliness(category: str, dims: Sequence[float] | np.ndarray | None) -> float:
+    """1 where a size is one that such furniture has, down to a half where none has."""
+    if dims is None:
+        return 1.0
+    return 1.0 if misfit(category, dims) == 0 else max(0.5, 1.0 - 0.35 * misfit(category, dims))
+
+
+def misfit(category: str, dims: Sequence[float] | np.ndarray) -> float:
+    """How far a size lies beyond those of real furniture of a category, as a logarithm; 0 = within, any heading."""
+    table = size_statistics(category)
+    low, high = np.log(table.low / SLACK), np.log(table.high * SLACK)
+    best = np.inf
+    for order in ((0, 1, 2), (2, 1, 0)):
+        said = np.log(np.maximum(np.asarray(dims, float)[list(order)], 1e-9))
+        best = min(best, float(np.maximum(np.maximum(low - said, said - high), 0).sum()))
+    return best
+
+
+def likely_unit(category: str, extents: np.ndarray) -> float | None:
+    """Metres of the unit in which a model is likeliest to be drawn, None where none gives a size of such furniture."""
+    found = [(misfit(category, extents * unit), place) for place, unit in enumerate(UNITS)]
+    best, place = min(found)
+    return UNITS[place] if best < 0.5 else None

@@ -1,0 +1,82 @@
+"""What the shape of a model in the object frame tells: level surfaces that carry things, and a small picture."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import trimesh
+
+LEVEL = 0.95  # least upward part of a normal
+CARRIES = 0.2  # least share of the footprint at one height that things can stand on
+SIDE = 96  # pixels of a thumbnail
+SPLATS = 24_000
+
+
+def supports(mesh: trimesh.Trimesh) -> tuple[float, ...]:
+    """Heights in metres of level surfaces, the lowest first, at most eight."""
+    normals, area = np.asarray(mesh.face_normals), np.asarray(mesh.area_faces)
+    up = normals[:, 1] > LEVEL
+    if not up.any():
+        return ()
+    low, high = mesh.bounds
+    footprint = float((high[0] - low[0]) * (high[2] - low[2]))
+    heights = np.asarray(mesh.triangles_center)[up, 1] - low[1]
+    order = np.argsort(heights)
+    heights, areas = heights[order], area[up][order]
+    starts = np.flatnonzero(np.diff(heights, prepend=-np.inf) > 0.02)
+    found = []
+    for start, end in zip(starts, [*starts[1:], len(heights)], strict=True):
+        level = areas[start:end]
+        if level.sum() >= CARRIES * footprint:
+            height = float(np.average(heights[start:end], weights=level))
+            found.append((float(level.sum()), round(height, 4)))
+    return tuple(sorted(height for _, height in sorted(found, reverse=True)[:8]))
+
+
+def thumbnail(mesh: trimesh.Trimesh, *, yaw: float = 0.6, pitch: float = 0.4) -> bytes:
+    """PNG of a mesh in the object frame, seen from its front right above, drawn as points.
+
+    Arguments:
+        mesh: +Y up, front +Z.
+        yaw, pitch: direction of view, radians; 0, 0 looks at the front.
+    """
+    from PIL import Image
+
+    cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
+    view = np.array([[cy, 0, -sy], [-sp * sy, cp, -sp * cy], [cp * sy, sp, cp * cy]])
+    points, normals, _ = sampled(mesh, SPLATS)
+    seen = points @ view.T
+    corners = trimesh.bounds.corners(mesh.bounds) @ view.T
+    low, high = corners[:, :2].min(0), corners[:, :2].max(0)
+    scale = 0.92 * SIDE / max(float((high - low).max()), 1e-9)
+    at = (seen[:, :2] - (low + high) / 2) * scale * [1, -1] + SIDE / 2
+    pixel = at.astype(int).clip(0, SIDE - 2)
+    facing = normals @ view.T
+    facing[facing[:, 2] < 0] *= -1
+    light = 0.4 + 0.6 * np.maximum(facing @ (np.array([-0.35, 0.75, 0.6]) / 1.022), 0)
+    shade = np.repeat((186.0 * light[:, None]).clip(0, 255), 3, 1)
+    order = np.argsort(seen[:, 2], kind="stable")  # the nearest last
+    picture = np.full((SIDE, SIDE, 3), 250, np.uint8)
+    for dx, dy in ((1, 1), (1, 0), (0, 1), (0, 0)):  # later ones win: a point's own pixel
+        picture[pixel[order, 1] + dy, pixel[order, 0] + dx] = shade[order]
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, "PNG")
+    return out.getvalue()
+
+
+def sampled(mesh: trimesh.Trimesh, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(points, normals, faces) of evenly chosen places on the surface, the same for the same mesh."""
+    area = np.nan_to_num(np.asarray(mesh.area_faces, float))
+    total = float(area.sum())
+    rng = np.random.default_rng(0)
+    where = (np.arange(count) + 0.5) / count
+    even = np.arange(count) % len(area)
+    face = np.searchsorted(np.cumsum(area) / total, where).clip(0, len(area) - 1) if total > 0 else even
+    share = rng.random((count, 2))
+    share = np.where(share.sum(1, keepdims=True) > 1, 1 - share, share)
+    corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)[face]]
+    points = (
+        corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0]) + share[:, 1:] * (corners[:, 2] - corners[:, 0])
+    )
+    return points, np.asarray(mesh.face_normals)[face], face

@@ -1,0 +1,87 @@
+"""A model that is a USD file: its root prim, surface, labels, licence, physics and variants."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
+
+from echousd.assets.measured import Measured
+from echousd.stage.contents import triangulated
+from echousd.stage.encoding import StageError
+from echousd.stage.files import open_stage
+from echousd.stage.foreign import labels
+from echousd.stage.forms import SkippedForms, forms
+from echousd.stage.units import metres_per_unit, up_axis
+
+IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".tga", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".hdr")
+
+
+def measured_stage(path: Path) -> Measured:
+    """What a USD file says of the model in it; raises StageError (a ValueError) as `open_stage` does."""
+    stage = open_stage(path)
+    root = root_prim(stage, path)
+    cache = UsdGeom.XformCache()
+    points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SkippedForms)
+        for form in forms(root, cache, _visible):
+            vertices, triangles = triangulated(form.prim)
+            if len(triangles):
+                points.append(vertices @ form.world[:3, :3].T + form.world[:3, 3])
+                faces.append(triangles + count)
+                count += len(vertices)
+    prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
+    layer = stage.GetRootLayer()
+    data = dict(layer.customLayerData)
+    words = {str(key).lower(): str(value) for key, value in data.items() if isinstance(value, str)}
+    joints = sum(prim.IsA(UsdPhysics.Joint) for prim in prims[1:])
+    variants = tuple(
+        f"{name}={root.GetVariantSet(name).GetVariantSelection()}" for name in root.GetVariantSets().GetNames()
+    )
+    return Measured(
+        np.concatenate(points),
+        np.concatenate(faces),
+        metres=metres_per_unit(stage) if _says_unit(stage) else None,
+        z_up=up_axis(stage) == UsdGeom.Tokens.z,
+        prim=str(root.GetPath()),
+        labels=tuple(dict.fromkeys(word for prim in prims[:50] for word in labels(prim))),
+        materials=tuple(dict.fromkeys(p.GetName() for p in prims if p.IsA(UsdShade.Material))),
+        licence=words.get("asset_license") or words.get("license") or words.get("licence") or "",
+        author=words.get("asset_credit") or words.get("author") or "",
+        joints=joints,
+        bodies=any(prim.HasAPI(UsdPhysics.RigidBodyAPI) for prim in prims),
+        colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
+        variants=variants,
+        missing=tuple(missing_files(path)),
+    )
+
+
+def root_prim(stage: Usd.Stage, path: Path) -> Usd.Prim:
+    """The prim that a reference to the file brings: the default prim, or the only root prim."""
+    default = stage.GetDefaultPrim()
+    if default:
+        return default
+    roots = [prim for prim in stage.GetPseudoRoot().GetChildren() if prim.IsA(UsdGeom.Imageable)]
+    if len(roots) != 1:
+        names = ", ".join(prim.GetName() for prim in roots[:5]) or "none"
+        raise StageError(f"{path}: no default prim and {len(roots)} root prims ({names}), allowed: a default prim")
+    return roots[0]
+
+
+def missing_files(path: Path) -> list[str]:
+    """Files that a stage depends on and that are not there, as their names end."""
+    _, _, unresolved = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(path)))
+    return sorted({PurePosixPath(str(name).replace("\\", "/")).name for name in unresolved})
+
+
+def _says_unit(stage: Usd.Stage) -> bool:
+    return any(layer.pseudoRoot.HasInfo("metersPerUnit") for layer in stage.GetUsedLayers())
+
+
+def _visible(prim: Usd.Prim) -> bool:
+    image = UsdGeom.Imageable(prim)
+    shown = image.ComputePurpose() in (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+    return shown and image.ComputeVisibility() != UsdGeom.Tokens.invisible

@@ -1,0 +1,122 @@
+"""The index of a library: one Parquet file, a row for each model."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from echomodel.files import whole_file
+from echousd.assets.record import AssetRecord
+
+VERSION = 1
+KEY = b"echousd.assets"
+KINDS = {"str": "string", "float": "float64", "int": "int64", "bool": "bool_", "bytes": "binary"}
+
+
+@dataclass(frozen=True, eq=False)
+class Library:
+    """An index that was read.
+
+    Arguments:
+        file: the Parquet file, which paths of records are relative to. records: by id, in the index's order.
+    """
+
+    file: Path
+    records: Mapping[str, AssetRecord]
+
+    @cached_property
+    def by_category(self) -> dict[str, tuple[AssetRecord, ...]]:
+        """Category -> its usable models."""
+        found: dict[str, list[AssetRecord]] = {}
+        for record in self.records.values():
+            if record.usable:
+                found.setdefault(record.category, []).append(record)
+        return {category: tuple(records) for category, records in found.items()}
+
+    def path(self, record: AssetRecord) -> tuple[Path, str]:
+        """The file of a record, and its member in it where it is an archive."""
+        file, _, member = record.uri.partition("!")
+        return (self.file.absolute().parent / file), member
+
+    def root(self, record: AssetRecord) -> Path:
+        """The folder that a record's files lie in."""
+        return self.file.absolute().parent / record.root
+
+
+def arrow() -> Any:
+    """The module pyarrow; raises ImportError that says how it is installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ImportError("libraries of assets need pyarrow (pip install 'echousd[assets]')") from None
+    return pyarrow
+
+
+def _schema() -> Any:
+    pa = arrow()
+    columns = []
+    for field in fields(AssetRecord):
+        kind = str(field.type)
+        if kind == "Vector" or kind.startswith("tuple[float"):
+            columns.append((field.name, pa.list_(pa.float64())))
+        elif kind.startswith("tuple[str"):
+            columns.append((field.name, pa.list_(pa.string())))
+        else:
+            columns.append((field.name, getattr(pa, KINDS[kind])()))
+    return pa.schema(columns)
+
+
+def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str, Any] | None = None) -> None:
+    """Write an index as a whole or not at all; raises ValueError where that is impossible."""
+    pa = arrow()
+    schema = _schema().with_metadata({KEY: json.dumps({"version": VERSION, **(about or {})}).encode()})
+    names = schema.names
+    rows = sorted(records, key=lambda record: record.id)
+    columns = {name: [_plain(getattr(record, name)) for record in rows] for name in names}
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(file) as beside:
+            pa.parquet.write_table(pa.table(columns, schema=schema), beside, compression="zstd")
+    except OSError as error:
+        raise ValueError(f"{file}: cannot be written ({error.strerror or error})") from None
+
+
+def read_library(file: str | os.PathLike[str]) -> Library:
+    """The library whose index is `file`; raises ValueError for a file that is missing or no index."""
+    file = Path(file)
+    if file.is_dir() or not file.exists():
+        found = "is a folder" if file.is_dir() else "no such file"
+        raise ValueError(f"{file}: {found}, allowed: an index, made by `echousd assets index FOLDER -o {file.name}`")
+    pa = arrow()
+    try:
+        table = pa.parquet.read_table(file)
+        about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise ValueError(f"{file}: cannot be read as an index ({reason:.120})") from None
+    if not isinstance(about, dict) or about.get("version") != VERSION:
+        version = about.get("version") if isinstance(about, dict) else "none"
+        raise ValueError(f"{file}: version {version} of an index of assets, allowed: {VERSION}; index the folder again")
+    wanted = _schema()
+    wrong = [f.name for f in wanted if f.name not in table.schema.names or table.schema.field(f.name).type != f.type]
+    if wrong:
+        raise ValueError(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
+    records: dict[str, AssetRecord] = {}
+    for row in table.select(wanted.names).to_pylist():
+        empty = [name for name, value in row.items() if value is None]
+        if empty:
+            raise ValueError(f"{file}: row {len(records) + 1} has no {empty[0]}; index the folder again")
+        fields_of: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}
+        record = AssetRecord(**fields_of)
+        records[record.id] = record
+    return Library(file, records)
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

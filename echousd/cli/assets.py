@@ -1,0 +1,56 @@
+"""`echousd assets`: libraries of other people's furniture."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from echousd.cli.output import say
+
+assets_app = typer.Typer(help="Libraries of furniture: index them, look through them.", no_args_is_help=True)
+SHOWN = 20  # faults that are told; the table holds all
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.add_typer(assets_app, name="assets")
+
+
+@assets_app.command(epilog="Example: echousd assets index ~/models -o models.parquet")
+def index(
+    folders: Annotated[list[Path], typer.Argument(help="Folders of models, or libraries.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The index (.parquet).", show_default=False)],
+    workers: Annotated[int, typer.Option(help="Processes; 0: one for each core.", min=0, max=256)] = 0,
+    table: Annotated[
+        Path | None, typer.Option(help="Table of corrections; default: beside the index, where there is one.")
+    ] = None,
+) -> None:
+    """Index a library: what its models are, how large, where their front is, and whose they are.
+
+    Models that did not change since the last run are not read again. What cannot be used is listed.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from echousd.assets.index import index as make
+
+    if table is not None and not table.is_file():
+        raise ValueError(f"{table}: no such file, allowed: a table that `echousd assets review` wrote")
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("Reading the models", total=None)
+        done = make(
+            folders,
+            output,
+            workers=workers or os.cpu_count() or 1,
+            table=table or output.with_suffix(".csv"),
+            progress=lambda count, of: bar.update(task, completed=count, total=of),
+        )
+    for fault in done.faults[:SHOWN]:
+        say(f"left out {fault}")
+    if len(done.faults) > SHOWN:
+        say(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
+    say(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")

@@ -1,0 +1,199 @@
+"""Which objects of a room are models of other people, which ones, and what sizes they insist on."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echomodel.vocabulary import vocabulary
+from echousd.assets.choose import Asked, AssetWishes, choose, fits
+from echousd.assets.describe import relative
+from echousd.assets.model_file import ModelFile
+from echousd.assets.record import AssetRecord, Vector
+from echousd.graph import SceneGraph
+from echousd.room.originals.loading import is_file, library_file, own_file, own_record
+from echousd.room.styles import ALIKE, ROOM_STYLE
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
+    from echousd.graph import Node
+
+RETRIEVED = ("library", "guided")
+TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and sets
+
+
+@dataclass(frozen=True, eq=False)
+class Retrieved:
+    """What is known of the models of a room.
+
+    Arguments:
+        chosen: object name -> model. files: object name -> where it lies.
+        sizes: object name -> (3) metres that the layout must give it, as the model cannot be stretched to another.
+        missing: objects that the library has nothing for.
+    """
+
+    chosen: Mapping[str, AssetRecord] = field(default_factory=dict)
+    files: Mapping[str, ModelFile] = field(default_factory=dict)
+    sizes: Mapping[str, Vector] = field(default_factory=dict)
+    missing: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence for what could not be had."""
+        if not self.missing:
+            return ()
+        return (f"the library has nothing for {', '.join(self.missing)}: made by the project's own programs",)
+
+
+def source_of(node: Node, shapes: str) -> str:
+    """The source of one object: its own word, what its asset asks for, else the room's."""
+    if node.source:
+        return node.source
+    return shapes if node.asset is None else "own" if is_file(node.asset) else "library"
+
+
+def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
+    """The graph with the files of assets as absolute paths; relative ones are in `folder`."""
+    if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
+        return graph
+    nodes = (
+        node.replaced(asset=(folder.absolute() / node.asset).as_posix())
+        if node.asset is not None and is_file(node.asset)
+        else node
+        for node in graph.nodes
+    )
+    return graph.replaced(nodes=tuple(nodes))
+
+
+def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
+    """The graph with the files of assets relative to a room's folder, as a saved room tells them."""
+    if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
+        return graph
+    nodes = (
+        node.replaced(asset=relative(Path(node.asset), folder.absolute() / "graph"))
+        if node.asset is not None and is_file(node.asset)
+        else node
+        for node in graph.nodes
+    )
+    return graph.replaced(nodes=tuple(nodes))
+
+
+def given_pieces(graph: SceneGraph, shapes: str, wishes: AssetWishes, among: Container[str] | None = None) -> Retrieved:
+    """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
+
+    Arguments:
+        shapes: the room's source. among: names of the objects that are looked at, None = all.
+    """
+    chosen: dict[str, AssetRecord] = {}
+    files: dict[str, ModelFile] = {}
+    sizes: dict[str, Vector] = {}
+    for node in graph.nodes:
+        if among is not None and node.name not in among:
+            continue
+        if node.asset is None:
+            if source_of(node, shapes) in RETRIEVED and wishes.library is None:
+                raise ValueError(f"object {node.name!r}: from a library, but none is given; name one (--assets LIB)")
+            continue
+        try:
+            chosen[node.name], files[node.name] = _given(node, wishes)
+        except (ValueError, ImportError) as error:
+            raise ValueError(f"object {node.name!r}: {error}") from None
+        if node.size is None:
+            sizes[node.name] = chosen[node.name].dims
+    return Retrieved(chosen, files, sizes)
+
+
+def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
+    assert node.asset is not None
+    if is_file(node.asset):
+        return own_record(node.asset, node.category), own_file(node.asset)
+    if wishes.library is None:
+        raise ValueError(f"asset {node.asset!r} is in a library, but none is given; name one (--assets LIB)")
+    record = wishes.library.records.get(node.asset)
+    if record is None or record.fault:
+        why = "is not in it" if record is None else record.fault
+        raise ValueError(f"{wishes.library.file}: asset {node.asset!r} {why}")
+    return record, library_file(wishes.library, record)
+
+
+def retrieved(
+    graph: SceneGraph,
+    boxes: Boxes,
+    styles: Mapping[str, str],
+    shapes: str,
+    wishes: AssetWishes,
+    seed: int,
+    given: Retrieved,
+    nearness: Mapping[str, Mapping[str, float]] | None = None,
+    among: Container[str] | None = None,
+) -> Retrieved:
+    """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
+
+    Arguments:
+        boxes: n boxes in the order of the nodes. styles: object name -> style. shapes: the room's source.
+        given: what `given_pieces` found. nearness: as for `choose`. among: as for `given_pieces`.
+    """
+    size = np.asarray(boxes.size, float)
+    wanted = [
+        i
+        for i, node in enumerate(graph.nodes)
+        if source_of(node, shapes) in RETRIEVED and (among is None or node.name in among)
+    ]
+    asked = _asked(graph, wanted, size, styles)
+    found = choose(wishes, asked, seed, kept=given.chosen, nearness=nearness)
+    files, sizes = dict(given.files), dict(given.sizes)
+    for i in wanted:
+        node = graph.nodes[i]
+        record = found.chosen.get(node.name)
+        if record is None or node.name in given.chosen:
+            continue
+        assert wishes.library is not None
+        files[node.name] = library_file(wishes.library, record)
+        if not fits(record, size[i], wishes.stretch) and node.size is None:
+            sizes[node.name] = record.dims
+    return Retrieved(found.chosen, files, sizes, tuple(found.missing))
+
+
+def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping[str, str]) -> list[Asked]:
+    """The objects with who shares a model with whom: those of one category and style group, and sets."""
+    heads: list[tuple[int, str]] = []
+    out = []
+    for i in rows:
+        node = graph.nodes[i]
+        style = styles[node.name]
+        shares = ""
+        if style != ROOM_STYLE or vocabulary().category(node.category).stands in TOGETHER:
+            near = 2 * ALIKE if style == ROOM_STYLE else np.inf
+            shares = next(
+                (
+                    name
+                    for first, name in heads
+                    if (graph.nodes[first].category, styles[graph.nodes[first].name]) == (node.category, style)
+                    and np.abs(np.log(size[i] / size[first])).max() <= near
+                ),
+                node.name,
+            )
+            if shares == node.name:
+                heads.append((i, node.name))
+        out.append(Asked(node.name, node.category, style, tuple(map(float, size[i])), shares))  # type: ignore[arg-type]
+    return out
+
+
+def with_given_sizes(graph: SceneGraph, sizes: Mapping[str, Vector]) -> SceneGraph:
+    """The graph in which the sizes of some objects are fixed."""
+    if not sizes:
+        return graph
+    nodes = (replace_size(node, sizes) for node in graph.nodes)
+    return graph.replaced(nodes=tuple(nodes))
+
+
+def replace_size(node: Node, sizes: Mapping[str, Vector]) -> Node:
+    """The node with the size that is known for it, unless it states its own."""
+    if node.size is not None or node.name not in sizes:
+        return node
+    sized: Node = node.replaced(size=sizes[node.name])
+    return sized
