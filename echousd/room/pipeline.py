@@ -119,8 +119,7 @@ def generate(
         echo = load_model(model, preset)
         shapes = shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
-    with timer.stage("assets"):
-        given = given_pieces(graph, shapes, wishes)
+    given = given_pieces(graph, shapes, wishes, timer=timer)
     sizes = dict(given.sizes)
     check_doors(graph)
     graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
@@ -145,8 +144,7 @@ def generate(
 
     graph, boxes, notes, more = laid_out(graph)
     left_out = (*left_out, *more)
-    with timer.stage("assets"):
-        models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given)
+    models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given, timer=timer)
     if models.sizes != sizes:  # real sizes shape the layout
         sizes |= models.sizes
         graph, boxes, notes, more = laid_out(graph)

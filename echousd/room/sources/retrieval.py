@@ -16,6 +16,7 @@ from echousd.assets.model_file import ModelFile
 from echousd.assets.record import AssetRecord, Vector
 from echousd.graph import SceneGraph
 from echousd.room.originals.loading import is_file, library_file, own_file, own_record
+from echousd.room.progress import StageTimer
 from echousd.room.styles import ALIKE, ROOM_STYLE
 
 if TYPE_CHECKING:
@@ -82,28 +83,34 @@ def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
     return graph.replaced(nodes=tuple(nodes))
 
 
-def given_pieces(graph: SceneGraph, shapes: str, wishes: AssetWishes, among: Container[str] | None = None) -> Retrieved:
+def given_pieces(
+    graph: SceneGraph,
+    shapes: str,
+    wishes: AssetWishes,
+    among: Container[str] | None = None,
+    timer: StageTimer | None = None,
+) -> Retrieved:
     """The models that the graph names itself, with their real sizes; raises ValueError that names object and file.
 
     Arguments:
-        shapes: the room's source. among: names of the objects that are looked at, None = all.
+        shapes: the room's source. among: names of the objects that are looked at, None = all. timer: is told.
     """
+    nodes = [node for node in graph.nodes if among is None or node.name in among]
+    for node in nodes:
+        if node.asset is None and source_of(node, shapes) in RETRIEVED and wishes.library is None:
+            raise ValueError(f"object {node.name!r}: from a library, but none is given; name one (--assets LIB)")
+    named = [node for node in nodes if node.asset is not None]
+    if not named:
+        return Retrieved()
     chosen: dict[str, AssetRecord] = {}
     files: dict[str, ModelFile] = {}
-    sizes: dict[str, Vector] = {}
-    for node in graph.nodes:
-        if among is not None and node.name not in among:
-            continue
-        if node.asset is None:
-            if source_of(node, shapes) in RETRIEVED and wishes.library is None:
-                raise ValueError(f"object {node.name!r}: from a library, but none is given; name one (--assets LIB)")
-            continue
-        try:
-            chosen[node.name], files[node.name] = _given(node, wishes)
-        except (ValueError, ImportError) as error:
-            raise ValueError(f"object {node.name!r}: {error}") from None
-        if node.size is None:
-            sizes[node.name] = chosen[node.name].dims
+    with (timer or StageTimer()).stage("assets"):
+        for node in named:
+            try:
+                chosen[node.name], files[node.name] = _given(node, wishes)
+            except (ValueError, ImportError) as error:
+                raise ValueError(f"object {node.name!r}: {error}") from None
+    sizes = {node.name: chosen[node.name].dims for node in named if node.size is None}
     return Retrieved(chosen, files, sizes)
 
 
@@ -130,31 +137,34 @@ def retrieved(
     given: Retrieved,
     nearness: Mapping[str, Mapping[str, float]] | None = None,
     among: Container[str] | None = None,
+    timer: StageTimer | None = None,
 ) -> Retrieved:
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
 
     Arguments:
         boxes: n boxes in the order of the nodes. styles: object name -> style. shapes: the room's source.
-        given: what `given_pieces` found. nearness: as for `choose`. among: as for `given_pieces`.
+        given: what `given_pieces` found. nearness: as for `choose`. among, timer: as for `given_pieces`.
     """
-    size = np.asarray(boxes.size, float)
     wanted = [
         i
         for i, node in enumerate(graph.nodes)
         if source_of(node, shapes) in RETRIEVED and (among is None or node.name in among)
     ]
-    asked = _asked(graph, wanted, size, styles)
-    found = choose(wishes, asked, seed, kept=given.chosen, nearness=nearness)
-    files, sizes = dict(given.files), dict(given.sizes)
-    for i in wanted:
-        node = graph.nodes[i]
-        record = found.chosen.get(node.name)
-        if record is None or node.name in given.chosen:
-            continue
-        assert wishes.library is not None
-        files[node.name] = library_file(wishes.library, record)
-        if not fits(record, size[i], wishes.stretch) and node.size is None:
-            sizes[node.name] = record.dims
+    if not wanted:
+        return given
+    size = np.asarray(boxes.size, float)
+    with (timer or StageTimer()).stage("assets"):
+        found = choose(wishes, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness)
+        files, sizes = dict(given.files), dict(given.sizes)
+        for i in wanted:
+            node = graph.nodes[i]
+            record = found.chosen.get(node.name)
+            if record is None or node.name in given.chosen:
+                continue
+            assert wishes.library is not None
+            files[node.name] = library_file(wishes.library, record)
+            if not fits(record, size[i], wishes.stretch) and node.size is None:
+                sizes[node.name] = record.dims
     return Retrieved(found.chosen, files, sizes, tuple(found.missing))
 
 
