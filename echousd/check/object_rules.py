@@ -11,7 +11,7 @@ from echousd.check.findings import Finding, Rule
 from echousd.stage import encoding as usd
 from echousd.stage.contents import read_contents, room_frame
 from echousd.stage.encoding import StageError
-from echousd.stage.foreign import known_category
+from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims, find_rooms, value
 from echousd.stage.values import matrix, texts
 

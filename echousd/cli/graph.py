@@ -37,6 +37,8 @@ GRAPH_EXAMPLES = """Examples:
 
     echousd graph house.usda --room /House/Bedroom --json > bedroom.json
 
+    echousd graph scan.usdc --names --relations 2 --yaml > room.yaml
+
     echousd graph --schema > scenegraph.schema.json"""
 
 
@@ -135,6 +137,15 @@ def graph(
         Path | None, typer.Argument(metavar="GRAPH", help="Stage (.usda .usdc .usd .usdz), YAML or JSON.")
     ] = None,
     room: Annotated[str | None, typer.Option(metavar="PRIM", help="Prim path of one room of several.")] = None,
+    names: Annotated[
+        bool, typer.Option("--names", help="Of a stage without a graph: names of prims count where labels are missing.")
+    ] = False,
+    relations: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N", help="Add N relations an object from the boxes, near and meaningful ones first.", min=0
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the canonical JSON form.")] = False,
     as_yaml: Annotated[bool, typer.Option("--yaml", help="Print the short YAML form.")] = False,
     as_dot: Annotated[bool, typer.Option("--dot", help="Print Graphviz' dot.")] = False,
@@ -162,10 +173,21 @@ def graph(
     for path, suffix in ((png, ".png"), (svg, ".svg")):
         if path is not None and path.suffix.lower() != suffix:
             raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {suffix}")
-    if not chosen and png is None and svg is None and room is None and source.suffix.lower() in STAGE_FORMS:
-        shown = _rooms(source)
+    on_stage = source.suffix.lower() in STAGE_FORMS
+    if on_stage and (names or (not chosen and png is None and svg is None and room is None)):
+        shown = _rooms(source, names=names)
+        if room is not None:
+            if room not in shown:
+                raise GraphError(f"{source}: no room {room!r}, allowed: {', '.join(filter(None, shown)) or 'none'}")
+            shown = {"": shown[room]}
+        elif len(shown) > 1 and (chosen or png or svg):
+            raise GraphError(f"{source}: {len(shown)} rooms, say which one of {', '.join(shown)} (--room)")
     else:
         shown = {"": load_graph(source, room)}
+    if relations is not None:
+        from echousd.stage import relations_from_boxes
+
+        shown = {prim: relations_from_boxes(each, per_object=relations) for prim, each in shown.items()}
     only = next(iter(shown.values()))
     for path in (png, svg):
         if path is not None:
@@ -192,13 +214,13 @@ def graph(
             (_print_table if as_table else _print_tree)(console, each, prim)
 
 
-def _rooms(source: Path) -> dict[str, SceneGraph]:
+def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
     """All rooms of a stage by prim path; a single one goes without."""
-    from echousd.stage import open_stage, read_graph, read_rooms
+    from echousd.stage import foreign_rooms, open_stage, read_rooms
 
     stage = open_stage(source)
-    rooms = read_rooms(stage)
-    return rooms if len(rooms) > 1 else {"": read_graph(stage)}
+    rooms = read_rooms(stage) or foreign_rooms(stage, names=names)
+    return rooms if len(rooms) > 1 else {"": next(iter(rooms.values()))}
 
 
 def _summary(made: SceneGraph) -> str:

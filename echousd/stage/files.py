@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
+import warnings
 from pathlib import Path
 
 from pxr import Sdf, Tf, Usd, UsdUtils
@@ -12,6 +14,9 @@ from echomodel.files import whole_file
 from echousd.stage.encoding import StageError
 
 WRITABLE = (".usd", ".usda", ".usdc")
+MATERIALS = re.compile(
+    r"Could not open asset @([^@]*\.mtlx)@", re.IGNORECASE
+)  # a MaterialX document, not there or no plugin
 READABLE = (*WRITABLE, ".usdz")
 
 
@@ -40,10 +45,21 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
-    errors = stage.GetCompositionErrors()
-    if errors:
-        raise StageError(f"{path}: does not compose: {one_line(str(errors[0]))}")
+    errors = [str(error) for error in stage.GetCompositionErrors()]
+    materials = [text for text in errors if MATERIALS.match(text)]
+    if len(materials) < len(errors):
+        wrong = next(text for text in errors if text not in materials)
+        raise StageError(f"{path}: does not compose: {one_line(wrong)}")
+    if materials:
+        names = ", ".join(dict.fromkeys(Path(MATERIALS.match(text)[1]).name for text in materials))  # type: ignore[index]
+        warnings.warn(
+            f"{path}: materials that cannot be read here are left out: {names}", MissingMaterials, stacklevel=2
+        )
     return stage
+
+
+class MissingMaterials(UserWarning):
+    """A stage refers to materials in a form that this OpenUSD does not read, such as MaterialX without its plugin."""
 
 
 def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:

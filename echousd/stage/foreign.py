@@ -6,24 +6,23 @@ import math
 import os
 import warnings
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
-from echomodel.roomboxes import RoomBoxes, footprints
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
-from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import UnknownWord, vocabulary
+from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
+from echousd.stage.labels import category_of_name, is_floor, is_structure, known_category, labels, room_word
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import texts
 
-LABELS_SCHEMA = "SemanticsLabelsAPI:"
-OLD_SCHEMA = "SemanticsAPI:"  # Omniverse before UsdSemantics
-STRUCTURE = frozenset({"floor", "wall", "walls", "ceiling", "door", "window", "room", "building", "curtain", "rug"})
+OBSTACLE = "cabinet"  # what a fixed thing of an unknown class is taken for
+LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
+STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
 _FLAT = 1e-18  # the determinant of a transform that leaves no volume
 _Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) of a Z-up stage -> (x, z, -y)
@@ -81,84 +80,157 @@ def _box(size: np.ndarray, centre: np.ndarray, yaw: float) -> Box:
     return Box((width, height, depth), (x, y - height / 2, z), yaw)
 
 
-def foreign_graph(stage: Usd.Stage | str | os.PathLike[str], room_type: str | None = None) -> SceneGraph:
+def foreign_graph(
+    stage: Usd.Stage | str | os.PathLike[str], room_type: str | None = None, *, names: bool = False
+) -> SceneGraph:
     """The nodes of a stage without a scene graph: its topmost prims with semantics labels and bounds, boxes fixed.
 
     A label of any SemanticsLabelsAPI instance or of Omniverse's SemanticsAPI counts if the vocabulary knows it; the
-    instance `category` is asked first. Lengths and axes are converted to metres and +Y up. A prim labelled `floor`
-    gives the floor. Without `room_type` it is guessed: by a prim's name or label, else by the furniture.
-    Warns `SkippedPrims`; raises StageError where nothing is left.
+    instance `category` is asked first. Large things of unknown labels become locked obstacles. Lengths and axes are
+    converted to metres and +Y up. A prim labelled `floor` gives the floor. Without `room_type` it is guessed: by a
+    prim's name or label, else by the furniture. Warns `SkippedPrims`; raises StageError where nothing is left.
+
+    Arguments:
+        names: what has no label is known by the name of its asset or prim.
     """
     stage = opened(stage)
+    found = _read(stage, names=names)
+    floor = next((box for _, box in found.floors), None)
+    return _graph(stage, [node for _, node in found.nodes], floor, room_type, found.words)
+
+
+def foreign_rooms(stage: Usd.Stage | str | os.PathLike[str], *, names: bool = False) -> dict[str, SceneGraph]:
+    """The rooms of a house without scene graphs, by prim path: those that prims are called after, else one a floor.
+
+    What belongs to no room is told (`SkippedPrims`). A stage that tells of no rooms is one room, with the path "".
+
+    Arguments:
+        names: as for `foreign_graph`.
+    """
+    stage = opened(stage)
+    found = _read(stage, names=names)
+    members: dict[str, list[Node]] = {}
+    for path, node in found.nodes:
+        members.setdefault(_room_above(stage.GetPrimAtPath(path)), []).append(node)
+    inside = {key: box for key, box in ((_room_above(stage.GetPrimAtPath(p)), box) for p, box in found.floors) if key}
+    if len({key for key in members if key}) < 2:
+        if len(found.floors) < 2:
+            floor = next((box for _, box in found.floors), None)
+            return {"": _graph(stage, [node for _, node in found.nodes], floor, None, found.words)}
+        members, inside = {}, {str(path): box for path, box in found.floors}
+        for _, node in found.nodes:
+            members.setdefault(next((key for key, box in inside.items() if _over(node, box)), ""), []).append(node)
+    homeless = [node.name for node in members.pop("", ())]
+    if homeless:
+        warnings.warn(f"{source(stage)}: in no room: {', '.join(homeless[:8])}", SkippedPrims, stacklevel=2)
+    return {
+        key: _graph(stage, nodes, inside.get(key), None, [key.rpartition("/")[2]]) for key, nodes in members.items()
+    }
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a stage holds: prim path and node, prim path and box of every floor, and all words."""
+
+    nodes: list[tuple[Sdf.Path, Node]]
+    floors: list[tuple[Sdf.Path, Box]]
+    words: list[str]
+
+
+def _read(stage: Usd.Stage, *, names: bool) -> _Found:
     frame = StageFrame.of(stage)
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
-    nodes: dict[str, Node] = {}
-    floor: Box | None = None
-    room_words: list[str] = []
+    found = _Found([], [], [])
+    taken: set[str] = set()
     skipped: Counter[str] = Counter()
+    obstacles: Counter[str] = Counter()
     prims = iter(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()))
     for prim in prims:
         words = list(labels(prim))
-        room_words += [*words, prim.GetName()]
-        category = next(filter(None, map(known_category, words)), None)
+        found.words.extend((*words, prim.GetName()))
+        category, told = next(filter(None, map(known_category, words)), None), {}
+        if category is None and names and not words:
+            category = category_of_name(prim)
         if category is None:
-            if "floor" in map(normalised, words) and floor is None:
-                floor = frame.box(_object_bound(cache, prim))
-            elif words and not any(_is_structure(word) for word in words):
+            if is_floor(prim, words, names=names) and (ground := frame.box(_object_bound(cache, prim))) is not None:
+                found.floors.append((prim.GetPath(), ground))
+            if not words or any(is_structure(word) for word in words):
+                continue
+            if not _holds_furniture(prim) and _is_large(frame.box(_object_bound(cache, prim))):
+                category, told = OBSTACLE, {"obstacle": words[0]}
+                obstacles[words[0]] += 1
+            else:
                 skipped[f"unknown label {words[0]!r}"] += 1
-            continue
+                continue
         box = frame.box(_object_bound(cache, prim))
         if box is None or min(box.size) <= 0:
             skipped["no bounds"] += 1
             continue
         prims.PruneChildren()
         ascii_name = prim.GetName().encode("ascii", "replace").decode().replace("?", "_")
-        name = free_name(Tf.MakeValidIdentifier(ascii_name), nodes)
-        nodes[name] = Node(name, category, size=box.size, position=box.position, yaw=box.yaw)
-    if skipped:
-        told = ", ".join(f"{reason} ({count})" for reason, count in skipped.most_common(8))
-        warnings.warn(f"{source(stage)}: labelled prims that became no node: {told}", SkippedPrims, stacklevel=2)
-    if not nodes:
+        name = free_name(Tf.MakeValidIdentifier(ascii_name), taken)
+        taken.add(name)
+        node = Node(
+            name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told
+        )
+        found.nodes.append((prim.GetPath(), node))
+    _tell(stage, skipped, obstacles)
+    if not found.nodes:
         raise StageError(
             f"{source(stage)}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds "
-            "to make one of"
+            "to make one of" + ("" if names else "; `echousd graph --names` takes the names of prims for labels")
         )
-    kind = room_type or _room_type(room_words, [node.category for node in nodes.values()])
+    return found
+
+
+def _tell(stage: Usd.Stage, skipped: Counter[str], obstacles: Counter[str]) -> None:
+    said = []
+    if skipped:
+        told = ", ".join(f"{reason} ({count})" for reason, count in skipped.most_common(8))
+        said.append(f"labelled prims that became no node: {told}")
+    if obstacles:
+        told = ", ".join(f"{word!r} ({count})" for word, count in obstacles.most_common(8))
+        said.append(f"unknown labels, fixed obstacles: {told}")
+    if said:
+        warnings.warn(f"{source(stage)}: {'; '.join(said)}", SkippedPrims, stacklevel=4)
+
+
+def _graph(
+    stage: Usd.Stage, nodes: list[Node], floor: Box | None, room_type: str | None, words: list[str]
+) -> SceneGraph:
+    kind = room_type or _room_type(words, [node.category for node in nodes])
     try:
-        return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes.values()))
+        return SceneGraph(RoomSpec(kind, floor_polygon=_corners(floor)), tuple(nodes))
     except GraphError as error:
         raise StageError(f"{source(stage)}: {error}") from None
 
 
-def labels(prim: Usd.Prim) -> Iterator[str]:
-    """All semantics labels of a prim, those of the taxonomy `category` first."""
-    applied = prim.GetPrimTypeInfo().GetAppliedAPISchemas()
-    new = [name.removeprefix(LABELS_SCHEMA) for name in applied if name.startswith(LABELS_SCHEMA)]
-    for taxonomy in sorted(new, key=lambda name: name != "category"):
-        attribute = prim.GetAttribute(f"semantics:labels:{taxonomy}")
-        yield from texts(attribute)
-    for name in applied:
-        if name.startswith(OLD_SCHEMA):
-            attribute = prim.GetAttribute(f"semantic:{name.removeprefix(OLD_SCHEMA)}:params:semanticData")
-            for found in texts(attribute):
-                yield from (word.strip() for word in found.split(","))
+def _is_large(box: Box | None) -> bool:
+    return box is not None and min(box.size) > 0 and sorted(box.size)[1] >= LARGE
 
 
-def known_category(word: str) -> str | None:
-    """The vocabulary's name for a label, None where it has none."""
-    try:
-        return vocabulary().category(word).name
-    except UnknownWord:
-        return None
+def _holds_furniture(prim: Usd.Prim) -> bool:
+    below = Usd.PrimRange(prim, Usd.TraverseInstanceProxies())
+    return any(known_category(word) for each in below if each != prim for word in labels(each))
 
 
-def _is_structure(word: str) -> bool:
-    if normalised(word) in STRUCTURE:
-        return True
-    try:
-        return bool(vocabulary().room_type(word))
-    except UnknownWord:
-        return False
+def _room_above(prim: Usd.Prim) -> str:
+    """Path of the innermost prim above one that is labelled or called as a room, "" = there is none."""
+    above = prim.GetParent()
+    while above and not above.IsPseudoRoot():
+        if any(room_word(word) for word in (*labels(above), above.GetName())):
+            return str(above.GetPath())
+        above = above.GetParent()
+    return ""
+
+
+def _over(node: Node, floor: Box) -> bool:
+    """Whether the middle of a node is above a floor and no storey higher."""
+    assert node.position is not None
+    x, y, z = np.subtract(node.position, floor.position)
+    cos, sin = math.cos(floor.yaw), math.sin(floor.yaw)
+    along = (abs(cos * x - sin * z), abs(sin * x + cos * z))
+    return along[0] <= floor.size[0] / 2 and along[1] <= floor.size[2] / 2 and -0.5 < y < STOREY
 
 
 def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:
@@ -200,48 +272,3 @@ def _room_type(words: list[str], categories: list[str]) -> str:
     if "dining_table" in has:
         return "living_dining_room" if "sofa" in coarse else "dining_room"
     return "study" if "desk" in has and "sofa" not in coarse else "living_room"
-
-
-def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict") -> SceneGraph:
-    """`graph` with the relations that its boxes show (SG-FRONT's rules) between pairs that it says nothing about.
-
-    Arguments:
-        graph: every node with size, position and yaw, as `foreign_graph` reads them.
-        rules: `strict` or `sgfront`, see `echomodel.rules`.
-
-    Raises StageError for a node without a box.
-    """
-    from echomodel.rules import label_relations
-
-    found = label_relations(room_boxes(graph), rules=rules)
-    names = {predicate.id: predicate.name for predicate in vocabulary().predicates}
-    stated = {frozenset((relation.subject, relation.object)) for relation in graph.relations}
-    nodes = graph.names
-    triples = [(nodes[s], names[p], nodes[o]) for s, p, o in np.asarray(found).tolist()]
-    new = tuple(Relation(*triple) for triple in triples if frozenset((triple[0], triple[2])) not in stated)
-    return SceneGraph(graph.room, graph.nodes, (*graph.relations, *new))
-
-
-def room_boxes(graph: SceneGraph) -> RoomBoxes:
-    """A graph whose nodes all have boxes as `RoomBoxes`; the floor, where unknown, is the boxes' bounding rectangle."""
-    for node in graph.nodes:
-        if node.size is None or node.position is None or node.yaw is None:
-            raise StageError(f"object {node.name!r} has no size, position and yaw, allowed: a box for every object")
-    size = np.array([node.size for node in graph.nodes])
-    position = np.array([node.position for node in graph.nodes])
-    styles = {style: number for number, style in enumerate(dict.fromkeys(n.style for n in graph.nodes if n.style))}
-    reach = np.hypot(size[:, 0], size[:, 2])[:, None] / 2
-    low, high = (position[:, ::2] - reach).min(0), (position[:, ::2] + reach).max(0)
-    corners = graph.room.floor_polygon or ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1]))
-    return RoomBoxes(
-        id="stage",
-        room_type=graph.room.type,
-        floor_polygon=np.array(corners),
-        height=graph.room.height or float((position[:, 1] + size[:, 1]).max()),
-        categories=tuple(node.category for node in graph.nodes),
-        size=size,
-        position=position,
-        yaw=np.array([node.yaw for node in graph.nodes], float),
-        models=("",) * len(graph.nodes),
-        styles=tuple(styles.get(node.style, -1) if node.style else -1 for node in graph.nodes),
-    )

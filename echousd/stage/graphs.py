@@ -9,7 +9,7 @@ from pxr import Sdf, Usd
 from echousd.graph import SceneGraph
 from echousd.stage import values
 from echousd.stage.files import opened
-from echousd.stage.foreign import foreign_graph
+from echousd.stage.foreign import foreign_graph, foreign_rooms
 from echousd.stage.read import find_rooms, room_graph, the_room
 from echousd.stage.update import update_graph
 from echousd.stage.write import author, prim_path
@@ -24,6 +24,10 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
     stage = opened(stage)
     with values.reading(stage):
         rooms = find_rooms(stage)
+        if not rooms and room is not None:
+            found = foreign_rooms(stage)
+            if room in found:
+                return found[room]
         if rooms or room is not None:
             return room_graph(the_room(stage, room, rooms))
         return foreign_graph(stage)

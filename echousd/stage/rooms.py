@@ -13,8 +13,8 @@ import numpy as np
 from echomodel.roomboxes import RoomBoxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.stage.boxes import room_boxes
 from echousd.stage.files import save_layer
-from echousd.stage.foreign import room_boxes
 from echousd.stage.read import read_rooms
 from echousd.stage.write import graph_layer
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from echomodel.boxes import Boxes
+from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import BoxesLike
 
 SELDOM = 0.3  # weight of sizes and styles among the relations that are told
@@ -61,3 +64,9 @@ def told_relations(relations: Tensor, boxes: BoxesLike, per_object: float, gener
     one, other = number // count, number % count
     ranked = near_first(holds, boxes, one, other, torch.tensor([count]), generator)[: round(per_object * count)]
     return torch.stack([one[ranked[:, 0]], ranked[:, 1], other[ranked[:, 0]]], 1)
+
+
+def told_of_room(relations: np.ndarray | Tensor, room: RoomBoxes, per_object: float, seed: int = 0) -> np.ndarray:
+    """`told_relations` of a room's boxes as (e, 3) int64 numpy; `seed` of the draws."""
+    luck = torch.Generator().manual_seed(seed)
+    return np.asarray(told_relations(torch.as_tensor(relations), Boxes.from_room(room), per_object, luck))

@@ -10,7 +10,8 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics
 
 from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import StageError, foreign_graph, graph_layer, read_graph, relations_from_boxes
-from echousd.stage.foreign import SkippedPrims, room_boxes
+from echousd.stage.boxes import room_boxes
+from echousd.stage.foreign import SkippedPrims
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 
@@ -206,8 +207,12 @@ def test_what_is_left_out_is_told():
     label(box_mesh(stage, "/World/bed", (0, 0, 0), (1, 1, 1)).GetPrim(), "bed")
     label(box_mesh(stage, "/World/piano", (0, 0, 0), (1, 1, 1)).GetPrim(), "grand piano")
     label(UsdGeom.Xform.Define(stage, "/World/ghost").GetPrim(), "chair")
-    with pytest.warns(SkippedPrims, match=r"became no node: unknown label 'grand piano' \(1\), no bounds \(1\)"):
-        assert read_graph(stage).names == ("bed",)
+    told = r"became no node: no bounds \(1\); unknown labels, fixed obstacles: 'grand piano' \(1\)"
+    with pytest.warns(SkippedPrims, match=told):
+        graph = read_graph(stage)
+    assert graph.names == ("bed", "piano")
+    assert graph.node("piano").locked
+    assert graph.node("piano").attributes == {"obstacle": "grand piano"}
 
 
 def test_labels_without_bounds_are_no_graph():
@@ -215,7 +220,7 @@ def test_labels_without_bounds_are_no_graph():
     label(UsdGeom.Xform.Define(stage, "/World/ghost").GetPrim(), "chair")
     with (
         pytest.warns(SkippedPrims),
-        pytest.raises(StageError, match=r"no prims with semantics labels and bounds to make one of$"),
+        pytest.raises(StageError, match=r"no prims with semantics labels and bounds to make one of; "),
     ):
         read_graph(stage)
 
