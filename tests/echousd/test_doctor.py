@@ -111,5 +111,5 @@ def Cube "harp" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
     assert done.returncode == 0
     assert json.loads(done.stdout)["nodes"][0]["category"] == "double_bed"
     assert done.stderr.startswith("warning: ")
-    assert done.stderr.endswith("foreign.usda: unknown labels, fixed obstacles: 'harp' (1)\n")
+    assert done.stderr.endswith("foreign.usda: labelled prims that became no node: unknown label 'harp' (1)\n")
     assert done.stderr.count("\n") == 1

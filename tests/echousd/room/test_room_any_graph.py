@@ -4,12 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 
 import echousd
 from echomodel.vocabulary import vocabulary
-from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
 from echousd.room.verdicts import RoomWarning
 
 WORDS = st.sampled_from([row.name for row in vocabulary().categories])
@@ -37,10 +37,8 @@ def test_graphs_without_relations_become_rooms(graph, seed):
         warnings.simplefilter("ignore", RoomWarning)
         try:
             room = echousd.generate(graph, seed=seed, shapes="boxes", drafts=1)
-        except ValueError as error:
-            assert str(error).strip()
-            assert "argmax" not in str(error)
-            return
+        except GraphError:  # the floor is too small for it, which is said in one line
+            reject()
     assert room.names == graph.names
     for row, node in enumerate(graph.nodes):
         if node.position is not None:

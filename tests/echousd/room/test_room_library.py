@@ -111,9 +111,7 @@ def test_a_model_that_vanished_or_changed_since_it_was_indexed_is_told(tmp_path)
     folder = small_library(tmp_path / "models")
     file = index([folder], tmp_path / "lib.parquet").file
     (folder / "storage/thing_17.usda").write_text("#usda 1.0\n")
-    with pytest.raises(
-        ValueError, match=r"storage/thing_17.usda': .* was changed since; index the folder again"
-    ):
+    with pytest.raises(ValueError, match=r"storage/thing_17.usda': .* was changed since; index the folder again"):
         echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
     (folder / "storage/thing_17.usda").unlink()
     with pytest.raises(ValueError, match=r"thing_17.usda: no such file; index the folder again"):
