@@ -110,22 +110,23 @@ def report(
 
     Example: echousd data report --count 2000 --worst 20
     """
-    from echomodel.data.report import compare, section_means
+    from echomodel.data.report import compare, left_out, section_means
     from echomodel.data.room_files import load_rooms
     from echomodel.data.rooms import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
-    rows = compare(drawn, None if real is None else load_rooms(real))
+    others = None if real is None else load_rooms(real)
+    rows = compare(drawn, others)
     chosen = sorted((r for r in rows if r.section.startswith(section or "")), key=lambda row: -row.distance)
-    _print_rows(rows, chosen[: worst or None], section_means(rows), json_out)
+    _print_rows(rows, chosen[: worst or None], section_means(rows), left_out(drawn, others), json_out)
 
 
-def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], as_json: bool) -> None:
+def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], silent: list[str], as_json: bool) -> None:
     if as_json:
         import json
         from dataclasses import asdict
 
-        typer.echo(json.dumps({"mean_distance": means, "rows": [asdict(row) for row in rows]}))
+        typer.echo(json.dumps({"mean_distance": means, "left_out": silent, "rows": [asdict(row) for row in rows]}))
         return
     from rich.console import Console
     from rich.table import Table
@@ -136,4 +137,6 @@ def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], as_j
         ours, theirs = (" ".join(f"{v:.2f}" for v in values) for values in (row.ours, row.real))
         table.add_row(row.section, row.name, ours, theirs, f"{row.distance:.3f}")
     console.print(table)
+    for line in silent:
+        console.print(f"left out   {line}")
     console.print("mean distance: " + ", ".join(f"{name} {value:.3f}" for name, value in means.items()))

@@ -3,110 +3,11 @@
 from __future__ import annotations
 
 import json
-import platform
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from importlib import import_module, metadata, resources, util
+from dataclasses import asdict
 
 import typer
 
-# Optional extra of the distribution, the modules it brings, what needs it.
-EXTRAS = (
-    ("render", ("embreex",), "fast ray casting for pictures"),
-    ("sim", ("mujoco",), "simulating rooms (check --settle)"),
-    ("texture", ("xatlas",), "texture coordinates"),
-    ("validate", ("usd_validation_nvidia",), "NVIDIA's rules in `echousd check`"),
-    ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
-    ("batch", ("pyarrow",), "Parquet tables of `echousd batch`"),
-    ("text", ("open_clip",), "text features of the released models"),
-    ("train", ("tensorboard", "h5py"), "training"),
-)
-OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """One thing looked at; `state` is ok, gap (something will not work) or optional (an extra not installed)."""
-
-    name: str
-    state: str
-    found: str
-    remedy: str = ""
-
-
-def diagnose() -> list[Diagnosis]:
-    """Look at the USD provider, the schema plugin, torch, the weights and the optional extras."""
-    checks: tuple[Callable[[], Iterator[Diagnosis]], ...] = (_python, _usd, _plugin, _torch, _weights, _extras)
-    return [diagnosis for check in checks for diagnosis in check()]
-
-
-def _python() -> Iterator[Diagnosis]:
-    yield Diagnosis("python", "ok", f"{platform.python_version()} on {platform.system()} {platform.machine()}")
-
-
-def _usd() -> Iterator[Diagnosis]:
-    if util.find_spec("pxr") is None:
-        yield Diagnosis("usd", "gap", "no pxr module", "pip install usd-core")
-        return
-    from pxr import Usd
-
-    version = Usd.GetVersion()
-    by = sorted({f"{name} {metadata.version(name)}" for name in metadata.packages_distributions().get("pxr", [])})
-    text = f"OpenUSD {version[1]}.{version[2]:02d} from {' and '.join(by) or import_module('pxr').__path__[0]}"
-    if len(by) > 1:
-        yield Diagnosis("usd", "gap", text, "two distributions share the module pxr: uninstall one of them")
-    elif version < OLDEST or util.find_spec("pxr.UsdSemantics") is None:
-        yield Diagnosis("usd", "gap", text, "OpenUSD 24.11 or newer is needed (UsdSemantics): pip install -U usd-core")
-    else:
-        yield Diagnosis("usd", "ok", text)
-
-
-def _plugin() -> Iterator[Diagnosis]:
-    from echousd import plugin
-
-    folder = plugin.plugin_path()
-    if util.find_spec("pxr") is None:
-        yield Diagnosis("schema plugin", "gap", f"not active, {folder}", "install a pxr first")
-    elif plugin.is_active():
-        yield Diagnosis("schema plugin", "ok", f"active, {folder}")
-    else:
-        remedy = f"import echousd before a stage is opened, or set {plugin.ENVIRONMENT_VARIABLE}={folder}"
-        yield Diagnosis("schema plugin", "gap", f"not active, {folder}", remedy)
-
-
-def _torch() -> Iterator[Diagnosis]:
-    if util.find_spec("torch") is None:
-        yield Diagnosis("torch", "gap", "not installed", "pip install torch")
-        return
-    import torch
-
-    devices = [f"cpu ({torch.get_num_threads()} threads)"]
-    devices += [f"cuda:{i} ({torch.cuda.get_device_name(i)})" for i in range(torch.cuda.device_count())]
-    if torch.backends.mps.is_available():
-        devices.append("mps")
-    yield Diagnosis("torch", "ok", f"{torch.__version__}, devices: {', '.join(devices)}")
-
-
-def _weights() -> Iterator[Diagnosis]:
-    folder = resources.files("echomodel").joinpath("weights")
-    entries = folder.iterdir() if folder.is_dir() else ()
-    files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
-    if files:
-        sizes = (len(folder.joinpath(name).read_bytes()) / 2**20 for name in files)
-        told = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
-        yield Diagnosis("weights", "ok", f"{told} in {folder}")
-    else:
-        yield Diagnosis("weights", "gap", f"no .safetensors file in {folder}", "reinstall echousd, or echousd train")
-
-
-def _extras() -> Iterator[Diagnosis]:
-    for extra, modules, purpose in EXTRAS:
-        missing = [module for module in modules if util.find_spec(module) is None]
-        if missing:
-            remedy = f"pip install 'echousd[{extra}]'"
-            yield Diagnosis(f"extra {extra}", "optional", f"not installed ({purpose})", remedy)
-        else:
-            yield Diagnosis(f"extra {extra}", "ok", f"installed ({purpose})")
+from echousd.diagnosis import Diagnosis, diagnose
 
 
 def register(app: typer.Typer) -> None:

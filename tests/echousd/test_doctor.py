@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from importlib import util
+from pathlib import Path
 
 import pytest
 
-from echousd import plugin
-from echousd.cli import doctor
+from echousd import diagnosis, plugin
 
 
 def test_plugin_path(echousd_command):
@@ -41,10 +42,15 @@ def test_doctor_as_json(echousd_command):
         "remedy": "",
     }
     assert "cpu" in found["torch"]["found"]
-    assert {f"extra {extra}" for extra, _, _ in doctor.EXTRAS} <= set(found)
+    assert {f"extra {extra}" for extra, _, _ in diagnosis.EXTRAS} <= set(found)
     assert all(finding["remedy"] for finding in report["findings"] if finding["state"] != "ok")
     assert report["ok"] == all(finding["state"] != "gap" for finding in report["findings"])
     assert done.code == (0 if report["ok"] else 1)
+
+
+def test_every_extra_of_the_distribution_is_looked_at():
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
+    assert {extra for extra, _, _ in diagnosis.EXTRAS} == project["optional-dependencies"].keys() - {"dev"}
 
 
 def test_doctor_as_a_table(echousd_command):
@@ -67,14 +73,14 @@ def without(monkeypatch):
 
 def test_missing_extras_are_no_gap(without, echousd_command):
     without("xatlas")
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["extra texture"].state == "optional"
     assert found["extra texture"].remedy == "pip install 'echousd[texture]'"
 
 
 def test_missing_usd_and_torch_are(without, echousd_command):
     without("pxr", "torch")
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert (found["usd"].state, found["usd"].remedy) == ("gap", "pip install usd-core")
     assert (found["torch"].state, found["torch"].remedy) == ("gap", "pip install torch")
     assert found["schema plugin"].state == "gap"
@@ -83,7 +89,7 @@ def test_missing_usd_and_torch_are(without, echousd_command):
 
 def test_an_inactive_plugin_is_a_gap(monkeypatch):
     monkeypatch.setattr(plugin, "is_active", lambda: False)
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["schema plugin"].state == "gap"
     assert f"PXR_PLUGINPATH_NAME={plugin.plugin_path()}" in found["schema plugin"].remedy
 
@@ -92,7 +98,7 @@ def test_an_old_usd_is_a_gap(monkeypatch):
     from pxr import Usd
 
     monkeypatch.setattr(Usd, "GetVersion", lambda: (0, 24, 8))
-    found = {finding.name: finding for finding in doctor.diagnose()}
+    found = {finding.name: finding for finding in diagnosis.diagnose()}
     assert found["usd"].state == "gap"
     assert found["usd"].remedy.startswith("OpenUSD 24.11 or newer is needed")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -36,6 +37,20 @@ def compare(rooms: Sequence[RoomBoxes], real: Sequence[RoomBoxes] | None = None)
     rows = list(rows_between(ours, other))
     # The aggregate statistics count `close by` in a way of their own: by the published rule the figure is not known.
     return rows if real is not None else [row for row in rows if row.name != "close_by"]
+
+
+def left_out(rooms: Sequence[RoomBoxes], real: Sequence[RoomBoxes] | None = None) -> list[str]:
+    """A sentence for every room type that is too rare, here or among the real rooms, to be compared."""
+    ours = Counter(room.room_type for room in with_known_words(rooms))
+    if real is None:
+        theirs = {kind: found["rooms"] for kind, found in room_statistics()["rooms"].items()}
+    else:
+        theirs = dict(Counter(room.room_type for room in with_known_words(real)))
+    return [
+        f"{kind}: {ours.get(kind, 0)} here and {theirs.get(kind, 0)} real, compared from {LEAST} of each"
+        for kind in sorted({*ours, *theirs})
+        if min(ours.get(kind, 0), theirs.get(kind, 0)) < LEAST
+    ]
 
 
 def rows_between(ours: dict, real: dict) -> Iterator[Row]:

@@ -58,13 +58,15 @@ class ReleasedEcho:
         self.model, self.hash = model.eval(), hash
 
     @classmethod
-    def load(cls, path: str | Path, text: TextEncoder | None = None) -> ReleasedEcho:
+    def load(
+        cls, path: str | Path, text: TextEncoder | None = None, *, device: torch.device | str = "cpu"
+    ) -> ReleasedEcho:
         """Load a file that `echousd convert` wrote; raises ValueError naming the file where that cannot work."""
         model = load_released(path)
         if not isinstance(model, ReleasedModel):
             raise ValueError(f"{path}: holds the autoencoder alone, rooms need the model with its graph encoder")
         try:
-            return cls(model, text, hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12])
+            return cls(model.to(device), text, hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12])
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 
@@ -102,17 +104,14 @@ class ReleasedEcho:
             ValueError: no layout branch, no box statistics, too many steps, a category without a class, or no text
                 features.
         """
-        graph = in_published_words(graph)
-        scenes, objects = self._scenes(graph)
-        change = None if edit is None else self._change(graph, scenes, edit)
-        whole, _ = pack_scenes(scenes)
+        whole, change, objects = self._told(graph, edit)
         boxes = self.model.sample_layout(whole, generator=generator, steps=steps, change=change, progress=progress)[
             objects
         ]
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
         if known is None or known_mask is None:
             return boxes
-        return boxes.replaced(known_mask, known)
+        return boxes.replaced(known_mask.to(self.model.device), known.to(self.model.device))
 
     @torch.no_grad()
     def sample_shapes(
@@ -138,10 +137,7 @@ class ReleasedEcho:
         Raises:
             ValueError: no shape branch, a category without a class, or no text features.
         """
-        graph = in_published_words(graph)
-        scenes, objects = self._scenes(graph)
-        change = None if edit is None else self._change(graph, scenes, edit)
-        whole, _ = pack_scenes(scenes)
+        whole, change, objects = self._told(graph, edit)
         latents = self.model.sample_shapes(
             whole, generator=generator, steps=steps or 100, change=change, progress=progress
         )[objects]
@@ -154,7 +150,7 @@ class ReleasedEcho:
         if coder.config.resolution != grids.shape[1]:
             sides = f"{coder.config.resolution} voxels a side, not {grids.shape[1]}"
             raise ValueError(f"the grids of this model's autoencoder have {sides}")
-        through = [coder(published_grids(part, part.shape[1])) for part in grids.split(DECODED)]
+        through = [coder(published_grids(part.to(self.model.device), part.shape[1])) for part in grids.split(DECODED)]
         return turned_back(torch.cat(through)) / DISTANCE
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
@@ -184,6 +180,15 @@ class ReleasedEcho:
         if missing:
             raise ValueError(f"this model has no class for {', '.join(missing)}; allowed: {', '.join(sorted(known))}")
         return [found[number] for number in graph.category.tolist()]
+
+    def _told(self, graph: GraphBatch, edit: GraphEdit | None) -> tuple[SceneGraphTensors, GraphChange | None, Tensor]:
+        """All scenes as the model takes them, the edit, and (M,) bool which nodes are objects; made on the CPU."""
+        graph = in_published_words(graph.to("cpu"))
+        scenes, objects = self._scenes(graph)
+        change = None
+        if edit is not None:
+            change = self._change(graph, scenes, replace(edit, before=edit.before.cpu(), added=edit.added.cpu()))
+        return pack_scenes(scenes)[0], change, objects.to(self.model.device)
 
     def _scenes(self, graph: GraphBatch) -> tuple[list[SceneGraphTensors], Tensor]:
         """Each scene with its floor and `_scene_` nodes, and which nodes of all of them are objects, (M,) bool."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from echomodel.randomness import normal
 from echomodel.released.config import EncoderConfig
 from echomodel.released.gcn import TripletGCN
 
@@ -27,6 +28,11 @@ class SceneGraphTensors:
     triples: Tensor
     node_text: Tensor
     edge_text: Tensor | None = None
+
+    def to(self, device: torch.device | str) -> SceneGraphTensors:
+        """The same graph on a device."""
+        text = None if self.edge_text is None else self.edge_text.to(device)
+        return SceneGraphTensors(self.classes.to(device), self.triples.to(device), self.node_text.to(device), text)
 
     def check(self, config: EncoderConfig) -> None:
         """Raises ValueError naming the first class, predicate, end or text feature that the model cannot use."""
@@ -129,11 +135,11 @@ class GraphEncoder(nn.Module):
             raise ValueError(f"{len(latent)} latents with {len(places)} added nodes for a graph of {count} nodes")
         edited = sorted({*places, *touched})  # the published code draws node by node
         if noise is None:
-            noise = torch.randn(len(edited), config.flag, generator=generator)
+            noise = normal((len(edited), config.flag), generator, latent.device)
         if tuple(noise.shape) != (len(edited), config.flag):
             raise ValueError(f"change flags are {tuple(noise.shape)}, expected {(len(edited), config.flag)}")
         flags = latent.new_zeros(count, config.flag)
-        keep = torch.ones(count, dtype=torch.bool)
+        keep = torch.ones(count, dtype=torch.bool, device=latent.device)
         for row, node in enumerate(edited):
             flags[node], keep[node] = noise[row], False
         nodes, edges = self.embed(graph, manipulator=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.progress import StepListener
+from echomodel.randomness import normal
 from echomodel.released.compiled_layout import CompiledLayout
 from echomodel.released.compiled_shape import CompiledShape
 from echomodel.released.config import ReleasedConfig
@@ -97,6 +98,11 @@ class ReleasedModel(GraphEncoder):
             raise ValueError("this model has no layout branch")
         return self.LayoutDiff["df"]["model"]  # type: ignore[index, return-value]
 
+    @property
+    def device(self) -> torch.device:
+        """Where the weights are."""
+        return next(self.parameters()).device
+
     def conditions(
         self,
         graph: SceneGraphTensors,
@@ -155,18 +161,26 @@ class ReleasedModel(GraphEncoder):
         net, statistics = self.layout_net, self.statistics
         if statistics is None:
             raise ValueError("box statistics are missing: convert the checkpoint with --bounds FILE")
+        graph, change, device = graph.to(self.device), self._here(change), self.device
         conditions = self.eval().conditions(graph, change, generator)
         tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
-        bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
+        tables, chosen = tables.to(device), chosen.to(device)
+
+        def as_trained(x: Tensor, t: Tensor) -> Tensor:
+            return net(x, conditions.layout, graph.triples, t, conditions.edges)
+
+        bound: Denoiser = as_trained
+        if device.type == "cpu":
+            bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
         shape = (len(graph.classes), net.config.channels)
-        start = torch.randn(shape, generator=generator)
+        start = normal(shape, generator, device)
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
         variance = "beta" if self.config.preset == "paper" else "posterior"
         states = ancestral(
             lambda x, t: bound(x, chosen[t]),
             start,
             tables,
-            noise=lambda step: torch.randn(shape, generator=generator),
+            noise=lambda step: normal(shape, generator, device),
             variance=variance,
         )
         return Boxes.decode(last(states, progress, len(chosen)), statistics.scale())
@@ -199,10 +213,11 @@ class ReleasedModel(GraphEncoder):
         """
         if self.config.shape is None:
             raise ValueError("this model has no shape branch")
+        graph, change = graph.to(self.device), self._here(change)
         conditions = self.eval().conditions(graph, change, generator)
         count, grid = len(graph.classes), self.config.shape.grid
-        drawn = torch.randn(
-            1 if shared_noise else count, self.config.shape.channels, grid, grid, grid, generator=generator
+        drawn = normal(
+            (1 if shared_noise else count, self.config.shape.channels, grid, grid, grid), generator, self.device
         )
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
@@ -210,10 +225,14 @@ class ReleasedModel(GraphEncoder):
             return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edges)
 
         denoise: Denoiser = as_trained
-        if self.config.shape.conditioning == "crossattn" and conditions.shape is not None:
+        compiled = self.device.type == "cpu" and self.config.shape.conditioning == "crossattn"
+        if compiled and conditions.shape is not None:
             net = self.shape_df.diffusion_net
             denoise = CompiledShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
         return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
+
+    def _here(self, change: GraphChange | None) -> GraphChange | None:
+        return None if change is None else replace(change, before=change.before.to(self.device))
 
     def training_losses(
         self,
@@ -234,12 +253,15 @@ class ReleasedModel(GraphEncoder):
             boxes: (N, 8) float32, normalised. latents: (N, 3, 16, 16, 16) float32 encoder output, None = layout only.
             generator: source of steps, noise and change flags. change: as `conditions`. budget: of `node_budget`.
         """
+        device = self.device
+        graph, change, scene, boxes = graph.to(device), self._here(change), scene.to(device), boxes.to(device)
         conditions = self.conditions(graph, change, generator)
         count = len(self.layout_tables.betas)
-        t = torch.randint(count, (int(scene.max()) + 1,), generator=generator)[scene]
-        noise = torch.randn(boxes.shape, generator=generator)
+        t = torch.randint(count, (int(scene.max()) + 1,), generator=generator).to(device)[scene]
+        noise = normal(boxes.shape, generator, device)
+        tables = self.layout_tables.to(device)
         losses = layout_loss(
-            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, self.layout_tables, conditions.edges
+            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, tables, conditions.edges
         )
         losses["layout"] = losses.pop("loss")
         losses["loss"] = losses["layout"]
@@ -247,15 +269,16 @@ class ReleasedModel(GraphEncoder):
             kept, triples = node_budget(graph.triples, scene, budget)
             inside = (graph.triples[:, 0] < kept) & (graph.triples[:, 2] < kept)
             edges = None if conditions.edges is None else conditions.edges[inside]
-            t = torch.randint(count, (kept,), generator=generator)
-            noise = torch.randn(latents[:kept].shape, generator=generator)
+            t = torch.randint(count, (kept,), generator=generator).to(device)
+            clean = latents[:kept].to(device)
+            noise = normal(clean.shape, generator, device)
             args: tuple[Any, ...] = (
-                latents[:kept],
+                clean,
                 conditions.shape[:kept],
                 triples,
                 t,
                 noise,
-                self.shape_tables,
+                self.shape_tables.to(device),
                 edges,
             )
             losses["shape"] = shape_loss(self.shape_df, *args)

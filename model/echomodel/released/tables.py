@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
+
+Tables = TypeVar("Tables", "LayoutTables", "ShapeTables")
+
+
+def on_device(tables: Tables, device: torch.device | str) -> Tables:
+    """Tables all of whose tensors lie on a device."""
+    return type(tables)(**{field.name: getattr(tables, field.name).to(device) for field in fields(tables)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +44,10 @@ class LayoutTables:
         bar = torch.from_numpy(np.cumprod(1.0 - betas64)).float()
         betas, alphas = torch.from_numpy(betas64).float(), torch.from_numpy(1.0 - betas64).float()
         return cls._of(betas, alphas, bar)
+
+    def to(self, device: torch.device | str) -> LayoutTables:
+        """The same tables on a device."""
+        return on_device(self, device)
 
     def spaced(self, count: int) -> tuple[LayoutTables, Tensor]:
         """Tables of `count` of these T steps, evenly spread, and which they are: (count,) int64 (Nichol and Dhariwal
@@ -77,6 +89,10 @@ class ShapeTables:
     alphas_cumprod: Tensor
     sqrt_alphas_cumprod: Tensor
     sqrt_one_minus_alphas_cumprod: Tensor
+
+    def to(self, device: torch.device | str) -> ShapeTables:
+        """The same tables on a device."""
+        return on_device(self, device)
 
     @classmethod
     def scaled_linear(cls, start: float = 0.00085, end: float = 0.012, steps: int = 1000) -> ShapeTables:

@@ -98,7 +98,8 @@ class PaperStage:
         return {f"held/{name}": float(losses[name]) for name in ("layout", "shape")}
 
     def _autoencoding(self, model: PaperModel, numbers: np.ndarray) -> Tensor:
-        return model.vqvae.loss(published_grids(read(self.shapes, numbers), model.vqvae.config.resolution))
+        grids = published_grids(read(self.shapes, numbers), model.vqvae.config.resolution)
+        return model.vqvae.loss(grids.to(model.device))
 
     def _draw(self, generator: torch.Generator, *, held: bool) -> list[RoomBoxes]:
         pool = self.numbers[held]
@@ -146,7 +147,7 @@ class PaperStage:
                 known[rows] = published_grids(read(self.shapes, np.array([own[k] for k in rows])), side)
             grids += [known, empty]
         encoder = model.vqvae.eval()
-        found = torch.cat([encoder.encode(part) for part in torch.cat(grids).split(8)])
+        found = torch.cat([encoder.encode(part.to(model.device)) for part in torch.cat(grids).split(8)])
         missing = sum(len(room) + 2 for room in rooms) - len(found)
         return torch.cat([found, found.new_zeros(max(missing, 0), *found.shape[1:])])
 

@@ -47,7 +47,7 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     torch.manual_seed(recipe.seed)
     if recipe.stage in ("paper", "paper_vqvae"):
-        return _open_paper(recipe, folder, resume, report)
+        return _open_paper(recipe, folder, device, resume, report)
     kind = STAGES[recipe.stage]
     start = started(kind, recipe, device, resume=resume)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)
@@ -62,7 +62,7 @@ def own_device() -> torch.device:
     return device
 
 
-def _open_paper(recipe: Recipe, folder: Path, resume: bool, report: Report | None) -> Trainer:
+def _open_paper(recipe: Recipe, folder: Path, device: torch.device, resume: bool, report: Report | None) -> Trainer:
     autoencoder = recipe.stage == "paper_vqvae"
     if not autoencoder and not recipe.start and not resume:
         raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
@@ -75,4 +75,4 @@ def _open_paper(recipe: Recipe, folder: Path, resume: bool, report: Report | Non
     stage = PaperStage(
         rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder
     )
-    return Trainer(recipe, model, stage, folder, resume=resume, report=report)
+    return Trainer(recipe, model.to(device), stage, folder, resume=resume, report=report)

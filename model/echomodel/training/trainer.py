@@ -23,6 +23,11 @@ from echomodel.training.logs import RunLog, plot_log
 from echomodel.training.paper_stage import PaperModel
 from echomodel.training.recipe import Recipe
 
+# Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
+MAY_CHANGE = {
+    "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight", "validate_every", "save_every",
+    "log_every", "threads", "precision", "nodes", "scenes", "shapes_per_batch",
+}  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]
 Trainable = CompactModel | PaperModel
 
@@ -64,8 +69,8 @@ class Trainer:
         report: called with (step, values) whenever something is logged.
 
     Raises:
-        ValueError: `resume` without a checkpoint, or a checkpoint of another stage or model; steps, rates and weights
-            of the recipe may change on the way.
+        ValueError: `resume` without a checkpoint, or one of a recipe that differs in more than `MAY_CHANGE`; names the
+            fields.
     """
 
     def __init__(
@@ -179,9 +184,10 @@ class Trainer:
         with safe_open(path, "pt") as handle:
             metadata = handle.metadata()
             tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
-        stage = json.loads(metadata["recipe"])["stage"]
-        if stage != self.recipe.stage:
-            raise ValueError(f"{path}: is a checkpoint of stage {stage!r}, the recipe's is {self.recipe.stage!r}")
+        other = changed_fields(json.loads(metadata["recipe"]), json.loads(to_json(self.recipe)))
+        if other:
+            told = "; ".join(f"{name} was {was!r}, is {now!r}" for name, was, now in other)
+            raise ValueError(f"{path}: is a checkpoint of another recipe ({told})")
         try:
             state = {key[6:]: value for key, value in tensors.items() if key.startswith("model.")}
             self.model.load_state_dict(state)
@@ -197,6 +203,21 @@ class Trainer:
                         for key in ("step", "exp_avg", "exp_avg_sq")
                     }
         self.step = int(metadata["step"])
+
+
+def changed_fields(was: dict[str, Any], now: dict[str, Any], above: str = "") -> list[tuple[str, Any, Any]]:
+    """Fields (dotted names) in which two recipes as JSON differ so that one does not continue the other's run.
+
+    What only says how long, where and how often may change, see `MAY_CHANGE`, and so may what a recipe of an earlier
+    version does not name.
+    """
+    found: list[tuple[str, Any, Any]] = []
+    for name in sorted(was.keys() & now.keys() - (set() if above else MAY_CHANGE)):
+        if isinstance(was[name], dict) and isinstance(now[name], dict):
+            found += changed_fields(was[name], now[name], f"{above}{name}.")
+        elif was[name] != now[name]:
+            found.append((f"{above}{name}", was[name], now[name]))
+    return found
 
 
 def step_generator(seed: int, step: int, rank: int = 0) -> torch.Generator:

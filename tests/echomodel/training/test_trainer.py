@@ -247,3 +247,14 @@ def test_boxes_of_a_room_set_survive_packing(data: Path, packed: PackedRooms) ->
     first = int((~rooms.held_out).nonzero()[0][0])
     boxes = Boxes.from_room(rooms.room(first))
     torch.testing.assert_close(packed.position[: len(boxes)], boxes.position)
+
+
+def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(data: Path, tmp_path: Path) -> None:
+    recipe = smoke("layout", data, "steps=1", "validate_every=9")
+    open_run(recipe, tmp_path).run()
+    open_run(replace(recipe, steps=2, nodes=300, threads=1), tmp_path, resume=True)  # these may change
+    width = recipe.model.layout.width
+    other = replace(recipe, seed=8, model=replace(recipe.model, layout=replace(recipe.model.layout, width=2 * width)))
+    told = rf"another recipe \(model.layout.width was {width}, is {2 * width}; seed was {recipe.seed}, is 8\)"
+    with pytest.raises(ValueError, match=told):
+        open_run(other, tmp_path, resume=True)

@@ -87,7 +87,9 @@ def test_plot_report_and_evaluation(rooms_file, tmp_path, capsys):
     assert run(["data", "plot", str(rooms_file), "-o", str(tmp_path / "rooms.png"), "--columns", "4"]) == 0
     assert (tmp_path / "rooms.png").read_bytes()[:4] == b"\x89PNG"
     assert run(["data", "report", str(rooms_file), "--real", str(rooms_file), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["mean_distance"]["all"] == 0.0
+    found = json.loads(capsys.readouterr().out)
+    assert found["mean_distance"]["all"] == 0.0
+    assert all(line.endswith(" real, compared from 25 of each") for line in found["left_out"])
     assert run(["eval", "layout", "--rooms", str(rooms_file), "--model", "truth", "--change", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["generation"]["total"] == 1.0
