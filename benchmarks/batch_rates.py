@@ -59,7 +59,7 @@ def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, 
         ended += len(pool.outcomes(1.0))
     begun = sum(_cpu_of(process) for process in pool.processes)
     wall = time.perf_counter()
-    Run(plan, plan.packs(), frozenset(), folder, journal, workers).execute(pool)
+    Run(plan, plan.packs(), frozenset(), folder, journal).execute(pool)
     wall = time.perf_counter() - wall
     used = sum(_cpu_of(process) for process in pool.processes) - begun
     pool.close()

@@ -63,6 +63,7 @@ def batch(
     timeout: float | None = None,
     until: float | None = None,
     memory: int | None = MEMORY,
+    ray: str = "",
     executor: Executor | None = None,
     progress: Callable[[BatchProgress], None] | None = None,
     **options: Any,
@@ -81,7 +82,8 @@ def batch(
         resume: go on with the run in `out`: rooms that are complete and valid stay.
         max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
         memory: MiB a worker; a room that needs more fails.
-        executor: runs the tasks in place of local processes.
+        ray: `auto` or the address of a Ray cluster, whose nodes see `out` under the same path; "" = processes here.
+        executor: runs the tasks in place of either.
         progress: called after every room.
         options: fields of `echousd.batches.options.BatchOptions`.
 
@@ -94,7 +96,7 @@ def batch(
     }  # fmt: skip
     return run_batch(
         request_of(raw, "batch"), Path(out), workers=workers, shard=shard, resume=resume, max_failures=max_failures,
-        timeout=timeout, until=until, memory=memory, executor=executor, progress=progress,
+        timeout=timeout, until=until, memory=memory, ray=ray, executor=executor, progress=progress,
     )  # fmt: skip
 
 
@@ -109,15 +111,13 @@ def run_batch(
     timeout: float | None = None,
     until: float | None = None,
     memory: int | None = MEMORY,
+    ray: str = "",
     executor: Executor | None = None,
     progress: Callable[[BatchProgress], None] | None = None,
 ) -> BatchResult:
     """`batch` for a checked request."""
     if not 0 <= shard[0] < shard[1]:
         raise ValueError(f"shard is {shard[0]}/{shard[1]}, allowed: i/n with i from 0 to n - 1")
-    workers = workers or len(
-        os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-    )
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
@@ -127,10 +127,9 @@ def run_batch(
         _agree_on(plan, out, resume=resume or shard[1] > 1)
         valid = _valid(plan, out, shard)
         journal = Journal(place)
-        pool = executor or LocalWorkers(min(workers, max(len(plan.entries), 1)), timeout=timeout, memory=memory)
-        run = Run(
-            plan, plan.packs(shard), valid, out, journal, workers, max_failures=max_failures, until=until, tell=progress
-        )
+        pool = executor or _executor(ray, workers, len(plan.entries), timeout, memory)
+        seen = out.resolve() if ray else out  # workers elsewhere stand in another folder
+        run = Run(plan, plan.packs(shard), valid, seen, journal, max_failures=max_failures, until=until, tell=progress)
         try:
             end = run.execute(pool)
         finally:
@@ -166,6 +165,14 @@ def generate_many(
                 raise ValueError(f"graph {number + k}: {error}")
             yield generated(replace(job, text=text, boxes=boxes))
         number += len(pack)
+
+
+def _executor(ray: str, workers: int | None, rooms: int, timeout: float | None, memory: int | None) -> Executor:
+    if not ray:
+        return LocalWorkers(max(min(workers or cores(), rooms), 1), timeout=timeout, memory=memory)
+    from echousd.batches.cluster import RayCluster
+
+    return RayCluster(ray, workers=workers, timeout=timeout, memory=memory)
 
 
 def cores() -> int:

@@ -24,11 +24,13 @@ class Task:
 
     Arguments:
         key: unique in its run; call: the function; given: its one argument.
+        network: whether it is the network's, where that has processes of its own.
     """
 
     key: str
     call: Callable[[Any], Any]
     given: Any
+    network: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,12 @@ class Executor(Protocol):
     """Runs tasks; local processes and Ray keep it."""
 
     @property
-    def free(self) -> int:
-        """How many more tasks are taken now."""
+    def workers(self) -> int:
+        """How many rooms are made at once."""
+        ...
+
+    def free(self, *, network: bool = False) -> int:
+        """How many more tasks are taken now, of the network or others."""
         ...
 
     @property
@@ -92,14 +98,18 @@ class LocalWorkers:
         self._workers = [self._start() for _ in range(workers)]
 
     @property
-    def free(self) -> int:
-        """How many more tasks are taken now."""
+    def workers(self) -> int:
+        """How many rooms are made at once."""
+        return len(self._workers)
+
+    def free(self, *, network: bool = False) -> int:
+        """How many more tasks are taken now, of the network or others."""
         return sum(worker.task is None for worker in self._workers)
 
     @property
     def megabytes(self) -> float:
         """Memory of the workers together."""
-        return sum(_resident(worker.process.pid) for worker in self._workers)
+        return sum(resident(worker.process.pid) for worker in self._workers)
 
     @property
     def processes(self) -> list[int]:
@@ -157,7 +167,7 @@ class LocalWorkers:
         error = ""
         if self._timeout is not None and time.monotonic() - worker.since > self._timeout:
             error = f"took longer than {self._timeout:g} s"
-        elif self._memory is not None and (held := _resident(worker.process.pid)) > self._memory:
+        elif self._memory is not None and (held := resident(worker.process.pid)) > self._memory:
             error = f"held {held:.0f} MiB of memory, allowed: {self._memory} MiB"
         if not error:
             return None
@@ -215,7 +225,7 @@ def _die_with(parent: int) -> None:
         os._exit(1)
 
 
-def _resident(process: int | None) -> float:
+def resident(process: int | None) -> float:
     """MiB that a process holds, 0 where the system does not tell."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20

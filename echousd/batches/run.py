@@ -64,7 +64,6 @@ class Run:
     skip: frozenset[str]
     folder: Path
     journal: Journal
-    workers: int
     max_failures: int | None = None
     until: float | None = None
     tell: Callable[[BatchProgress], None] | None = None
@@ -81,10 +80,11 @@ class Run:
         layouts_out = 0
         while waiting or self._ready or self._asked:
             self._check_stop(progress)
-            while executor.free and not self.stopped:
-                if waiting and len(self._ready) + PACK * layouts_out < 2 * self.workers:
+            while not self.stopped:
+                wanted = waiting and len(self._ready) + PACK * layouts_out < 2 * executor.workers
+                if wanted and executor.free(network=True):
                     layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
-                elif self._ready:
+                elif self._ready and executor.free():
                     entry, job = self._ready.popleft()
                     self._submit(executor, Task(f"room {entry.id}", work.room, job), entry)
                 else:
@@ -122,7 +122,7 @@ class Run:
         if all(entry.id in self.skip for entry in good):
             return 0
         jobs = [self._job(entry) for entry in good]
-        self._submit(executor, Task(f"layouts {pack[0].number}", work.layouts, jobs), good)
+        self._submit(executor, Task(f"layouts {pack[0].number}", work.layouts, jobs, network=True), good)
         return 1
 
     def _submit(self, executor: Executor, task: Task, asked: Any) -> None:

@@ -62,6 +62,7 @@ def run(
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
     dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
+    ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.")] = "",
     self_contained: Annotated[
         bool | None, typer.Option("--self-contained/--store", help="Assets in every room, or once in a store.")
     ] = None,
@@ -92,7 +93,7 @@ def run(
     with _shown(json) as tell:
         result = run_batch(
             request, output, workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures,
-            timeout=timeout, until=_clock(until), memory=memory, progress=tell,
+            timeout=timeout, until=_clock(until), memory=memory, ray=ray, progress=tell,
         )  # fmt: skip
     found = finish(output)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)

@@ -13,7 +13,9 @@ PYTHON_CLIENTS = {
     "nvidia": ("usd-validation-nvidia==1.22.0", "usd-core==26.11", "numpy>=2"),
     "usd2411": ("usd-core==24.11",),
     "usd2551": ("usd-core==25.5.1",),
+    "ray": ("ray==2.60.0",),
 }
+WITH_OURS = ("ray",)  # clients that see our own packages, too
 THREE = "three@0.187.0"
 
 
@@ -30,6 +32,9 @@ def python_of(client: str) -> Path:
     wanted = " ".join(PYTHON_CLIENTS[client])
     if not ready.is_file() or ready.read_text("utf-8") != wanted:
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        if client in WITH_OURS:
+            (site,) = (folder / "lib").glob("python*/site-packages")
+            (site / "ours.pth").write_text("\n".join(filter(None, sys.path)) + "\n", "utf-8")
         install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         subprocess.run([*install, *PYTHON_CLIENTS[client]], check=True)
         ready.write_text(wanted, "utf-8")

@@ -40,7 +40,7 @@ def eats(_):
 def all_outcomes(pool, tasks):
     waiting, found = list(tasks), {}
     while len(found) < len(tasks):
-        while waiting and pool.free:
+        while waiting and pool.free():
             pool.submit(waiting.pop(0))
         for outcome in pool.outcomes(1.0):
             found[outcome.task.key] = outcome
@@ -63,7 +63,7 @@ def test_a_bad_task_costs_only_itself():
         assert (found["stalls"].fate, found["stalls"].error) == ("limit", "took longer than 8 s")
         assert found["eats"].fate == "limit"
         assert found["eats"].error.endswith("MiB of memory, allowed: 300 MiB")
-        assert pool.free == 2
+        assert pool.free() == 2
     finally:
         processes = pool.processes
         pool.close()
