@@ -61,6 +61,39 @@ def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
     """
     if not rows.shape[1]:
         return boxes.size.new_zeros(len(boxes), OPENING_FEATURES)
+    there, window, beside, before, under = _gaps(boxes, rows)
+    out = []
+    for mask, gaps in ((there & ~window, (beside, before)), (there & window, (beside, before, under))):
+        clear = torch.stack(gaps[:2]).amax(0)
+        nearest = torch.where(mask, clear, torch.full_like(clear, FAR * 10)).argmin(1, keepdim=True)
+        some = mask.any(1, keepdim=True).to(clear.dtype)
+        chosen = torch.cat([gap.gather(1, nearest) for gap in (*gaps[:2], clear)], 1)
+        told = [torch.tanh(chosen / scale) for scale in (FAR, ROUND_ABOUT, NEAR)]
+        told += [torch.tanh(gap.gather(1, nearest) / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
+        out.append(torch.cat([torch.cat(told, 1) * some, some], 1))
+    return torch.cat(out, 1)
+
+
+def kept_free(boxes: Boxes, rows: Tensor) -> Tensor:
+    """How far each box keeps out of the way of the openings of its room: the least of all, metres, differentiable.
+
+    Arguments:
+        boxes: N boxes that stand on the floor. rows: (N, O, ROW), openings of the room of each, NaN = none.
+
+    Returns:
+        (N,) float32, negative in the way of a door or passage, or before a window and higher than its sill; `FAR`
+        where there is no opening.
+    """
+    if not rows.shape[1]:
+        return boxes.size.new_full((len(boxes),), FAR)
+    there, window, beside, before, under = _gaps(boxes, rows)
+    clear = torch.maximum(beside, before)
+    clear = torch.where(window, torch.maximum(clear, under), clear)
+    return torch.where(there, clear, torch.full_like(clear, FAR)).amin(1).clamp_max(FAR)
+
+
+def _gaps(boxes: Boxes, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+    """(N, O) each: which openings there are and which are windows; how far each box stands beside, before and below."""
     there = torch.isfinite(rows[..., 0])
     rows = torch.where(there[..., None], rows, torch.zeros_like(rows))
     near, far, inward = rows[..., 0:2], rows[..., 2:4], rows[..., 4:6]
@@ -77,17 +110,7 @@ def clearances(boxes: Boxes, rows: Tensor) -> Tensor:
     beside = (off * along).sum(-1).abs() - reach(along) - length / 2
     before = (off * inward).sum(-1) - reach(inward) - rows[..., 6]
     under = rows[..., 7] - (boxes.position[:, 1] + boxes.size[:, 1])[:, None]
-    window = rows[..., 9] > 0.5
-    out = []
-    for mask, gaps in ((there & ~window, (beside, before)), (there & window, (beside, before, under))):
-        clear = torch.stack(gaps[:2]).amax(0)
-        nearest = torch.where(mask, clear, torch.full_like(clear, FAR * 10)).argmin(1, keepdim=True)
-        some = mask.any(1, keepdim=True).to(clear.dtype)
-        chosen = torch.cat([gap.gather(1, nearest) for gap in (*gaps[:2], clear)], 1)
-        told = [torch.tanh(chosen / scale) for scale in (FAR, ROUND_ABOUT, NEAR)]
-        told += [torch.tanh(gap.gather(1, nearest) / s) for gap in gaps[2:] for s in (ROUND_ABOUT, NEAR)]
-        out.append(torch.cat([torch.cat(told, 1) * some, some], 1))
-    return torch.cat(out, 1)
+    return there, rows[..., 9] > 0.5, beside, before, under
 
 
 def _axes(boxes: Boxes) -> tuple[Tensor, Tensor]:

@@ -7,9 +7,15 @@ from shapely.geometry import Polygon, box
 
 from echomodel.data.furniture.sizes import size_score
 from echomodel.data.rooms import generate_room, generate_rooms
+from echomodel.data.rooms.arranging import arranged
 from echomodel.data.rooms.builder import Item, overlaps
 from echomodel.data.rooms.floor import sample_floor
+from echomodel.data.rooms.outline import floor_of
+from echomodel.data.rooms.recipes import SOFA_KINDS
 from echomodel.data.rooms.statistics import room_requests, room_statistics, room_type_statistics
+from echomodel.metrics.living_evaluation import living_scores
+from echomodel.metrics.room_figures import room_figures
+from echomodel.openingrows import ROW
 from echomodel.vocabulary import vocabulary
 
 TYPES = [kind.name for kind in vocabulary().room_types]
@@ -141,3 +147,39 @@ def test_sizes_asked_for_give_the_medians_of_real_rooms():
     for category in ("wardrobe", "coffee_table", "pendant_lamp", "double_bed", "dining_chair", "tv_stand"):
         scores = np.median(size_score(category, sizes[categories == category]), axis=0)
         assert np.abs(scores).max() < 0.25, category  # of a standard deviation
+
+
+def test_backs_stand_off_their_walls_as_in_real_rooms(rooms):
+    drawn, real = room_figures(rooms)["walls"], room_statistics()["walls"]
+    for category in ("double_bed", "wardrobe", "tv_stand", "nightstand"):
+        for got, wished in zip(drawn[category]["back_gap"], real[category]["back_gap"], strict=True):
+            assert abs(got - wished) < 0.04, (category, drawn[category]["back_gap"])
+    straight = drawn["floor_lamp"]["axis_aligned"]
+    assert abs(straight - real["floor_lamp"]["axis_aligned"]) < 0.2
+
+
+def test_halls_hold_several_zones_and_stay_tidy():
+    halls = generate_rooms(60, 4, halls=1.0)
+    area = np.array([Polygon(room.floor_polygon).area for room in halls])
+    count = np.array([len(room) for room in halls])
+    assert np.median(area) > 35
+    assert area.max() > 60
+    assert np.percentile(count, 80) >= 20
+    assert max(sum(word in SOFA_KINDS for word in room.categories) for room in halls) >= 2
+    assert max(room.categories.count("dining_table") for room in halls) >= 2
+    told = [np.zeros((0, 3), int)] * len(halls)
+    assert living_scores(halls, told)["per_object"] < 0.03
+    assert halls[3].to_json() == generate_rooms(1, 4, start=3, halls=1.0)[0].to_json()
+
+
+def test_a_share_of_halls_leaves_the_other_rooms_alone():
+    plain, mixed = generate_rooms(40, 2), generate_rooms(40, 2, halls=0.2)
+    same = [a.to_json() == b.to_json() for a, b in zip(plain, mixed, strict=True)]
+    assert 0.5 < np.mean(same) < 1.0
+
+
+def test_two_beds_get_their_own_nightstands():
+    floor = floor_of(np.array([(-4, -3), (4, -3), (4, 3), (-4, 3)]), np.zeros((0, ROW)))
+    words = ("double_bed", "single_bed", "nightstand", "nightstand", "nightstand", "nightstand")
+    found = [arranged(words, "bedroom", floor, np.random.default_rng(seed)) for seed in range(6)]
+    assert np.mean([placed.mean() for *_, placed in found]) > 0.8

@@ -14,17 +14,23 @@ from echomodel.progress import StageListener, StepListener
 
 @dataclass(frozen=True)
 class DataRecipe:
-    """What a data set holds: `rooms` labelled rooms, a share of them `untidy`; all categories in `styles` styles."""
+    """What a data set holds: `rooms` labelled rooms, shares of them `untidy` and `halls`; all categories in `styles`
+    styles."""
 
     name: str
     rooms: int
     styles: int
     untidy: float = 0.2
+    halls: float = 0.0
 
 
 RECIPES = {
     recipe.name: recipe
-    for recipe in (DataRecipe("smoke", 64, 2), DataRecipe("packed", 12_000, 160), DataRecipe("full", 30_000, 327))
+    for recipe in (
+        DataRecipe("smoke", 64, 2),
+        DataRecipe("packed", 12_000, 160),
+        DataRecipe("full", 30_000, 327, halls=0.12),
+    )
 }
 
 
@@ -49,7 +55,9 @@ def build_data(
     def report(part: str) -> StepListener | None:
         return None if progress is None else lambda done, total: progress(part, done, total)
 
-    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), untidy=chosen.untidy)
+    rooms = build_rooms(
+        folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), untidy=chosen.untidy, halls=chosen.halls
+    )
     shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
     note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
     (folder / "data.json").write_text(json.dumps(note, indent=1) + "\n", "utf-8")

@@ -60,6 +60,7 @@ def build_rooms(
     progress: StepListener | None = None,
     *,
     untidy: float = 0.0,
+    halls: float = 0.0,
 ) -> RoomSet:
     """Generate and label a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
 
@@ -68,6 +69,7 @@ def build_rooms(
         count: number of rooms, at least 1. seed: seed of the world. styles: number of style groups of the shape set.
         progress: called with (rooms done, rooms in all).
         untidy: share of the rooms to train on that are shaken (see `echomodel.data.rooms.untidied`), 0 to 1.
+        halls: share of large rooms of several zones, 0 to 1.
 
     Raises:
         ValueError: the folder holds a set that was begun with other arguments.
@@ -79,6 +81,8 @@ def build_rooms(
     words = [category.name for category in vocabulary().categories]
     plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
     plan["untidy"] = untidy
+    if halls:
+        plan["halls"] = halls
     claim(folder, plan)
     for number, first in enumerate(range(0, count, ROOMS_PER_SHARD)):
         path = folder / f"rooms-{number:04d}.bin"
@@ -87,7 +91,7 @@ def build_rooms(
             rooms: list[RoomBoxes] = []
             shaken: list[bool] = []
             for start in range(first, last, 100):
-                drawn = generate_rooms(min(100, last - start), seed, styles=styles, start=start)
+                drawn = generate_rooms(min(100, last - start), seed, styles=styles, start=start, halls=halls)
                 shaken += [_is_untidied(seed, start + k, untidy) for k in range(len(drawn))]
                 rooms += [_untidied(r, seed, start + k) if shaken[-len(drawn) + k] else r for k, r in enumerate(drawn)]
                 if progress:

@@ -16,6 +16,7 @@ from echomodel.openingrows import clearances
 from echomodel.randomness import normal
 from echomodel.rules import margins, verdicts
 from echomodel.samplers import sample
+from echomodel.training.living_loss import HEADINGS, heading_distance, living_loss
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
@@ -38,13 +39,14 @@ def layout_loss(
     generator: torch.Generator,
     relation_weight: float,
     measure_weight: float = 0.0,
+    living_weight: float = 0.0,
 ) -> tuple[Tensor, dict[str, Tensor]]:
     """Denoising loss of the unknown nodes, of the drafts too, plus the weighted relation hinge and measure distance.
 
     Arguments:
         model: with latent graph and layout denoiser. batch: true rooms. latent: (N, latent width), the edited graph's.
         generator: source of levels, noise and of what is known.
-        relation_weight, measure_weight: 0 leaves the hinge or the distance out.
+        relation_weight, measure_weight, living_weight: 0 leaves the hinge, the distance or the living rules out.
 
     Returns:
         The loss, and the parts that the log names.
@@ -71,6 +73,10 @@ def layout_loss(
     if measure_weight:
         parts["measures"] = measure_distance(batch, predicted, context.floor, level, free)
         loss = loss + measure_weight * parts["measures"]
+    if living_weight:
+        parts["living"] = living_loss(batch, predicted, level, known)
+        parts["headings"] = heading_distance(batch, predicted, level, known)
+        loss = loss + living_weight * (parts["living"] + HEADINGS * parts["headings"])
     return loss, parts
 
 
@@ -137,6 +143,7 @@ class LayoutStage:
         relation_weight: weight of the relation hinge.
         frozen: parts that stay as they are.
         measure_weight: weight of the difference in what predicted and true boxes measure.
+        living_weight: weight of what a person would point at in the predicted boxes.
     """
 
     saved = ("latent", "layout")
@@ -151,9 +158,10 @@ class LayoutStage:
         relation_weight: float,
         frozen: tuple[str, ...] = (),
         measure_weight: float = 0.0,
+        living_weight: float = 0.0,
     ) -> None:
         self.rooms, self.held, self.nodes = rooms, held, nodes
-        self.relation_weight, self.measure_weight = relation_weight, measure_weight
+        self.weights = relation_weight, measure_weight, living_weight
         self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 
     @classmethod
@@ -162,7 +170,8 @@ class LayoutStage:
         recipe, (rooms, held) = start.recipe, (start.rooms(held=held) for held in (False, True))
         if "layout" not in start.given:
             start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rooms.category, recipe.model.categories)
-        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, recipe.measure_weight)
+        weights = recipe.measure_weight, recipe.living_weight
+        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch."""
@@ -172,8 +181,7 @@ class LayoutStage:
         self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator
     ) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one batch, whose graph passes encoder and manipulator, and its parts."""
-        weights = self.relation_weight, self.measure_weight
-        return layout_loss(model, batch, edited_latent(model, batch), generator, *weights)
+        return layout_loss(model, batch, edited_latent(model, batch), generator, *self.weights)
 
     @torch.no_grad()
     def validate(self, model: CompactModel, rooms: int = 96) -> dict[str, float]:

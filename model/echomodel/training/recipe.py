@@ -55,6 +55,7 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     ("threads", 0, 1024),
     ("relation_weight", 0, 10**6),
     ("measure_weight", 0, 10**6),
+    ("living_weight", 0, 10**6),
 )
 
 
@@ -78,6 +79,7 @@ class Recipe:
             weights file of CLIP's, or `random` (vectors that only tell texts apart).
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
+        living_weight: weight of what a person would point at in the predicted boxes (the living rules' margins).
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes.
@@ -98,6 +100,7 @@ class Recipe:
     text: str = "clip"
     relation_weight: float = 0.5
     measure_weight: float = 0.0
+    living_weight: float = 0.0
     validate_every: int = 2000
     save_every: int = 1000
     log_every: int = 50

@@ -21,6 +21,7 @@ from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
 from echomodel.rules import label_relations, verdicts
 from echomodel.training.layout_stage import measure_distance
+from echomodel.training.living_loss import heading_distance, living_loss
 from echomodel.training.logs import read_log
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
@@ -62,6 +63,31 @@ def test_told_relations_hold_in_mirrored_rooms(packed: PackedRooms) -> None:
             seen += int((kept >= 0).sum())
             assert not (kept == 0).any()
     assert seen > 1000
+
+
+def test_living_loss_pulls_what_a_person_would_point_at(packed: PackedRooms) -> None:
+    batch = draw_batch(packed, 120, torch.Generator().manual_seed(1))
+    nodes = batch.graph.num_nodes
+    level, known_boxes = torch.full((nodes,), 0.2), torch.zeros(nodes, dtype=torch.bool)
+    true = living_loss(batch, batch.boxes, level, known_boxes)
+    assert heading_distance(batch, batch.boxes, level, known_boxes) == 0
+    luck = torch.Generator().manual_seed(0)
+    size = batch.boxes.size.clone().requires_grad_()
+    position = (batch.boxes.position + 0.4 * torch.randn(nodes, 3, generator=luck)).requires_grad_()
+    yaw = (batch.boxes.yaw + 0.3 * torch.randn(nodes, generator=luck)).requires_grad_()
+    shaken = Boxes(size, position, yaw)
+    loss = living_loss(batch, shaken, level, known_boxes) + heading_distance(batch, shaken, level, known_boxes)
+    assert loss > true + 0.1
+    loss.backward()
+    assert size.grad is None
+    assert position.grad is not None
+    assert yaw.grad is not None
+    assert torch.isfinite(position.grad).all()
+    assert torch.isfinite(yaw.grad).all()
+    assert position.grad.abs().max() > 0
+    assert living_loss(batch, shaken, level, ~known_boxes) == 0  # what is given is nobody's fault
+    untidy = replace(batch, tidy=torch.zeros_like(batch.tidy))
+    assert living_loss(untidy, shaken, level, known_boxes) == 0
 
 
 def test_floors_are_mirrored_with_their_rooms() -> None:

@@ -14,7 +14,7 @@ BEDS = ("double_bed", "single_bed", "kids_bed")
 
 def bed_group(room: Builder, category: str) -> Item | None:
     """A bed with its head at a wall, its nightstands at the head's sides, a bench or ottoman at its foot."""
-    count = room.take("nightstand")
+    count = min(room.wanted.get("nightstand", 0), 2)
     style = room.style()
     size, stand = room.size(category), room.size("nightstand")
     vanity = bool(room.wanted.get("dressing_table")) and room.chance(0.5)
@@ -39,7 +39,7 @@ def bed_group(room: Builder, category: str) -> Item | None:
             continue
         if sides == 1:
             along += room.pick([-1, 1], [1, 1]) * stand[0] / 2
-        x, z = wall.point(along, size[2] / 2 + room.wall_gap())
+        x, z = wall.point(along, size[2] / 2 + room.wall_gap(category))
         bed = room.put(category, size, x, z, wall.yaw, style)
         if bed and _sides_kept_free(room, bed):
             break
@@ -94,7 +94,7 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
         return
     gap = room.uniform(-0.05, 0.04) if room.chance(0.7) else room.uniform(0.04, 0.12)
     lateral = bed.size[0] / 2 + size[0] / 2 + gap
-    shift = room.uniform(-0.06, 0.04) if room.chance(0.85) else room.uniform(0.04, 0.12)
+    shift = room.uniform(-0.09, 0.05) if room.chance(0.8) else room.uniform(0.05, 0.15)
     forward = -bed.size[2] / 2 + size[2] / 2 + shift
     sides = [1, -1] if room.chance(0.5) else [-1, 1]
     placed = 0
@@ -102,6 +102,7 @@ def _nightstands(room: Builder, bed: Item, size: Size, count: int, style: int) -
         for shift in (0.0, 0.06):
             at = side * (lateral + shift + room.rng.normal(0.0, 0.02))
             if room.beside(bed, "nightstand", size, at, forward, 0.0, style, play=0.12):
+                room.wanted["nightstand"] -= 1
                 placed += 1
                 break
         if placed == count:

@@ -10,6 +10,7 @@ import numpy as np
 
 from echomodel.data.furniture.sizes import sample_size, size_statistics
 from echomodel.data.rooms.floor import Floor, Wall
+from echomodel.data.rooms.statistics import QUARTILE, back_gaps
 
 HALF_PI = math.pi / 2
 Size = tuple[float, float, float]
@@ -20,6 +21,9 @@ ACCESS = {
 }  # fmt: skip
 SMALLEST, LARGEST = 0.55, 1.15  # times the 5th and 95th percentile of the class
 BODY = 1.8  # metres that a free zone is high
+# shares that stand askew, of room_statistics.json
+ASKEW = {"dining_chair": 0.09, "floor_lamp": 0.36, "plant": 0.06, "office_chair": 0.2}
+SUNK, FAR_BACK = -0.02, 0.12  # metres, ends of what a gap behind furniture at a wall is drawn from
 
 
 @dataclass(slots=True)
@@ -96,6 +100,12 @@ class Builder:
         shift = self.size_shift.get(category, (0.0, 0.0, 0.0))
         x, y, z = sample_size(category, self.rng, shift=shift).tolist()
         return x, y, z
+
+    def askew(self, category: str) -> float:
+        """How far one of a category is turned off the axes, radians: most stand straight."""
+        if not self.chance(ASKEW.get(category, 0.0)):
+            return 0.0
+        return float(np.clip(self.rng.normal(0.0, 0.35), -0.7, 0.7))
 
     def style(self) -> int:
         """The style of a group of furniture: mostly that of the room."""
@@ -198,7 +208,7 @@ class Builder:
             if spot is None:
                 return None
             wall, along = spot
-            x, z = wall.point(along, (self.wall_gap() if gap is None else gap) + size[2] / 2)
+            x, z = wall.point(along, (self.wall_gap(category) if gap is None else gap) + size[2] / 2)
             item = Item(category, size, x, 0.0, z, wall.yaw)
             if self.free(item):
                 found.append(item)
@@ -210,9 +220,12 @@ class Builder:
             found.sort(key=lambda item: math.hypot(item.x - near.x, item.z - near.z))
         return self.add(found[0], style)
 
-    def wall_gap(self) -> float:
-        """Gap between a back and its wall: a few centimetres."""
-        return min(abs(self.rng.normal(0.02, 0.02)), 0.07)
+    def wall_gap(self, category: str) -> float:
+        """Gap between a back and its wall: a few centimetres, as such furniture of real rooms has."""
+        low, middle, high = back_gaps(category)
+        z = self.rng.normal()
+        gap = middle + z * ((high - middle) if z > 0 else (middle - low)) / QUARTILE
+        return min(max(gap, SUNK), FAR_BACK)
 
     def somewhere(
         self, category: str, *, size: Size | None = None, yaw: float | None = None, style: int | None = None,

@@ -11,6 +11,7 @@ import numpy as np
 
 from echomodel.data.rooms.builder import Builder
 from echomodel.data.rooms.floor import sample_floor
+from echomodel.data.rooms.halls import hall_of, together
 from echomodel.data.rooms.recipes import furnish, wanted
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
 from echomodel.openings import Opening
@@ -25,6 +26,7 @@ STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
 def generate_room(
     rng: np.random.Generator, room_type: str | None = None, *, styles: int = STYLES, name: str = "room",
     statistics: RoomTypeStatistics | None = None, size_shift: Mapping[str, Sequence[float]] | None = None,
+    hall: bool = False,
 ) -> RoomBoxes:  # fmt: skip
     """Draw one room.
 
@@ -35,6 +37,7 @@ def generate_room(
         name: the room's id.
         statistics: what such rooms hold, default that of the real ones.
         size_shift: which sizes to try (see `room_requests`), default those that give real rooms' sizes.
+        hall: draw a large room of two or three zones.
 
     Returns:
         The room with its floor's bounding box centred at the origin, metres and radians.
@@ -47,8 +50,11 @@ def generate_room(
     statistics = statistics or room_type_statistics(room_type)
     size_shift = room_requests()["size"] if size_shift is None else size_shift
     for attempt in itertools.count():
-        builder = Builder(sample_floor(statistics, rng), rng, styles, size_shift)
-        builder.wanted = wanted(statistics, builder.floor.area, rng)
+        ground, zones = hall_of(statistics, rng) if hall else (statistics, [])
+        builder = Builder(sample_floor(ground, rng), rng, styles, size_shift)
+        kinds = [room_type_statistics(zone) for zone in zones] or [statistics]
+        area = builder.floor.area / len(kinds)
+        builder.wanted = together([wanted(kind, area, rng) for kind in kinds])
         furnish(builder, room_type)
         if len(builder.items) > 1 and (not builder.lost or attempt >= REDRAWS):
             return _boxes(builder, name, room_type)
@@ -56,19 +62,20 @@ def generate_room(
 
 
 def generate_rooms(
-    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0
+    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0, halls: float = 0.0
 ) -> list[RoomBoxes]:
     """Draw `count` rooms; room number i depends on (seed, i) alone, so that sets can be made in pieces."""
-    return list(iterate_rooms(count, seed, room_type=room_type, styles=styles, start=start))
+    return list(iterate_rooms(count, seed, room_type=room_type, styles=styles, start=start, halls=halls))
 
 
 def iterate_rooms(
-    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0
+    count: int, seed: int, *, room_type: str | None = None, styles: int = STYLES, start: int = 0, halls: float = 0.0
 ) -> Iterator[RoomBoxes]:
-    """`generate_rooms` one by one."""
+    """`generate_rooms` one by one; `halls` is the share of large rooms of several zones."""
     for number in range(start, start + count):
         rng = np.random.Generator(np.random.PCG64([seed, number]))
-        yield generate_room(rng, room_type, styles=styles, name=f"room_{seed}_{number:06d}")
+        hall = halls > 0 and np.random.Generator(np.random.PCG64([seed, number, 3])).random() < halls
+        yield generate_room(rng, room_type, styles=styles, name=f"room_{seed}_{number:06d}", hall=hall)
 
 
 def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:

@@ -10,7 +10,7 @@ from echomodel.data.rooms.beds import BEDS, bed_group
 from echomodel.data.rooms.builder import HALF_PI, Builder, Item
 from echomodel.data.rooms.floor import Wall
 from echomodel.data.rooms.lamps import ceiling_lamps, on_top
-from echomodel.data.rooms.sofas import SOFAS, sofa_group, television
+from echomodel.data.rooms.sofas import SOFAS, groups_left, sofa_group, television
 from echomodel.data.rooms.statistics import RoomTypeStatistics
 from echomodel.data.rooms.tables import VANITY_SEATS, desk_group, dining_group
 from echomodel.vocabulary import vocabulary
@@ -92,7 +92,7 @@ def furnish(room: Builder, name: str) -> None:
 
 
 def _bedroom(room: Builder) -> None:
-    beds = [bed for category in BEDS if room.take(category) and (bed := bed_group(room, category))]
+    beds = _beds(room)
     if beds and room.take("tv_stand"):
         television(room, beds[0])
     _wardrobe(room, beds[0] if beds else None)
@@ -102,6 +102,16 @@ def _bedroom(room: Builder) -> None:
     _desks(room)
     _rest(room)
     ceiling_lamps(room, list(beds))
+
+
+def _beds(room: Builder) -> list[Item]:
+    """The beds, each with what belongs to it; sofas and tables of a sleeping and living room after them."""
+    beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
+    if room.wanted.get("coffee_table"):
+        _sofas(room)
+    if room.wanted.get("dining_table"):
+        _set_tables(room)
+    return beds
 
 
 def _wardrobe(room: Builder, bed: Item | None) -> None:
@@ -125,7 +135,7 @@ def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], styl
         if room.chance(0.5):
             along = min(ends, key=lambda end: abs(end - level))
         along = min(max(along, ends[0]), max(ends))
-        x, z = wall.point(along, size[2] / 2 + abs(room.rng.normal(0.03, 0.02)))
+        x, z = wall.point(along, size[2] / 2 + room.wall_gap("wardrobe"))
         placed = room.put("wardrobe", size, x, z, wall.yaw, style)
         if placed:
             return placed
@@ -135,34 +145,36 @@ def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], styl
 def _living_room(room: Builder) -> None:
     sofa = _sofas(room)
     if room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
-        dining_group(room)
+        _set_tables(room)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, _anchors(room, sofa))
 
 
 def _dining_room(room: Builder) -> None:
-    tables = [dining_group(room, central=True) for _ in range(_tables(room))]
+    tables = _set_tables(room, central=True)
     _no_chairs_without(room, tables)
+    if room.wanted.get("coffee_table"):
+        _sofas(room)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, [table for table in tables if table])
 
 
 def _living_dining_room(room: Builder) -> None:
-    count = _tables(room)
     sofa = _sofas(room)
-    _no_chairs_without(room, [dining_group(room) for _ in range(count)])
+    _no_chairs_without(room, _set_tables(room))
     _desks(room)
     _rest(room)
     ceiling_lamps(room, _anchors(room, sofa))
 
 
-def _tables(room: Builder) -> int:
-    """How many dining tables are wanted; several chairs ask for one."""
+def _set_tables(room: Builder, *, central: bool = False) -> list[Item | None]:
+    """The dining tables with their chairs; several chairs ask for one."""
     if sum(room.wanted.get(chair, 0) for chair in DINING_CHAIRS) > 1:
         room.wanted.setdefault("dining_table", 1)
-    return room.take("dining_table")
+    count = room.take("dining_table")
+    return [dining_group(room, central=central, sharing=count - k) for k in range(count)]
 
 
 def _no_chairs_without(room: Builder, tables: list[Item | None]) -> None:
@@ -173,7 +185,7 @@ def _no_chairs_without(room: Builder, tables: list[Item | None]) -> None:
 
 
 def _study(room: Builder) -> None:
-    beds = [bed for category in BEDS if room.take(category) and (bed := bed_group(room, category))]
+    beds = _beds(room)
     if not beds and not room.wanted.get("desk"):
         room.wanted["desk"] = 1
     if room.wanted.get("desk") and not any(room.wanted.get(seat) for seat in DESK_SEATS) and room.chance(0.5):
@@ -185,11 +197,18 @@ def _study(room: Builder) -> None:
 
 
 def _sofas(room: Builder) -> Item | None:
-    for category in sorted(SOFAS, key=lambda name: -room.wanted.get(name, 0)):
-        if room.wanted.get(category):
-            room.wanted[category] -= 1
-            return sofa_group(room, category)
-    return None
+    """The first sofa with its group; further coffee tables ask for further groups."""
+    first: Item | None = None
+    while groups_left(room) and (first is None or room.wanted.get("coffee_table")):
+        category = max(SOFAS, key=lambda name: room.wanted.get(name, 0))
+        room.wanted[category] -= 1
+        made = sofa_group(room, category)
+        if made is None:
+            break
+        first = first or made
+    if first is not None:
+        room.take("coffee_table")  # what found no place before a sofa has none
+    return first
 
 
 def _anchors(room: Builder, sofa: Item | None) -> list[Item]:
@@ -232,7 +251,7 @@ def _rest(room: Builder) -> None:
     for category in [c for c in room.wanted if c in SMALL_TABLES]:
         for _ in range(room.take(category)):
             if category != "nightstand" and room.chance(0.5):
-                room.against_wall(category, corner=0.3, near=sofa)
+                room.against_wall(category, corner=0.3, near=sofa, gap=room.uniform(0.02, 0.4))
     on_top(room)
     if any(item.category in BOARDS for item in room.items):  # chairs that found no place at a table stay out
         for category in (*DINING_CHAIRS, "chair", "office_chair", "dressing_chair"):
@@ -248,7 +267,7 @@ def _by_the_wall(room: Builder, category: str) -> None:
     """A plant or lamp: beside the tv stand, in a corner, or along a wall."""
     size, style = room.size(category), room.style()
     stands = [item for item in room.items if item.category == "tv_stand"]
-    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2])
+    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2]) + room.askew(category)
     sofas = [item for item in room.items if item.category in SOFAS]
     if (stands or sofas) and category == "plant" and room.chance(0.8):
         stand = (stands or sofas)[0] if room.chance(0.75) else (sofas or stands)[0]
@@ -270,15 +289,16 @@ def _loose(room: Builder, category: str, size: tuple[float, float, float], style
     """A loose seat: with its back to a wall, now and then turned into the room, or on open floor."""
     group = [item for item in room.items if item.category in ("coffee_table", *SOFAS)]
     if room.chance(0.6) or (group and category in LOUNGERS):
-        for _ in range(8):
+        for attempt in range(8):
             spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
             if spot is None:
                 break
             if group and category in LOUNGERS and not _faces(*spot, group[0]):
                 continue
-            askew = category in LOUNGERS and not group and room.chance(0.3)
+            askew = category in LOUNGERS and not group and room.chance(0.45)
             turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.3, 0.8) if askew else 0.0
-            x, z = spot[0].point(spot[1], size[2] / 2 + (room.uniform(0.15, 0.3) if askew else room.uniform(0.02, 0.1)))
+            off = room.uniform(0.2, 0.9) if attempt < 5 else room.uniform(0.02, 0.1)  # seats stand in the room
+            x, z = spot[0].point(spot[1], size[2] / 2 + (max(off, 0.2) if askew else off))
             if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
                 return
     if not (group and category in LOUNGERS):

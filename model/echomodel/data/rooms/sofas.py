@@ -27,7 +27,7 @@ def television(room: Builder, anchor: Item, nearest: float = 0.3, farthest: floa
             spread = 0.1 if attempt == 0 else 0.15 * attempt
             place = along + room.rng.normal(0.0, spread)
             place = min(max(place, size[0] / 2), max(wall.length - size[0] / 2, size[0] / 2))
-            px, pz = wall.point(place, size[2] / 2 + abs(room.rng.normal(0.02, 0.025)))
+            px, pz = wall.point(place, size[2] / 2 + room.wall_gap("tv_stand"))
             placed = room.put("tv_stand", size, px, pz, wall.yaw, style)
             if placed:
                 return placed
@@ -53,7 +53,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
             end = 0.3 + abs(room.rng.normal(0.0, 0.9))
             along = size[0] / 2 + (min(end, spare) if room.chance(0.5) else max(spare - end, 0.0))
         distance, _ = room.floor.opposite(wall, along)
-        gap = room.wall_gap()
+        gap = room.wall_gap(category)
         low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
         if attempt < 14 and not (low < distance < high):
             continue
@@ -70,7 +70,7 @@ def sofa_group(room: Builder, category: str) -> Item | None:
     if sofa is None:
         return None
     if room.wanted.get("tv_stand") and television(room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4):
-        room.take("tv_stand")
+        room.wanted["tv_stand"] -= 1
     table = _coffee_table(room, sofa, style)
     _second_sofa(room, sofa, table)
     _seats(room, sofa, table, style)
@@ -78,8 +78,13 @@ def sofa_group(room: Builder, category: str) -> Item | None:
     return sofa
 
 
+def groups_left(room: Builder) -> bool:
+    """Whether sofas are wanted that no group has yet."""
+    return any(room.wanted.get(category) for category in SOFAS)
+
+
 def _coffee_table(room: Builder, sofa: Item, style: int) -> Item | None:
-    count = room.take("coffee_table")
+    count = room.wanted.get("coffee_table", 0)
     if not count:
         return None
     size = room.size("coffee_table")
@@ -98,7 +103,9 @@ def _coffee_table(room: Builder, sofa: Item, style: int) -> Item | None:
         placed = room.beside(sofa, "coffee_table", size, lateral, forward, turn, style, play=0.02,
                              ignore=(sofa,) if inner else ())  # fmt: skip
         if placed:
-            if count > 1:
+            room.wanted["coffee_table"] -= 1
+            if count > 1 and not groups_left(room):
+                room.wanted["coffee_table"] -= 1
                 second = (size[0] * 0.75, size[1] * 0.85, size[2] * 0.75)
                 room.beside(placed, "coffee_table", second, placed.size[0] * 0.6, room.uniform(-0.3, 0.3), 0.0, style,
                             ignore=(placed,))  # fmt: skip
@@ -110,7 +117,9 @@ def _second_sofa(room: Builder, sofa: Item, table: Item | None) -> None:
     for category in SOFAS:
         if not room.wanted.get(category):
             continue
-        room.take(category)
+        if room.wanted.get("coffee_table"):  # a group of its own
+            return
+        room.wanted[category] -= 1
         size = room.size(category)
         centre = table or sofa
         for side in (1, -1) if room.chance(0.5) else (-1, 1):
@@ -180,6 +189,7 @@ def _side_tables(room: Builder, sofa: Item, style: int) -> None:
                 lateral = side * (sofa.size[0] / 2 + size[0] / 2 + gap)
                 forward = room.rng.normal(-0.02, 0.1) if attempt < 3 else -sofa.size[2] / 2 + size[2] / 2
                 turn = room.pick([0.0, -HALF_PI, HALF_PI, math.pi], [0.42, 0.25, 0.19, 0.14])
+                turn += room.askew(category)
                 if room.beside(sofa, category, size, lateral, forward, turn, style):
                     room.wanted[category] -= 1
                     break

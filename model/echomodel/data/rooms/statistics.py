@@ -12,6 +12,9 @@ import numpy as np
 # How many corners are cut where the floor is not a rectangle: shares of 1, 2, 3 and 4.
 CUTS = {"bedroom": (0.72, 0.2, 0.06, 0.02), "study": (0.75, 0.2, 0.05, 0.0)}
 MANY_CUTS = (0.35, 0.35, 0.2, 0.1)
+AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
+QUARTILE = 0.674  # standard score of the third quartile
+USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
 _KNOTS = {5: (-1.645, -0.674, 0.0, 0.674, 1.645), 3: (-1.645, 0.0, 1.645)}
 
 
@@ -70,6 +73,13 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
         cuts=CUTS.get(name, MANY_CUTS),
         presence=presence,
     )
+
+
+@cache
+def back_gaps(category: str) -> tuple[float, float, float]:
+    """Quartiles of the gap between the backs of a category at a wall and that wall, metres."""
+    low, middle, high = room_statistics()["walls"].get(category, {}).get("back_gap", USUAL_GAPS)
+    return (low, middle, high) if middle < AT_WALL else USUAL_GAPS
 
 
 @cache

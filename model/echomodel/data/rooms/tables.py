@@ -10,8 +10,8 @@ from echomodel.data.rooms.sofas import SOFAS
 VANITY_SEATS = ("dressing_chair", "stool", "chair", "dining_chair", "ottoman")
 
 
-def dining_group(room: Builder, *, central: bool = False) -> Item | None:
-    """A table with its chairs tucked in: in the open, or with one end at a wall."""
+def dining_group(room: Builder, *, central: bool = False, sharing: int = 1) -> Item | None:
+    """A table with its chairs tucked in: in the open, or with one end at a wall; `sharing` tables share the chairs."""
     size = room.size("dining_table")
     style = room.style()
     chair_kind = next((c for c in ("dining_chair", "chinese_chair", "chair") if room.wanted.get(c)), None)
@@ -29,7 +29,7 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
             if room.chance(0.6):  # near the end of the wall, with a seat's depth between
                 end = size[2] / 2 + chair[2] * 0.8 + abs(room.rng.normal(0.0, 0.35))
                 along = end if room.chance(0.5) else wall.length - end
-            gap = room.uniform(0.0, 0.12) if room.chance(0.85) else room.uniform(0.1, 0.5)
+            gap = room.uniform(-0.01, 0.12) if room.chance(0.65) else room.uniform(0.12, 0.9)
             x, z = wall.point(along, size[0] / 2 + gap)
             yaw = wall.yaw + (HALF_PI if room.chance(0.5) else -HALF_PI)
         else:
@@ -51,7 +51,7 @@ def dining_group(room: Builder, *, central: bool = False) -> Item | None:
     if table is None:
         return None
     if chair_kind:
-        room.take(chair_kind)
+        count = -(-count // sharing)
         _chairs_around(room, table, chair_kind, chair, count, style if room.chance(0.8) else room.style())
     return table
 
@@ -80,7 +80,9 @@ def _chairs_around(room: Builder, table: Item, category: str, size: Size, count:
         if count <= 0:
             return
         lateral, forward = lateral + room.rng.normal(0, 0.015), forward + room.rng.normal(0, 0.015)
+        turn += room.askew(category)
         if room.beside(table, category, size, lateral, forward, turn, style, ignore=(table,)):
+            room.wanted[category] -= 1
             count -= 1
 
 

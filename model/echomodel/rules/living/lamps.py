@@ -25,11 +25,11 @@ def pendant_over(plan: Plan) -> Found:
     near = gap.new_full((len(plan),), 9.0).scatter_reduce(0, i[tables], gap[tables], "amin")[who]
     floor = plan.floor[plan.scene[who]]
     there = known(floor)
-    corners = torch.where(torch.isfinite(floor), floor, floor[:, :1])
+    corners = torch.nan_to_num(torch.where(torch.isfinite(floor), floor, floor[:, :1]))  # NaN would spoil gradients
     middle = (corners.amax(1) + corners.amin(1)) / 2
-    away = ((plan.position[who][:, [0, 2]] - middle).abs() / extents(floor)).amax(1)
+    away = ((plan.position[who][:, [0, 2]] - middle).abs() / torch.nan_to_num(extents(floor), nan=1.0)).amax(1)
     central = torch.where(there, MIDDLE - away, -torch.ones_like(away))
-    margin = torch.maximum(torch.maximum(best, torch.nan_to_num(central)), near - CLEAR)
+    margin = torch.maximum(torch.maximum(best, central), near - CLEAR)
     return found(who, margin, measure=near)
 
 

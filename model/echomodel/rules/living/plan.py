@@ -117,9 +117,11 @@ class Plan:
     @cached_property
     def anchor(self) -> Tensor:
         """(N,) int64, the object that each one attends, -1 = none: as the graph states, else the nearest."""
-        names = [kind.name for kind in self.kinds]
-        table = [b in kind.belongs_to for kind in self.kinds for b in names]
-        belongs = self._mask(table).reshape(len(self), len(self))
+        words = list(dict.fromkeys(self.kinds))
+        number = {kind: k for k, kind in enumerate(words)}
+        mine = torch.tensor([number[kind] for kind in self.kinds], dtype=torch.int64)
+        table = self._mask([b.name in kind.belongs_to for kind in words for b in words])
+        belongs = table.reshape(len(words), len(words))[mine[:, None], mine[None]]
         together = (self.scene[:, None] == self.scene[None]) & belongs
         together.fill_diagonal_(False)
         cost = torch.full(together.shape, torch.inf, dtype=self.size.dtype)
