@@ -59,7 +59,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files.update(asset.files)
     built = structure.shell_prims(room)
     harmony = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
-    slots = {slot for asset in small.values() for slot in _slots(asset)}
+    slots = _slots(small)
     table, bindings = room_looks(room, made, built, slots, harmony)
     files |= materials.texture_files(table, harmony)
     layers = {
@@ -195,7 +195,7 @@ def materials_layer(
     """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
     stage = _room_stage(room, "materials")
     stage.OverridePrim("/Room")
-    slots = {slot for asset in small.values() for slot in _slots(asset)}
+    slots = _slots(small)
     tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
     materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     materials.write_palettes(stage, harmony, tables)
@@ -309,8 +309,9 @@ def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]
     return data
 
 
-def _slots(asset: Asset) -> set[str]:
-    return {slot for slots in asset.slots.values() for slot in slots}
+def _slots(made: Mapping[str, Asset]) -> list[str]:
+    """Material slots of assets, each once, in an order that no hash seed changes."""
+    return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
 
 
 def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 LENGTH = 1e-4  # metres
 ANGLE = 0.01  # degrees
 DISTANCE = 1e-4  # of a signed distance on the normalised grid
+TOLD = 1e-4  # of a number that describes a piece of furniture
 
 
 @contextmanager
@@ -49,6 +50,11 @@ def rounded_boxes(graph: SceneGraph, boxes: Boxes) -> Boxes:
 def rounded_grids(grids: np.ndarray) -> np.ndarray:
     """(n, d, d, d) float32 signed distances in steps of `DISTANCE`."""
     return _round(np.asarray(grids, float), DISTANCE).astype(np.float32)
+
+
+def rounded_descriptions(told: np.ndarray) -> np.ndarray:
+    """(n, d) float32 descriptions of furniture in steps of `TOLD`."""
+    return _round(np.asarray(told, float), TOLD).astype(np.float32)
 
 
 def _round(values: np.ndarray, step: float) -> np.ndarray:

@@ -29,6 +29,8 @@ from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided, sample
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
+# Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
+CODE, DISTANCE = 1e-3, 1e-4
 
 
 class EchoModel:
@@ -312,10 +314,11 @@ class EchoModel:
         return agreeing(predict, equal.repeat(count) + first)
 
     def _decoded(self, codes: Tensor) -> Tensor:
-        """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time."""
+        """Signed distances (N, 64, 64, 64) float32 of codes, a few objects at a time; both are rounded."""
         latents, decode = self.model.shape.latents, self.model.autoencoder.decode
         with torch.autocast(self.device.type, torch.bfloat16) if self.half_decode else nullcontext():
-            return torch.cat([decode(latents(part)).float() for part in codes.split(4)])
+            grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
+        return _rounded(grids, DISTANCE)
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
         graph.check()
@@ -327,3 +330,7 @@ class EchoModel:
         boxes = boxes.to(self.device)
         boxes.check()
         return boxes
+
+
+def _rounded(values: Tensor, step: float) -> Tensor:
+    return (values / step).round() * step

@@ -13,6 +13,7 @@ from echomodel.data.furniture.description import WIDTH, piece_of
 from echomodel.protocols import furnishes
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import assembled
+from echousd.room.reproducible import one_thread, rounded_descriptions
 from echousd.room.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.room.tensors import floor_centre, graph_batch, seeded
 
@@ -54,7 +55,7 @@ class AssembledParts:
 
 
 def descriptions(request: ShapeRequest) -> np.ndarray:
-    """(n, WIDTH) float32: the model's description of every object."""
+    """(n, WIDTH) float32: the model's description of every object, rounded (`echousd.room.reproducible`)."""
     graph, boxes, model = request.graph, request.boxes, request.model
     SOURCE.check(model)
     assert furnishes(model)
@@ -66,12 +67,12 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
     if kept:
         extra["known"] = torch.tensor([kept.get(name, (0.0,) * WIDTH) for name in graph.names])
         extra["known_mask"] = torch.tensor([name in kept for name in graph.names])
-    with request.timer.stage("shapes") as tell:
+    with request.timer.stage("shapes") as tell, one_thread():
         found = model.sample_furniture(
             graph_batch(graph), centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip
-    return np.asarray(found)
+    return rounded_descriptions(np.asarray(found))
 
 
 SOURCE = AssembledParts()
