@@ -112,14 +112,13 @@ def _checked(job: Job) -> Any:
     from echousd.graph import SceneGraph
     from echousd.graph.doors import check_doors
     from echousd.graph.floors import check_space
-    from echousd.room.pipeline import MAX_OBJECTS
+    from echousd.room.layouts import check_objects
 
     if job.draw is not None and not job.text:
         graph = sampled_graph(*job.draw, job.options.relations)
     else:
         graph = SceneGraph.from_json(job.text)
-    if len(graph.nodes) > MAX_OBJECTS:
-        raise ValueError(f"{len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
+    check_objects(graph)
     check_doors(graph)
     check_space(graph)
     return graph

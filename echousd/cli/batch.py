@@ -164,9 +164,9 @@ def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
     """A live line on a terminal, plain lines in a log (a failure at once, else every 30 s), JSON lines if wanted."""
     import json as text
 
-    from rich.console import Console
+    from echousd.cli.terminal import Terminal
 
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     last: dict[str, Any] = {"room": "", "when": 0.0}
 
     def line(progress: BatchProgress) -> str:

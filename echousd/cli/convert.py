@@ -6,6 +6,8 @@ from pathlib import Path
 
 import typer
 
+from echousd.cli.output import say
+
 SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
 OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
 BOUNDS = typer.Option(
@@ -47,9 +49,9 @@ def convert(
     config = checkpoint.convert(source, output, classes=names, statistics=statistics)
     parts = [name for name in ("encoder", "layout", "shape", "vqvae") if getattr(config, name) is not None]
     echo = config.layout or config.shape
-    typer.echo(f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB")
+    say(f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB")
     if config.encoder:
         timed = "with" if echo and echo.time_in_echo else "without"
-        typer.echo(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
+        say(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
     if config.layout and statistics is None:
-        typer.echo("no box statistics: sampling boxes needs a conversion with --bounds")
+        say("no box statistics: sampling boxes needs a conversion with --bounds")

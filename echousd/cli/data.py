@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echousd.cli.output import say_json
+
 if TYPE_CHECKING:
     from echomodel.data.report import Row
 
@@ -31,12 +33,12 @@ def build(
 
     Example: echousd data build --recipe packed --seed 1 -o data/packed
     """
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from echomodel.data.build import build_data
+    from echousd.cli.terminal import Terminal
 
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     columns = (TextColumn("{task.description:8}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     told: dict[str, int] = {}
     with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
@@ -123,15 +125,15 @@ def report(
 
 def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], silent: list[str], as_json: bool) -> None:
     if as_json:
-        import json
         from dataclasses import asdict
 
-        typer.echo(json.dumps({"mean_distance": means, "left_out": silent, "rows": [asdict(row) for row in rows]}))
+        say_json({"mean_distance": means, "left_out": silent, "rows": [asdict(row) for row in rows]})
         return
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, width=None if Console().is_terminal else 150)
+    from echousd.cli.terminal import Terminal
+
+    console = Terminal(width=None if Terminal().is_terminal else 150)
     table = Table("section", "figure", "here", "real", "distance", box=None)
     for row in shown:
         ours, theirs = (" ".join(f"{v:.2f}" for v in values) for values in (row.ours, row.real))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echomodel.files import write_picture
+
 if TYPE_CHECKING:
     import trimesh
 
@@ -38,14 +40,14 @@ def meshes(
 
     Example: echousd data meshes --debian -o data/meshes
     """
-    from rich.console import Console
     from rich.progress import Progress
 
     from echomodel.data.mesh_sources import entries_of, fetched_package
     from echomodel.data.meshes import build_meshes, draft_table, read_table, write_table
+    from echousd.cli.terminal import Terminal
     from echousd.stage.meshes import stage_mesh
 
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     out.mkdir(parents=True, exist_ok=True)
     paths = list(sources or [])
     if debian:
@@ -110,4 +112,4 @@ def sheet(
             mesh.apply_scale(stored.size[i])
         if drawn:
             rows.append((f"{name} ({len(drawn)})", drawn))
-    contact_sheet(rows, pixels).save(out)
+    write_picture(out, contact_sheet(rows, pixels))

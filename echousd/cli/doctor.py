@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 
 import typer
 
+from echousd.cli.output import say_json
 from echousd.diagnosis import Diagnosis, diagnose
 
 
@@ -34,15 +34,16 @@ def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) ->
     findings = diagnose()
     healthy = all(diagnosis.state != "gap" for diagnosis in findings)
     if as_json:
-        typer.echo(json.dumps({"ok": healthy, "findings": [asdict(diagnosis) for diagnosis in findings]}, indent=2))
+        say_json({"ok": healthy, "findings": [asdict(diagnosis) for diagnosis in findings]}, indent=2)
     else:
         _show(findings)
     raise typer.Exit(0 if healthy else 1)
 
 
 def _show(findings: list[Diagnosis]) -> None:
-    from rich.console import Console
     from rich.table import Table
+
+    from echousd.cli.terminal import Terminal
 
     colours = {"ok": "green", "gap": "red", "optional": "yellow"}
     table = Table(box=None, pad_edge=False, header_style="bold")
@@ -51,7 +52,7 @@ def _show(findings: list[Diagnosis]) -> None:
     for diagnosis in findings:
         state = f"[{colours[diagnosis.state]}]{diagnosis.state}[/]"
         table.add_row(diagnosis.name, state, _plain(diagnosis.found), _plain(diagnosis.remedy))
-    console = Console()
+    console = Terminal(markup=True)
     if not console.is_terminal:
         console.width = 200  # nobody's window: keep paths on one line
     console.print(table)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from echomodel.files import write_json
+from echousd.cli.output import plain_json, say_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,19 +63,19 @@ def layout(
 
     Example: echousd eval layout --rooms rooms.json --rules sgfront --change --add
     """
-    from rich.console import Console
     from rich.progress import Progress
 
     from echomodel.data.room_files import load_rooms
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
     from echomodel.metrics.layout_sources import model_layouts, true_layouts
+    from echousd.cli.terminal import Terminal
     from echousd.repair.drafts import best_repaired
 
     found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(
         rules, drop, seed, change, add, complete, contradictions, told=told, judge=judge, drafts=drafts, seeds=seeds
     )
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     if model == "truth":
         if seeds or drafts > 1:
             raise ValueError("--seeds and --drafts need several layouts of a room, the true one is one")
@@ -89,11 +91,11 @@ def layout(
             best_repaired(rules) if repair else None,
         )  # fmt: skip
     if out is not None:
-        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+        write_json(out, plain_json(result))
     if json_out:
-        typer.echo(json.dumps(result))
+        say_json(result)
     else:
-        _print(result, Console(highlight=False))
+        _print(result, Terminal())
 
 
 def _print(result: dict, console: Console) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from echomodel.files import write_json, write_picture
+from echousd.cli.output import plain_json, say_json
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,13 +47,13 @@ def shapes(
     Examples: echousd eval shapes --sheet parts.png, or
     echousd eval shapes --shapes sdf --set data/packed/shapes --rooms 12 --sheet shapes.png
     """
-    from rich.console import Console
     from rich.progress import Progress
 
     from echomodel.data.shapeset import ShapeSet
     from echomodel.data.sheet import contact_sheet
     from echomodel.loading import load_model
     from echomodel.metrics.shape_evaluation import ShapeEvaluation, class_shapes, evaluate_shapes
+    from echousd.cli.terminal import Terminal
 
     source = source or ("parts" if meshes is None and shape_set is None else "sdf")
     if source not in ("parts", "sdf"):
@@ -64,7 +66,7 @@ def shapes(
     folder = meshes or shape_set
     assert folder is not None
     found = ShapeSet(folder / "shapes" if (folder / "shapes").is_dir() else folder)
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         tasks: dict = {}
 
@@ -79,11 +81,11 @@ def shapes(
         if per_class:
             result["classes"], made = _cleaned(class_shapes(loaded, per_class, seed, progress))
     if sheet is not None and made:
-        contact_sheet([(name, made[name][: per_class or 8]) for name in sorted(made)]).save(sheet)
+        write_picture(sheet, contact_sheet([(name, made[name][: per_class or 8]) for name in sorted(made)]))
     if out is not None:
-        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+        write_json(out, plain_json(result))
     if json_out:
-        typer.echo(json.dumps(result))
+        say_json(result)
     else:
         _print(result)
 
@@ -100,25 +102,24 @@ def _parts(
     json_out: bool,
 ) -> None:
     """Score furniture made of parts, against a set of shapes as well where one is named."""
-    from rich.console import Console
-
     from echomodel.data.shapeset import ShapeSet
     from echomodel.data.sheet import contact_sheet
     from echomodel.echo import EchoModel
     from echomodel.metrics.parts_evaluation import PartsEvaluation, evaluate_parts
+    from echousd.cli.terminal import Terminal
 
     folder = compared / "shapes" if compared and (compared / "shapes").is_dir() else compared
     shapes = None if folder is None else ShapeSet(folder)
     settings = PartsEvaluation(per_class=per_class, seed=seed, steps=steps)
     result, made = evaluate_parts(EchoModel.load(weights), settings, shapes)
     if sheet is not None:
-        contact_sheet([(name, made[name]) for name in sorted(made)]).save(sheet)
+        write_picture(sheet, contact_sheet([(name, made[name]) for name in sorted(made)]))
     if out is not None:
-        out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+        write_json(out, plain_json(result))
     if json_out:
-        typer.echo(json.dumps(result))
+        say_json(result)
         return
-    console, pieces, style = Console(highlight=False), result["pieces"], result["style"]
+    console, pieces, style = Terminal(), result["pieces"], result["style"]
     console.print(
         f"{pieces['pieces']} pieces, {pieces['closed']} closed, {pieces['loose']} with a loose part, "
         f"boxes filled to {1000 * pieces['box_error']:.2g} mm"
@@ -159,10 +160,11 @@ def _cleaned(shapes: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> tuple[di
 
 
 def _print(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False)
+    from echousd.cli.terminal import Terminal
+
+    console = Terminal()
     table = Table("reconstruction", "n", "F-score", "IoU", "Chamfer", box=None)
     rows = result["reconstruction"]
     for name in ["all", *sorted((n for n in rows if n != "all"), key=lambda n: rows[n]["f_score"])]:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from echousd.cli.output import say
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -34,4 +36,4 @@ def export(
     from echousd.export import export as write
 
     path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
-    typer.echo(str(path))
+    say(str(path))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import check_picture, safe
+from echousd.cli.output import check_picture, safe, say
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -122,7 +122,7 @@ def new(
     except OSError as error:
         raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
     save_graph(made, out)
-    typer.echo(f"wrote {out}: {_summary(made)}")
+    say(f"wrote {out}: {_summary(made)}")
 
 
 def _counted(text: str) -> tuple[str, int]:
@@ -195,7 +195,7 @@ def graph(
 
             check_picture(path, force=force)
             draw_graph(only, path)
-            typer.echo(f"wrote {path}: {_summary(only)}", err=True)
+            say(f"wrote {path}: {_summary(only)}", err=True)
     if as_json:
         typer.echo(only.to_json(), nl=False)
     elif as_yaml:

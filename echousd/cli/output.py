@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import unicodedata
@@ -39,6 +40,11 @@ def one_line(text: str) -> str:
 def say(text: str, *, err: bool = False) -> None:
     """Print a line that may hold names from files."""
     typer.echo(safe(text), err=err)
+
+
+def say_json(found: Any, *, indent: int | None = None) -> None:
+    """Print plain data as JSON; a number that is none becomes null."""
+    typer.echo(json.dumps(plain_json(found), indent=indent, allow_nan=False))
 
 
 def plain_json(found: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.output import check_picture
+from echousd.cli.output import check_picture, say
 
 
 def register(app: typer.Typer) -> None:
@@ -39,4 +39,4 @@ def render(
     mark.add_text("Software", "echousd")
     render_file(room, view=view, size=size, colors=colors, layout=layout).save(buffer, "PNG", pnginfo=mark)
     write_whole(output, buffer.getvalue())
-    typer.echo(str(output))
+    say(str(output))

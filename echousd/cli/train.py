@@ -24,12 +24,11 @@ def train(
 
     Example: echousd train model/recipes/layout.toml --set data=data/full --set steps=20000
     """
-    from rich.console import Console
-
     from echomodel.training.recipe import read_recipe
     from echomodel.training.run import open_run
+    from echousd.cli.terminal import Terminal
 
-    console = Console(stderr=True, highlight=False)
+    console = Terminal(stderr=True)
     folder = out or Path("runs") / recipe.stem
     plan = read_recipe(recipe, settings)
     if not resume and (folder / "checkpoint.safetensors").exists():

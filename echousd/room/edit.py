@@ -20,7 +20,7 @@ from echousd.graph.floors import with_plan_of
 from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
-from echousd.room.layouts import finished_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.layouts import check_objects, finished_boxes, room_floor, sample_boxes, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
@@ -80,6 +80,7 @@ def edit(
     timer, wishes = StageTimer(progress), wishes_of(assets)
     with timer.stage("read"):
         saved = read_room(root)
+    check_objects(graph, str(root))
     beside = Path(root).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph)

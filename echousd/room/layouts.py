@@ -23,7 +23,20 @@ if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
 
 DRAFTS = 8  # of which the best is kept
+CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
+MAX_OBJECTS = 400  # of one room: repair grows faster than their number
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
+
+
+def check_objects(graph: SceneGraph, file: str = "") -> None:
+    """Raises ValueError for more objects than a room may hold."""
+    if len(graph.nodes) > MAX_OBJECTS:
+        raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
+
+
+def usual_drafts(objects: int) -> int:
+    """Layouts that are drawn where nobody says how many: fewer for very many objects, which take long enough."""
+    return max(1, min(DRAFTS, CROWD // max(objects, 1)))
 
 
 def sample_boxes(

@@ -16,7 +16,7 @@ from echousd.graph.floors import check_space, with_floor, with_placed_openings, 
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
-from echousd.room.layouts import DRAFTS, best_boxes, plan_boxes, room_floor, with_sizes
+from echousd.room.layouts import best_boxes, check_objects, plan_boxes, room_floor, usual_drafts, with_sizes
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
@@ -32,8 +32,6 @@ from echousd.room.verdicts import layout_outcome, warn_of_faults
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echomodel.protocols import RoomModel
-
-MAX_OBJECTS = 400  # of one room: repair and the layout's echoes grow faster than their number
 
 
 def generate(
@@ -74,7 +72,8 @@ def generate(
         repair: move and size the sampled boxes as little as possible until the graph is kept.
         samples: number of layouts of the same furniture.
         drafts: layouts that are drawn at most for each of them, the best by relations and living rules is kept; None =
-            `DRAFTS`, or 1 for the published models, which take a thousand steps; without repair it is always 1.
+            8, fewer in rooms of more than 30 objects, or 1 for the published models, which take a thousand steps;
+            without repair it is always 1.
         earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
         fit: `keep` everything and say what collides, or `drop` what finds no place, and say it (`Room.notes`).
         steps: sampling steps, None for the model's own.
@@ -113,8 +112,7 @@ def generate(
     else:
         graph, homeless = with_locked_places(graph, earlier)
     graph = anchored(graph, beside)
-    if len(graph.nodes) > MAX_OBJECTS:
-        raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
+    check_objects(graph, file)
     with timer.stage("load"):
         echo = load_model(model, preset)
         shapes = shapes or default_source(echo)
@@ -126,7 +124,7 @@ def generate(
     crowded = check_space(graph)
     proposed = with_floor(graph, seed)
     free, graph = proposed is not graph, proposed
-    drafts = drafts or (DRAFTS if echo.preset == "compact" else 1)
+    drafts = drafts or (usual_drafts(len(graph.nodes)) if echo.preset == "compact" else 1)
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
         styles = style_groups(graph)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import torch
 import trimesh
-from pxr import Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
@@ -70,7 +70,14 @@ def read_room(root: str | Path) -> SavedRoom:
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
         read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
-        found = made.get(asset) or read(stage.GetPrimAtPath(f"{OBJECTS}/{node.name}"), asset, node.category, manifest)
+        where = f"{OBJECTS}/{node.name}"
+        try:
+            found = made.get(asset) or read(stage.GetPrimAtPath(where), asset, node.category, manifest)
+        except (TypeError, ValueError, IndexError, AttributeError, ArithmeticError, Tf.ErrorException) as error:
+            reason = " ".join(str(error).split())
+            raise ValueError(
+                f"{root}: <{where}> holds what echousd did not write there ({reason}); generate the room again"
+            ) from None
         if asset is None or found is None:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:

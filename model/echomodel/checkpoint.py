@@ -17,6 +17,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from echomodel.boxes import BoxStatistics
+from echomodel.config import check_numbers
 from echomodel.files import whole_file
 from echomodel.released.config import ReleasedConfig
 from echomodel.released.inference import VQVAE as VQVAE_PREFIX
@@ -239,13 +240,16 @@ def load_released(path: str | os.PathLike[str]) -> nn.Module:
                 raise CheckpointError(
                     f"{path}: format is {metadata.get('format')!r}, expected {FORMAT!r} (echousd convert)"
                 )
-            config = ReleasedConfig.from_json(json.loads(metadata["config"]))
+            raw = json.loads(metadata["config"])
+            check_numbers(raw, len(file.keys()))
+            config = ReleasedConfig.from_json(raw)
             words, bounds = json.loads(metadata["vocabulary"]), json.loads(metadata["box_statistics"])
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
     except CheckpointError:
         raise
     except (SafetensorError, KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise CheckpointError(f"{path}: truncated, or not a converted checkpoint ({error})") from None
+        reason = " ".join(str(error).split())[:200]
+        raise CheckpointError(f"{path}: truncated, or not a converted checkpoint ({reason})") from None
     model = build(config, tensors, str(path))
     if isinstance(model, ReleasedModel):
         model.classes = tuple(words["classes"]) if words and words["classes"] else None

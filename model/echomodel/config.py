@@ -9,6 +9,11 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 Objective = Literal["noise", "velocity", "flow"]
 Prediction = Literal["output", "sample"]
 Sampler = Literal["ddim", "ancestral", "dpm2m"]
+DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
+RANGES = {  # of what costs no tensors, but time
+    "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100), "start": (0, 1),
+    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "levels": (0, 1024), "patch": (1, 64),
+}  # fmt: skip
 C = TypeVar("C")
 
 
@@ -166,6 +171,27 @@ PRESETS = {"compact": CompactConfig()}
 def to_json(config: Any) -> str:
     """A configuration as one line of JSON."""
     return json.dumps(asdict(config), sort_keys=True)
+
+
+def to_dict(config: Any) -> dict[str, Any]:
+    """A configuration as nested plain values."""
+    return asdict(config)
+
+
+def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:
+    """Raises ValueError for numbers of a file's configuration that would cost more than its tensors: layers, steps.
+
+    Arguments:
+        raw: nested plain values of a configuration. tensors: how many the file holds.
+    """
+    for name, value in raw.items():
+        path = f"{where}.{name}" if where else name
+        if isinstance(value, dict):
+            check_numbers(value, tensors, path)
+        elif name in DEPTHS and isinstance(value, int) and not 0 <= value <= tensors:
+            raise ValueError(f"{path} is {value}, the file holds {tensors} tensors")
+        elif name in RANGES and not RANGES[name][0] <= value <= RANGES[name][1]:
+            raise ValueError(f"{path} is {value}, allowed: {RANGES[name][0]} to {RANGES[name][1]}")
 
 
 def from_json(kind: type[C], text: str) -> C:

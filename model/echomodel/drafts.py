@@ -21,7 +21,9 @@ from echomodel.vocabulary import vocabulary
 PLACED = 2.0  # relations that a piece is worth which found a place of its own
 DEALS = 4  # ways in which equal pieces are dealt to the nodes
 EXCHANGES = 3  # rounds in which two equal pieces may change places
+MOST_PAIRS = 400  # of them that are tried, each a whole layout to judge
 TOGETHER = 4  # arrangements that are drawn before they are judged
+CROWD = 480  # pieces of all arrangements of a scene together
 MIRRORS = ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
 
 
@@ -43,7 +45,8 @@ def drafted(graph: GraphBatch, generator: Randomness, *, rules: str, draws: int 
 
     Arguments:
         graph: scenes whose floors are known. generator: source of all randomness.
-        rules: the rule set that the relations are meant in. draws: most arrangements of a scene.
+        rules: the rule set that the relations are meant in.
+        draws: most arrangements of a scene; fewer are drawn of scenes with more than 30 pieces.
 
     Returns:
         N boxes, in the room frame, and (S,) float32, the share of the told relations that each scene's draft keeps.
@@ -71,6 +74,7 @@ def _scene(graph: GraphBatch, rng: np.random.Generator, rules: str, draws: int) 
     triplets = graph.triplets[torch.isin(graph.triplets[:, 1], torch.tensor(sorted(measured(rules))))]
     deals = DEALS if len(triplets) and len(set(categories)) < len(categories) else 1
     together = TOGETHER if len(triplets) else 1
+    draws = max(together, min(draws, CROWD // max(len(category), 1)))
     best, most, share = None, -1.0, 1.0
     for start in range(0, draws, together):
         found = []
@@ -126,7 +130,7 @@ def _exchanged(
     one: _Candidate, kept: float, category: np.ndarray, triplets: Tensor, rules: str
 ) -> tuple[_Candidate, float]:
     """The arrangement after equal pieces changed places as long as that keeps more relations, and how many it keeps."""
-    pairs = [(i, k) for i in range(len(category)) for k in range(i) if category[i] == category[k]]
+    pairs = [(i, k) for i in range(len(category)) for k in range(i) if category[i] == category[k]][:MOST_PAIRS]
     for _ in range(EXCHANGES):
         if kept >= len(triplets) or not pairs:
             break

@@ -8,6 +8,10 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 
 @contextmanager
@@ -36,10 +40,21 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
         beside.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8; the file appears whole."""
+    with whole_file(path) as beside:
+        beside.write_text(text, "utf-8")
+
+
+def write_picture(path: Path, picture: Image) -> None:
+    """Write a picture in the format of the path's ending; the file appears whole."""
+    with whole_file(path, path.suffix) as beside:
+        picture.save(beside)
+
+
 def write_json(path: Path, content: object) -> None:
     """Write something as indented JSON; the file appears whole."""
-    with whole_file(path) as beside:
-        beside.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+    write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def flush(path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.files import write_text
 from echomodel.openings import Opening, opening_from_json
 
 CONVENTION = (
@@ -126,7 +127,7 @@ def write_rooms(path: str | os.PathLike[str], rooms: Iterable[RoomBoxes]) -> Non
     """Write a rooms file, one room a line."""
     lines = ",\n".join(json.dumps(room.to_json(), separators=(",", ":")) for room in rooms)
     text = f'{{"convention": {json.dumps(CONVENTION)}, "rooms": [\n{lines}\n]}}\n'
-    Path(path).write_text(text, "utf-8")
+    write_text(Path(path), text)
 
 
 def footprints(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:

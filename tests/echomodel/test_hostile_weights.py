@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import resource
 from importlib import resources
 
 import pytest
@@ -9,6 +11,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
+from echomodel.checkpoint import load_released
 from echomodel.echo import EchoModel
 
 
@@ -36,3 +39,46 @@ def test_tensors_that_are_no_weights(layout, tmp_path, bent):
     save_file({**tensors, key: wrong}, tmp_path / "bent.safetensors", metadata=metadata)
     with pytest.raises(ValueError, match=rf"bent\.safetensors: tensor {key} holds .*allowed: finite floating-point"):
         EchoModel.load(tmp_path / "bent.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        (("layout", "width"), 10**9),
+        (("layout", "width"), 2**70),
+        (("layout", "layers"), 10**9),
+        (("layout", "layers"), -1),
+        (("layout", "drafts"), 10**9),
+        (("layout", "frequencies"), 10**9),
+        (("latent", "layers"), 10**9),
+        (("categories",), 10**12),
+        (("layout", "steps"), 10**9),
+        (("layout", "steps"), 0),
+        (("layout", "guidance_rounds"), 10**9),
+        (("layout", "guidance"), float("nan")),
+    ],
+)
+def test_a_configuration_that_asks_for_more_than_the_file_holds(layout, tmp_path, field, value):
+    metadata, tensors = layout
+    config = json.loads(metadata["config"])
+    within = config
+    for name in field[:-1]:
+        within = within[name]
+    within[field[-1]] = value
+    save_file(tensors, tmp_path / "bent.safetensors", metadata={**metadata, "config": json.dumps(config)})
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(ValueError, match=r"bent\.safetensors: "):
+        EchoModel.load(tmp_path / "bent.safetensors")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1 << 20  # kB
+
+
+@pytest.mark.parametrize(("part", "field"), [("encoder", "layers"), ("encoder", "hidden"), ("layout", "blocks")])
+def test_converted_weights_that_ask_for_more_than_they_hold(tmp_path, part, field):
+    config = {part: {field: 10**9}}
+    save_file(
+        {"a": torch.zeros(1)}, tmp_path / "bent.safetensors",
+        metadata={"format": "echousd-released-1", "config": json.dumps(config), "vocabulary": "null",
+                  "box_statistics": "null"},
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"bent\.safetensors: "):
+        load_released(tmp_path / "bent.safetensors")

@@ -15,6 +15,7 @@ from echousd.repair.arrange.places import places
 from echousd.repair.arrange.setting import Poses, Setting, State
 
 ROUNDS = 4  # orders that are tried
+CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
 BLOCK = 16  # poses that are priced together at first
 BAD = 2.5  # a piece that pays more comes earlier in the next round
@@ -35,13 +36,14 @@ class Arranged:
         return float(self.paid.sum())
 
 
-def arrange(setting: Setting, *, rounds: int = ROUNDS) -> Arranged:
+def arrange(setting: Setting, *, rounds: int | None = None) -> Arranged:
     """The best arrangement of some rounds; the same for equal settings.
 
     Arguments:
         setting: the room, its boxes and where they were drawn.
-        rounds: orders to try; more for rooms that are hard.
+        rounds: orders to try; None = `ROUNDS`, fewer for very many boxes.
     """
+    rounds = rounds or max(1, min(ROUNDS, CROWD // max(len(setting.size), 1)))
     rank = np.array([_rank(setting, i) for i in range(len(setting.size))])
     regrets: dict[int, list[tuple[float, float, float, float]]] = {}
     best: Arranged | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.config import CompactConfig, from_dict, to_json
+from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 
@@ -122,13 +122,20 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
         # only a file with the layout branch knows the boxes
         own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
-        model = CompactModel(config, BoxStatistics.from_json(json.loads(own["statistics"])), parts)
+        statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
+        check_numbers(to_dict(config), len(tensors))
+        with torch.device("meta"):  # sizes that a bent configuration asks for cost nothing there
+            _check_fit(CompactModel(config, statistics, parts).state_dict(), tensors, where)
+        model = CompactModel(config, statistics, parts)
     except WeightsError:
         raise
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError, RecursionError) as error:
+    except (
+        KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError, RecursionError, ArithmeticError
+    ) as error:  # fmt: skip
         reason = " ".join(str(error).split())[:200]
         raise WeightsError(f"{where}: malformed metadata ({type(error).__name__}: {reason})") from None
-    _fit(model, tensors, where)
+    wanted = model.state_dict()
+    model.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
     return model.to(device).eval(), digest.hexdigest()[:12]
 
 
@@ -157,8 +164,7 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
     return joined
 
 
-def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:
-    wanted = model.state_dict()
+def _check_fit(wanted: Mapping[str, Tensor], tensors: dict[str, Tensor], where: str) -> None:
     missing = sorted(wanted.keys() - tensors.keys())
     unexpected = sorted(tensors.keys() - wanted.keys())
     misshapen = [key for key in sorted(wanted.keys() & tensors.keys()) if wanted[key].shape != tensors[key].shape]
@@ -169,7 +175,6 @@ def _fit(model: CompactModel, tensors: dict[str, Tensor], where: str) -> None:
     ]
     if problems:
         raise WeightsError(f"{where}: tensors do not fit the configuration: {'; '.join(problems)}")
-    model.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
 
 
 def _words(config: CompactConfig) -> dict[str, list[str]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.data.shapeset import ShapeSet, build_shapes
+from echomodel.files import write_json
 from echomodel.progress import StageListener, StepListener
 
 
@@ -60,5 +60,5 @@ def build_data(
     )
     shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
     note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
-    (folder / "data.json").write_text(json.dumps(note, indent=1) + "\n", "utf-8")
+    write_json(folder / "data.json", note)
     return rooms, shapes

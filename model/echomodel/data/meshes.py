@@ -20,7 +20,7 @@ from echomodel.data.catalogues import Loader, MeshEntry, load_mesh
 from echomodel.data.shapeset import ShapeRecord, ShapeSet, finish_set, write_shard
 from echomodel.data.sheet import thumbnail
 from echomodel.data.tsdf import tsdf_from_mesh
-from echomodel.files import whole_file
+from echomodel.files import whole_file, write_picture, write_text
 from echomodel.progress import StepListener
 from echomodel.vocabulary import vocabulary
 
@@ -251,7 +251,7 @@ def build_meshes(
     for stale in folder.glob("shapes-*.bin"):
         stale.unlink()
     write_shard(folder / "shapes-0000.bin", records)
-    (folder / "ATTRIBUTION.md").write_text(attribution(kept), "utf-8")
+    write_text(folder / "ATTRIBUTION.md", attribution(kept))
     return finish_set(folder, {"kind": "meshes", "names": names}, len(records))
 
 
@@ -266,7 +266,7 @@ def _one(
             return stored["tsdf"].astype(np.float32) / 127, stored["size"]
     mesh = prepared(entry, row, loaders)
     tsdf, size = tsdf_from_mesh(mesh), np.asarray(mesh.extents, float)
-    thumbnail(mesh).save(folder / "thumbnails" / f"{stem}.png")
+    write_picture(folder / "thumbnails" / f"{stem}.png", thumbnail(mesh))
     with whole_file(part) as beside, beside.open("wb") as file:
         np.savez_compressed(file, tsdf=np.rint(tsdf * 127).astype(np.int8), size=size)
     return np.rint(tsdf * 127).astype(np.float32) / 127, size

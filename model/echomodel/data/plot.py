@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from echomodel.files import whole_file
 from echomodel.openings import segment, swing_area
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.vocabulary import UnknownWord, vocabulary
@@ -67,7 +69,8 @@ def plot_rooms(
         axes.invert_yaxis()
         axes.set_title(f"{room.id} ({room.room_type})", fontsize=5, pad=1)
     figure.subplots_adjust(0.005, 0.005, 0.995, 0.98, 0.03, 0.08)
-    figure.savefig(path, dpi=dpi)
+    with whole_file(path, Path(path).suffix) as beside:
+        figure.savefig(beside, dpi=dpi)
 
 
 def _coarse(word: str) -> str | None:

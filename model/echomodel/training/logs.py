@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from echomodel.files import whole_file
+
 
 class RunLog:
     """Appends numbers per step to `log.csv` in long form (step, name, value), and to TensorBoard.
@@ -75,5 +77,6 @@ def plot_log(log: Path, out: Path) -> None:
         axis.set(title=group, xlabel="step")
         axis.legend(fontsize=6)
     figure.tight_layout()
-    figure.savefig(out, dpi=110)
+    with whole_file(out, Path(out).suffix) as beside:
+        figure.savefig(beside, dpi=110)
     plt.close(figure)
