@@ -1,9 +1,11 @@
 """What becomes of a room's folder when two writers race for it, and when writers are killed at any moment.
 
-    OMP_NUM_THREADS=1 python benchmarks/folder_safety.py --races 60 --kills 60
+    OMP_NUM_THREADS=1 python benchmarks/folder_safety.py --races 60 --kills 60 --commands 12
 
-Every writer is a process of its own. A race is won or lost as a whole: the folder holds exactly one writer's room.
-After a kill the room opens (if there was one), and the same command, run again, gives the bytes of an undisturbed run.
+Every writer is a process of its own: forked with everything loaded, so that many moments are met, or (`--commands`) the
+command as a shell starts it, killed at any time from its start on. A race is won or lost as a whole: the folder holds
+exactly one writer's room. After a kill the room opens (if there was one), and the same command, run again, gives the
+bytes of an undisturbed run.
 """
 
 from __future__ import annotations
@@ -15,10 +17,13 @@ import os
 import random
 import shutil
 import signal
+import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from pxr import Usd
@@ -105,11 +110,24 @@ def races(count: int, scratch: Path, told: Counter[str]) -> None:
         told["done"] += 1
 
 
-def kills(count: int, scratch: Path, told: Counter[str]) -> None:
+def forked(words: list[str]) -> int:
+    """Id of a process that runs a command with everything loaded."""
+    return start(lambda: run(words))
+
+
+def spawned(words: list[str]) -> int:
+    """Id of a process that a shell would start for a command."""
+    code = "from echousd.cli.main import main; main()"
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen([sys.executable, "-c", code, *words], **silent).pid
+
+
+def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[str]], int] = forked) -> None:
     """SIGKILL for `generate` over an old room and for `edit`, half of them while files are being written."""
-    said = ["--shapes", "boxes"]
+    said = ["--shapes", "boxes", "--no-repair"]
     old = scratch / "old/room"
-    run(["generate", str(GRAPH), "-o", str(old), "--seed", "1", *said])
+    if not old.exists():
+        run(["generate", str(GRAPH), "-o", str(old), "--seed", "1", *said])
     commands = (
         lambda folder: ["generate", str(GRAPH), "-o", str(folder), "--seed", "2", *said],
         lambda folder: ["edit", str(folder / "room.usda"), "--add", "fern:plant", "--remove", "pendant", *said],
@@ -119,16 +137,16 @@ def kills(count: int, scratch: Path, told: Counter[str]) -> None:
         folder = scratch / "undisturbed/room"
         shutil.copytree(old, folder)
         began = time.perf_counter()
-        assert wait_for(start(lambda c=command, f=folder: run(c(f)))) == 0
+        assert wait_for(begin(command(folder))) in (0, 1)  # without repair things may collide
         spent.append(time.perf_counter() - began)
         undisturbed.append(bytes_of(folder))
         shutil.rmtree(folder)
     before = bytes_of(old)
     for number in range(count):
         kind, command = number % 2, commands[number % 2]
-        folder = scratch / f"kill{number}" / "room"
+        folder = scratch / f"{begin.__name__}{number}" / "room"
         shutil.copytree(old, folder)
-        child = start(lambda c=command, f=folder: run(c(f)))
+        child = begin(command(folder))
         if number // 2 % 2:  # at any time
             time.sleep(random.uniform(0, 1.05 * spent[kind]))
         else:  # while it is writing
@@ -143,10 +161,10 @@ def kills(count: int, scratch: Path, told: Counter[str]) -> None:
         told["opens at once"] += opens(folder / "room.usda")
         if kind and bytes_of(folder) != undisturbed[kind]:
             stale = (folder / ".echousd/journal.json").exists()
-            again = wait_for(start(lambda c=command, f=folder: run(c(f))))
+            again = wait_for(forked(command(folder)))
             told["edit was complete with its journal"] += stale and again == 2
         elif not kind:
-            wait_for(start(lambda c=command, f=folder: run(c(f))))
+            wait_for(forked(command(folder)))
         write_missing_preview(folder)
         after = bytes_of(folder)
         told["same bytes in the end"] += after == undisturbed[kind]
@@ -167,20 +185,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--races", type=int, default=60)
     parser.add_argument("--kills", type=int, default=60)
+    parser.add_argument("--commands", type=int, default=0, help="kills of commands as a shell starts them")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     random.seed(asked.seed)
     load_graph(GRAPH)
     load_model(None)
     with tempfile.TemporaryDirectory(prefix="echousd-safety-") as folder:
-        for name, count, measure in (("races", asked.races, races), ("kills", asked.kills, kills)):
+        for name, count, measure in (
+            ("races", asked.races, races),
+            ("kills", asked.kills, kills),
+            ("kills of commands", asked.commands, partial(kills, begin=spawned)),
+        ):
             if count:
                 print(f"{count} {name}")
                 told: Counter[str] = Counter()
                 with contextlib.suppress(KeyboardInterrupt):  # then what was counted so far
                     measure(count, Path(folder), told)
                 for what, often in told.items():
-                    print(f"  {often:4d} {what}")
+                    print(f"  {often:4d} {what}", flush=True)
 
 
 if __name__ == "__main__":

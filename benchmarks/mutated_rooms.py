@@ -2,8 +2,8 @@
 
     OMP_NUM_THREADS=1 nice -n 5 python benchmarks/mutated_rooms.py --commands quick --seconds 3000 --log faults.txt
 
-Every command must work, or end in one line that names the file or the prim (exit code 0, 1 or 2), within a minute and
-4 GB. Mutations come in a random order, so that a run that was ended has tried an honest sample.
+Every command must work, or end in one line that names the file or the prim (exit code 0, 1 or 2), within a minute of
+the processor and 4 GB. Mutations come in a random order, so that a run that was ended has tried an honest sample.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ GROUPS = {
     "slow": ("edit", "glb", "generate", "graph --png"),
     "all": tuple(COMMANDS),
 }
-PIECE = 400  # mutations of one process
-SECONDS = 60  # for one command
+PIECE = 200  # mutations of one process
+SECONDS = 60  # of the processor for one command
 MEMORY = 12 << 30  # address space of one process, most of it never touched
 GROWTH = 4 << 20  # kB that one command may add
 
 
-class Hang(Exception):
+class Hang(BaseException):
     """A command that does not end."""
 
 
@@ -53,14 +53,14 @@ def fault(room: Path, mutation: Mutation, command: str, folder: Path) -> str:
     mutate(mutant, mutation)
     out, err = io.StringIO(), io.StringIO()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    signal.alarm(SECONDS)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = run(COMMANDS[command](mutant, folder / "out"))
     except Hang:
         return f"does not end in {SECONDS} s"
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     last = (err.getvalue().strip().splitlines() or [""])[-1]
     if code not in (0, 1, 2):
@@ -78,7 +78,7 @@ def piece(room: Path, pairs: list[tuple[Mutation, str]], log: Path, scratch: Pat
     def stop(*_: object) -> None:
         raise Hang
 
-    signal.signal(signal.SIGALRM, stop)
+    signal.signal(signal.SIGPROF, stop)
     warnings.simplefilter("ignore")
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     for mutation, command in pairs:

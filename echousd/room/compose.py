@@ -21,7 +21,7 @@ from echousd.room.originals import attribution, component
 from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
-from echousd.room.styles import ROOM_STYLE
+from echousd.room.styles import ROOM_STYLE, free_name
 from echousd.room.surface import surface
 from echousd.room.taxonomy import ade20k
 from echousd.sight import Furniture
@@ -168,13 +168,13 @@ def room_looks(
     """
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}
-    voices = {ROOM_STYLE: 0}
+    voices, slugs = {ROOM_STYLE: 0}, _slugs(room)
     for node in room.graph.nodes:
         asset, style = room.assets[node.name], room.styles[node.name]
-        slug = "".join(c if c.isalnum() else "_" for c in style)
+        slug = slugs[style]
         voice = voices.setdefault(style, len(voices))
         for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", made[asset].slots).items():
-            name = f"{slug}_{slot}" if slug[0].isalpha() else f"style_{slug}_{slot}"
+            name = f"{slug}_{slot}"
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
@@ -307,6 +307,17 @@ def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]
     if geometry.origin.credit:
         data["asset_credit"] = geometry.origin.credit
     return data
+
+
+def _slugs(room: RoomData) -> dict[str, str]:
+    """Style -> the first word of its materials' names; styles that differ in what no name may hold stay apart."""
+    out: dict[str, str] = {}
+    for style in (room.styles[node.name] for node in room.graph.nodes):
+        if style not in out:
+            word = "".join(c if Sdf.Path.IsValidIdentifier(f"a{c}") else "_" for c in style)
+            word = word if word[:1].isalpha() else f"style_{word}"
+            out[style] = free_name(word, {ROOM_STYLE, *out.values()} - {style})
+    return out
 
 
 def _slots(made: Mapping[str, Asset]) -> list[str]:

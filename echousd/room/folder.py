@@ -28,6 +28,7 @@ from echousd.room.journal import (
 from echousd.room.lock import LOCK, locked
 from echousd.room.manifest import find_manifest
 from echousd.room.within import inside
+from echousd.stage.files import check_path
 
 
 def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
@@ -37,6 +38,7 @@ def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
 
     Raises ValueError for a file in the way, or a folder that holds other things than a room of ours.
     """
+    check_path(folder)
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: is a file, the output must be a folder")
     if not folder.exists():
@@ -54,6 +56,7 @@ def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
 
 def check_writable(folder: Path) -> None:
     """Raises ValueError where nothing can be written into `folder`, or where it cannot be created."""
+    check_path(folder)
     nearest = folder
     while not nearest.exists():
         nearest = nearest.parent

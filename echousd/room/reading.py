@@ -74,6 +74,8 @@ def read_room(root: str | Path) -> SavedRoom:
         try:
             found = made.get(asset) or read(stage.GetPrimAtPath(where), asset, node.category, manifest)
         except (TypeError, ValueError, IndexError, AttributeError, ArithmeticError, Tf.ErrorException) as error:
+            if read is read_original and isinstance(error, ValueError):
+                raise
             reason = " ".join(str(error).split())
             raise ValueError(
                 f"{root}: <{where}> holds what echousd did not write there ({reason}); generate the room again"

@@ -33,8 +33,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
         raise StageError(f"{path}: a folder, allowed: a file, {', '.join(READABLE)}")
     if not path.is_file():
         raise StageError(f"{path}: not a regular file, allowed: a file, {', '.join(READABLE)}")
-    if ":SDF_FORMAT_ARGS:" in str(path):
-        raise StageError(f"{path}: ':SDF_FORMAT_ARGS:' in a name ends the path for USD, allowed: another name")
+    check_path(path)
     if path.suffix not in READABLE:
         raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(READABLE)}")
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well
@@ -60,6 +59,16 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
 
 class MissingMaterials(UserWarning):
     """A stage refers to materials in a form that this OpenUSD does not read, such as MaterialX without its plugin."""
+
+
+def check_path(path: Path) -> None:
+    """Raises StageError for a file or folder below which USD would look for layers elsewhere, or not at all."""
+    whole = os.path.abspath(path)  # noqa: PTH100  # links stay
+    if ":SDF_FORMAT_ARGS:" in whole:
+        raise StageError(f"{path}: ':SDF_FORMAT_ARGS:' in a name ends the path for USD, allowed: another name")
+    odd = next((c for c in whole if not c.isprintable() or (c == "\\" and os.name == "posix")), None)
+    if odd is not None:
+        raise StageError(f"{path}: {odd!r} in a name, which USD does not take in paths, allowed: another name")
 
 
 def opened(stage: Usd.Stage | str | os.PathLike[str]) -> Usd.Stage:

@@ -33,7 +33,8 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
             shutil.copymode(path, beside)
         beside.replace(path)
     except OSError as error:
-        if error.filename == str(beside):  # whoever reads the message knows the file by its own name
+        # whoever reads the message knows the file by its own name; a full disk names none
+        if error.filename in (None, str(beside)):
             error.filename = str(path)
         raise
     finally:
