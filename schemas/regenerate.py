@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+
+from echomodel.vocabulary import vocabulary
 
 SCHEMA = Path(__file__).with_name("schema.usda")
 RESOURCES = SCHEMA.parent / "resources"
 FILES = ("generatedSchema.usda", "plugInfo.json")
 
 
+def with_vocabulary(schema: str) -> str:
+    """The text of schema.usda with the room types and predicates that the vocabulary has."""
+    words = vocabulary()
+    for name, rows in (("echo:roomType", words.room_types), ("echo:predicate", words.predicates)):
+        tokens = ", ".join(f'"{row.name}"' for row in rows)
+        schema, found = re.subn(rf"(token {name} .*?allowedTokens = )\[[^]]*\]", rf"\1[{tokens}]", schema, flags=re.S)
+        if found != 1:
+            raise RuntimeError(f"{SCHEMA}: {name} has allowedTokens {found} times, expected once")
+    return schema
+
+
 def regenerate(target: Path = RESOURCES) -> None:
     """Write generatedSchema.usda and plugInfo.json of schema.usda to the folder `target`.
+
+    The tokens of room types and predicates in schema.usda itself are brought up to date before.
 
     Raises RuntimeError with usdGenSchema's own words where it fails (for one, when jinja2 is not installed).
     """
     target.mkdir(parents=True, exist_ok=True)
+    text = SCHEMA.read_text("utf-8")
+    if with_vocabulary(text) != text:
+        SCHEMA.write_text(with_vocabulary(text), "utf-8")
     command = [sys.executable, "-m", "pxr.Usd.usdGenSchema", str(SCHEMA), str(target)]
     # The installed plugin must not be loaded while it is generated anew.
     environment = {key: text for key, text in os.environ.items() if key != "PXR_PLUGINPATH_NAME"}

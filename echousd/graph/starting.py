@@ -3,59 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from echomodel.habits import Habit
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, check_triples
 from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
-
-BEDS = ("double_bed", "single_bed", "kids_bed")
-SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "sofa", "loveseat_sofa", "chaise_longue_sofa")
-TABLES = ("dining_table", "coffee_table")
-
-
-@dataclass(frozen=True)
-class Habit:
-    """How objects of some categories stand to the first of `anchors` that the room holds.
-
-    Arguments:
-        categories: whose habit it is.
-        anchors: categories to relate to, the preferred ones first.
-        predicates: what holds between the object and its anchor.
-        sides: predicates of which successive objects at one anchor get one each, in turn.
-    """
-
-    categories: tuple[str, ...]
-    anchors: tuple[str, ...]
-    predicates: tuple[str, ...] = ()
-    sides: tuple[str, ...] = ()
-
-
-# In the order in which they apply. Anchors come before what leans on them, so that the relations form a forest, which
-# cannot contradict itself. Beds and sofas have their back at -X: what they face is in front of them.
-HABITS = (
-    Habit(("nightstand",), BEDS, ("close_by",), ("left", "right")),
-    Habit(("dresser", "dressing_table", "desk"), BEDS, (), ("right", "left")),
-    Habit(("wardrobe",), BEDS, ("taller_than",), ("right", "left")),
-    Habit(("coffee_table",), SOFAS, ("front",)),
-    Habit(("tv_stand",), ("coffee_table", *SOFAS, *BEDS), ("front",)),
-    Habit(("dining_table",), SOFAS, (), ("right",)),
-    Habit(("armchair", "lounge_chair", "lazy_sofa"), (*SOFAS, *TABLES), (), ("right", "left")),
-    Habit(("side_table", "corner_side_table", "round_end_table"), (*SOFAS, *BEDS), ("close_by",), ("left", "right")),
-    Habit(("ottoman", "bench"), (*SOFAS, *BEDS), ("front",)),
-    Habit(("dining_chair", "chinese_chair"), ("dining_table", "desk"), ("close_by",), ("left", "right")),
-    Habit(("office_chair", "chair"), ("desk", "dining_table"), ("front", "close_by")),
-    Habit(("dressing_chair", "stool"), ("dressing_table",), ("front", "close_by")),
-    Habit(("sideboard", "cabinet", "wine_cabinet"), ("dining_table", *SOFAS), (), ("front", "behind")),
-    Habit(("bookshelf", "shelf"), ("desk", *SOFAS, *BEDS), ("taller_than",)),
-    Habit(("pendant_lamp", "ceiling_lamp"), (*TABLES, *BEDS, "desk", *SOFAS), ("above",)),
-    Habit(("table_lamp",), ("nightstand", "desk", "side_table", "sideboard", "dresser"), ("standing_on",)),
-    Habit(("tv",), ("tv_stand",), ("standing_on",)),
-    Habit(("floor_lamp",), ("armchair", "lounge_chair", *SOFAS, *BEDS, "desk"), ("close_by", "taller_than")),
-    Habit(("plant",), ("tv_stand", "sideboard", "bookshelf", *SOFAS), ("close_by",)),
-)
 
 MAX_COUNT = 100
 
@@ -82,7 +36,7 @@ def starting_graph(
         category: [_node(category, i, count) for i in range(count)] for category, count in wanted.items() if count
     }
     usual: list[Relation] = []
-    for habit in HABITS:
+    for habit in vocabulary().habits:
         for category in habit.categories:
             anchors = [anchor for word in habit.anchors for anchor in nodes.get(word, ())]
             if anchors:

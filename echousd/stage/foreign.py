@@ -28,6 +28,9 @@ _FLAT = 1e-18  # the determinant of a transform that leaves no volume
 _Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) of a Z-up stage -> (x, z, -y)
 
 
+UNTOLD = "living_room"  # what a room is whose furniture tells nothing
+
+
 class SkippedPrims(UserWarning):
     """Labelled prims that became no node; the message counts them by reason."""
 
@@ -265,10 +268,6 @@ def _room_type(words: list[str], categories: list[str]) -> str:
             return vocabulary().room_type(word.rstrip("0123456789_")).name
         except UnknownWord:
             continue
-    has = set(categories)
-    coarse = {vocabulary().category(name).coarse for name in has}
-    if "bed" in coarse:
-        return "bedroom"
-    if "dining_table" in has:
-        return "living_dining_room" if "sofa" in coarse else "dining_room"
-    return "study" if "desk" in has and "sofa" not in coarse else "living_room"
+    has = {*categories, *(vocabulary().category(name).coarse for name in categories)}
+    told = [kind for kind in vocabulary().room_types if kind.signs and has.issuperset(kind.signs)]
+    return max(told, key=lambda kind: kind.certainty).name if told else UNTOLD

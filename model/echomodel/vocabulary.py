@@ -12,6 +12,8 @@ from functools import cache, cached_property
 from importlib import resources
 from typing import Any, Literal
 
+from echomodel.habits import Habit
+
 TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet
 SUPPORTS = ("floor", "table", "wall", "ceiling")
 MEASURES = ("place", "size", None)
@@ -126,6 +128,8 @@ class RoomType:
     Arguments:
         contents: (category, count) of what such a room usually holds.
         scans: what SG-FRONT's scans of such rooms are called before the dash; the first is written.
+        signs: categories or coarse classes by which furniture tells such a room; certainty: of the types all of whose
+            signs are there, the one with the greatest is meant.
         like: the room type that weights take it for which do not know it, "" = there is none.
         aliases: what people call it.
     """
@@ -133,6 +137,8 @@ class RoomType:
     name: str
     contents: tuple[tuple[str, int], ...]
     scans: tuple[str, ...] = ()
+    signs: tuple[str, ...] = ()
+    certainty: int = 0
     like: str = ""
     aliases: tuple[str, ...] = ()
 
@@ -156,6 +162,7 @@ class Vocabulary:
     predicates: tuple[Predicate, ...]
     room_types: tuple[RoomType, ...]
     unsupported: tuple[str, ...]
+    habits: tuple[Habit, ...] = ()
     meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -238,7 +245,11 @@ class Vocabulary:
             _known(where, "unites", relation.unites, UNITES)
         for room in self.room_types:
             _known(f"room type {room.name}", "contents", (word for word, _ in room.contents), categories)
+            _known(f"room type {room.name}", "signs", room.signs, {*categories, *self.coarse_categories})
             _known(f"room type {room.name}", "like", (room.like,), {"", *(other.name for other in self.room_types)})
+        for habit in self.habits:
+            _known("habits", "category", (*habit.categories, *habit.anchors), categories)
+            _known("habits", "predicate", (*habit.predicates, *habit.sides), predicates)
 
     def _find(self, kind: str, word: str) -> int:
         index = self._index[kind]
@@ -325,6 +336,7 @@ def _shipped() -> Vocabulary:
         predicate_kinds=tuple(PredicateKind(**entry) for entry in raw["predicate_kinds"]),
         predicates=tuple(Predicate(**frozen(entry)) for entry in raw["predicates"]),
         room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
+        habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
         unsupported=tuple(raw["unsupported"]),
         meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},
     )

@@ -10,6 +10,7 @@ import torch
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.habits import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
 from echousd.check import check_room
@@ -17,6 +18,7 @@ from echousd.cli.main import command
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
 from echousd.repair import repair_boxes
+from echousd.stage.foreign import foreign_graph
 
 LEVEL = 0.05  # metres
 
@@ -33,7 +35,10 @@ def music():
         name="in_line_with", id=len(words.predicates), kind="closeness", inverse="in_line_with", symmetric=True,
         measures="place", emphasis=4.0, aliases=("level_with",),
     )  # fmt: skip
-    room = RoomType("music_room", contents=(("harp", 1), ("stool", 1), ("bookshelf", 1)), like="living_room")
+    room = RoomType(
+        "music_room", contents=(("harp", 1), ("stool", 1), ("bookshelf", 1)), like="living_room", signs=("harp",),
+        certainty=9,
+    )  # fmt: skip
 
     @rule("in_line_with")
     def in_line(pair):
@@ -80,6 +85,23 @@ def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
     draw_graph(graph, tmp_path / "graph.png")
     assert (tmp_path / "graph.png").stat().st_size > 1000
     assert "#112233" in to_dot(graph)
+
+
+def test_furniture_tells_a_room_type_by_its_row(music, tmp_path):
+    root = tmp_path / "foreign.usda"
+    root.write_text("""#usda 1.0
+def Cube "harp" (prepend apiSchemas = ["SemanticsLabelsAPI:class"]) {
+    token[] semantics:labels:class = ["concert harp"]
+}
+""")
+    assert foreign_graph(str(root)).room.type == "music_room"
+
+
+def test_a_habit_is_a_row_of_the_vocabulary(music):
+    habit = Habit(("armchair",), ("harp",), ("close_by",))
+    with speaking(replace(music, habits=(habit,))):
+        graph = starting_graph("music room", {"armchair": 1})
+    assert graph.relation("armchair", "close_by", "harp")
 
 
 def test_the_command_line_speaks_them(music, tmp_path):

@@ -7,12 +7,14 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from echousd.schemas.regenerate import SCHEMA, with_vocabulary
 from pxr import Sdf, Usd
 
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import RoomType, speaking, vocabulary
 from echousd import plugin
 from echousd.stage import encoding
 
@@ -185,3 +187,13 @@ def test_a_built_package_carries_the_plugin(tmp_path):
     )
     done = python(code, cwd=tmp_path)
     assert done.stdout.split() == [str(built / "echousd" / "schemas" / "resources"), "True"], done.stderr
+
+
+def test_the_schema_takes_its_words_from_the_vocabulary():
+    text = SCHEMA.read_text("utf-8")
+    assert with_vocabulary(text) == text
+    words = vocabulary()
+    with speaking(replace(words, room_types=(*words.room_types, RoomType("music_room", ())))):
+        assert '"study", "music_room"]' in with_vocabulary(text)
+    with pytest.raises(RuntimeError, match="echo:roomType has allowedTokens 0 times"):
+        with_vocabulary("")

@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from echomodel.data.rooms.generator import STYLES
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.data.shapeset import ShapeSet, build_shapes
 from echomodel.files import write_json
@@ -29,7 +30,7 @@ RECIPES = {
     for recipe in (
         DataRecipe("smoke", 64, 2),
         DataRecipe("packed", 12_000, 160),
-        DataRecipe("full", 30_000, 327, halls=0.12),
+        DataRecipe("full", 30_000, STYLES, halls=0.12),
     )
 }
 

@@ -42,7 +42,6 @@ ENTRY = np.dtype(
 STYLES_PER_SHARD = 8
 COMPRESSION = 12
 HELD_OUT_EVERY = 20  # every twentieth style is kept out of training
-STYLES = {"smoke": 2, "packed": 160, "full": 327}  # per recipe; times 46 categories
 
 
 @dataclass(frozen=True, eq=False)

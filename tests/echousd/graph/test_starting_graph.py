@@ -7,9 +7,8 @@ from graph_strategies import WORDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echomodel.vocabulary import UnknownWord
+from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import GraphError, Relation, RoomSpec, starting_graph
-from echousd.graph.starting import HABITS
 
 TYPICAL = {room.name: dict(room.contents) for room in WORDS.room_types}
 
@@ -42,7 +41,7 @@ def test_each_lamp_has_a_nightstand_of_its_own():
 
 def test_words_of_the_tables_are_the_vocabularys():
     categories = {category.name for category in WORDS.categories}
-    for habit in HABITS:
+    for habit in vocabulary().habits:
         assert {*habit.categories, *habit.anchors} <= categories
         assert {*habit.predicates, *habit.sides} <= {predicate.name for predicate in WORDS.predicates}
 

@@ -20,7 +20,7 @@ from echomodel.roomboxes import RoomBoxes
 # Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
 MIX = {"bedroom": 0.40, "living_dining_room": 0.27, "living_room": 0.14, "dining_room": 0.11, "study": 0.08}
 REDRAWS = 4  # rooms in which what they are for finds no place are drawn anew so often
-STYLES = 326  # 326 styles x 46 categories: the 15,000 shapes of the full set
+STYLES = 327  # of the full set of shapes, which has each of 46 categories in all of them
 
 
 def generate_room(
