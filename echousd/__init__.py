@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from echousd.room import Room, RoomOptions, generate
     from echousd.room.edit import edit
     from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
+    from echousd.texturing import export_job as export_texture_job
+    from echousd.texturing import import_look
 
 __version__ = "0.1.0"
 
@@ -44,6 +46,8 @@ _HOME = {
     "check_room": "echousd.check",
     "edit": "echousd.room.edit",
     "export_room": "echousd.export:export",
+    "export_texture_job": "echousd.texturing:export_job",
+    "import_look": "echousd.texturing",
     "load_model": "echomodel.loading",
     "render_file": "echousd.render",
     "vocabulary": "echomodel.vocabulary",
@@ -60,8 +64,10 @@ __all__ = [
     "check_room",
     "edit",
     "export_room",
+    "export_texture_job",
     "generate",
     "generate_many",
+    "import_look",
     "load_model",
     "read_graph",
     "read_rooms",

@@ -65,9 +65,9 @@ def import_(
     look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     say(f"look     {look.layer}")
     say(f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without")
-    for words, what in ((look.unpainted, "no result, keeps its look"), (look.skipped, "left out, keeps its look")):
-        for word in words:
-            say(f"{word}: {what}")
+    for words, what in ((look.unpainted, "no result"), (look.skipped, "left out")):
+        if words:
+            say(f"as it was: {', '.join(words)} ({what})")
 
 
 def _tell(job: Job) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdShade, Vt
+from pxr import Sdf, Tf, Usd, Vt
 
 from echousd.room.within import inside
 from echousd.stage.encoding import StageError
@@ -109,7 +109,7 @@ def unfit_layer(looks: Sequence[Look], unfit: Mapping[str, Sequence[str]], data:
     for look in looks:
         for path in unfit.get(look.path, ()):
             prim = stage.OverridePrim(path)
-            prim.CreateRelationship(f"{UsdShade.Tokens.materialBindingCollection}:{look.name}", False).SetTargets([])
+            prim.CreateRelationship(f"collection:{look.name}:includes", False).SetTargets([])  # its material binds none
             for mesh in (mesh for mesh in look.meshes if f"{mesh}/".startswith(f"{path}/")):
                 over = stage.OverridePrim(mesh)
                 name = f"primvars:{primvar(look.name)}"

@@ -165,7 +165,7 @@ def _fitting_again(unfit: bytes, layer: str) -> bytes:
     name = Path(layer).stem
     paths: list[Sdf.Path] = []
     found.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    mine = (f"material:binding:collection:{name}", f"primvars:{paintings.primvar(name)}")
+    mine = (f"collection:{name}:includes", f"primvars:{paintings.primvar(name)}")
     for path in paths:
         if path.IsPropertyPath() and path.name.removesuffix(":indices") in mine:
             prim = found.GetPrimAtPath(path.GetPrimPath())
