@@ -6,7 +6,7 @@ import itertools
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -21,6 +21,8 @@ class BatchOptions(BaseModel):
         relations: relations an object that are told of a room drawn from the room generator (`sample`).
         preview: draw a picture of every room (needs the extra `render`).
         weights: weights file or folder, "" for those that ship.
+        palette: harmony of the room, "" = the seed chooses.
+        openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
     """
 
@@ -39,6 +41,8 @@ class BatchOptions(BaseModel):
     ceiling: bool = False
     atlas: bool = False
     dress: str = "none"
+    palette: str = ""
+    openings: Literal["kept", "drawn"] = "kept"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5
     self_contained: bool = False
@@ -46,7 +50,7 @@ class BatchOptions(BaseModel):
     @property
     def look(self) -> RoomOptions:
         """How a room is written; raises ValueError for a word that is not allowed."""
-        return RoomOptions(self.up_axis, self.walls, self.atlas, self.ceiling, self.dress)
+        return RoomOptions(self.up_axis, self.walls, self.atlas, self.ceiling, self.dress, self.palette)
 
 
 class BatchRequest(BaseModel):

@@ -12,6 +12,7 @@ from echousd.batches.journal import fault_of, read_journals, whole_keys
 from echousd.batches.manifest import manifest_rows, summary, write_manifest
 from echousd.batches.plan import load_plan
 from echousd.batches.sheet import write_sheet
+from echousd.batches.webdataset import write_webdataset
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,18 @@ def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
                 yield Wrong(entry.id, "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts))
 
 
-def finish(folder: Path) -> dict[str, Any]:
-    """Write manifest, summary, contact sheet and index stage from plan and journals; returns the summary."""
+def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
+    """Write manifest, summary, contact sheet and index stage from plan and journals; returns the summary.
+
+    Arguments:
+        webdataset: write tars of previews and JSON, too.
+    """
     plan = load_plan(folder)
     found = write_manifest(plan, folder)
     write_sheet(
         folder, manifest_rows(plan, folder), f"{folder.resolve().name}: {found['done']} of {found['rooms']} rooms"
     )
     write_index(folder, manifest_rows(plan, folder))
+    if webdataset:
+        write_webdataset(folder, manifest_rows(plan, folder))
     return found

@@ -118,6 +118,8 @@ def _checked(job: Job) -> Any:
         graph = sampled_graph(*job.draw, job.options.relations)
     else:
         graph = SceneGraph.from_json(job.text)
+    if job.options.openings == "drawn":
+        graph = graph.replaced(room=graph.room.replaced(openings=()))
     check_objects(graph)
     check_doors(graph)
     check_space(graph)

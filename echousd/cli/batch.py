@@ -66,6 +66,7 @@ def run(
     self_contained: Annotated[
         bool | None, typer.Option("--self-contained/--store", help="Assets in every room, or once in a store.")
     ] = None,
+    webdataset: Annotated[bool, typer.Option("--webdataset", help="Also tars of previews and JSON.")] = False,
     json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
@@ -95,7 +96,7 @@ def run(
             request, output, workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures,
             timeout=timeout, until=_clock(until), memory=memory, ray=ray, progress=tell,
         )  # fmt: skip
-    found = finish(output)
+    found = finish(output, webdataset=webdataset)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
     say(f"run      {output}: {found['done']} of {found['rooms']} rooms; see {output / 'index.html'}", err=json)
     if result.stopped:

@@ -58,7 +58,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     for asset in small.values():
         files.update(asset.files)
     built = structure.shell_prims(room)
-    harmony = looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
+    harmony = room.options.palette or looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
     slots = _slots(small)
     table, bindings = room_looks(room, made, built, slots, harmony)
     files |= materials.texture_files(table, harmony)

@@ -161,6 +161,7 @@ def edit(
             manifest.get("atlas", False),
             manifest.get("ceiling", False),
             manifest.get("dress", "none"),
+            manifest.get("palette", ""),
         ),
         timings=timer.seconds,
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},

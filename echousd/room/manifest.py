@@ -38,6 +38,7 @@ class Manifest(BaseModel):
     atlas: bool = False
     ceiling: bool = False
     dress: Literal["none", "some", "full"] = "none"
+    palette: str = ""
     meshes: dict[str, dict[str, Any]] = {}
     store: Annotated[str, Field(max_length=4096)] = ""
     stored: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]] = {}

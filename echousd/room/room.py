@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
+from echousd.room.finishes.harmonies import HARMONIES as PALETTES
 from echousd.room.manifest import check_seed
 from echousd.room.styles import style_groups
 
@@ -32,6 +33,7 @@ class RoomOptions:
         ceiling: add a ceiling.
         dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`.
         atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
+        palette: harmony that is selected at first, one of `echousd.room.finishes.harmonies`; "" = the seed chooses.
     """
 
     up_axis: str = "Y"
@@ -39,12 +41,15 @@ class RoomOptions:
     atlas: bool = False
     ceiling: bool = False
     dress: str = "none"
+    palette: str = ""
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):
             raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
         if self.dress not in DRESS:
             raise ValueError(f"dress is {self.dress!r}, allowed: {', '.join(DRESS)}")
+        if self.palette and self.palette not in PALETTES:
+            raise ValueError(f"palette is {self.palette!r}, allowed: {', '.join(PALETTES)}")
 
 
 @dataclass(frozen=True)

@@ -220,6 +220,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "atlas": room.options.atlas,
         "ceiling": room.options.ceiling,
         "dress": room.options.dress,
+        **({"palette": room.options.palette} if room.options.palette else {}),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

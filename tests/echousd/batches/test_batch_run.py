@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,11 @@ from echousd.batches import work
 from echousd.batches.batch import batch, generate_many
 from echousd.batches.executor import Outcome, attempt
 from echousd.batches.journal import read_journals, room_digest, shard_folder
+from echousd.batches.manifest import manifest_rows
+from echousd.batches.plan import load_plan
+from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import finish, status, verify
+from echousd.batches.webdataset import write_webdataset
 from echousd.graph import SceneGraph
 from echousd.room.lock import locked
 from echousd.store import Store
@@ -131,6 +136,55 @@ def test_a_damaged_room_is_made_again_and_set_aside(calm, tmp_path):
     batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
     assert digests(out) == digests(folder)
     assert len(list((out / ".batch" / "set_aside").iterdir())) == 1
+
+
+def test_tars_for_training_hold_preview_and_json_of_every_room(calm, tmp_path):
+    _, folder, _ = calm
+    out = tmp_path / "run"
+    shutil.copytree(folder, out)
+    (out / "rooms" / "0000" / "graphs_000000" / "graphs_000000.png").write_bytes(b"picture")
+    finish(out, webdataset=True)
+    rows = list(manifest_rows(load_plan(out), out))
+    first = (out / "webdataset" / "rooms-000000.tar").read_bytes()
+    with tarfile.open(out / "webdataset" / "rooms-000000.tar") as tar:
+        assert tar.getnames() == ["graphs_000000.json", "graphs_000000.png", "graphs_000002.json"]
+        told = json.loads(tar.extractfile("graphs_000000.json").read())
+        assert tar.extractfile("graphs_000000.png").read() == b"picture"
+    assert told["room"]["graph"]["nodes"][0]["name"] == "double_bed"
+    assert told["categories"] == {"double_bed": 1, "wardrobe": 1}
+    assert len(write_webdataset(out, rows, rooms=1)) == 2
+    assert len(write_webdataset(out, rows)) == 1 == len(list((out / "webdataset").iterdir()))
+    assert (out / "webdataset" / "rooms-000000.tar").read_bytes() == first
+
+
+def test_palettes_openings_and_dressing_vary(tmp_path):
+    graph = sampled_graph("bedroom", 0, 0, 1.5)
+    nodes = tuple(node for node in graph.nodes if node.category == "double_bed")
+    assert graph.room.openings
+    (tmp_path / "graph.json").write_text(graph.replaced(nodes=nodes, relations=()).to_json())
+    varied = {"palette": ["coast", "clay"], "openings": ["kept", "drawn"]}
+    batch(tmp_path / "graph.json", tmp_path / "run", count=4, executor=Inline(), variations=varied, **QUICK)
+    found = [json.loads(p.read_text()) for p in sorted((tmp_path / "run" / "rooms").glob("*/*/*.json"))]
+    assert [room["palette"] for room in found] == ["coast", "coast", "clay", "clay"]
+    openings = [room["graph"]["room"]["openings"] for room in found]
+    assert openings[0] == openings[2] == json.loads(graph.to_json())["room"]["openings"]
+    assert openings[0] not in (openings[1], openings[3])
+    root = next((tmp_path / "run" / "rooms").glob("*/graph_000002/graph_000002.usda"))
+    selected = Usd.Stage.Open(str(root)).GetPrimAtPath("/Room").GetVariantSet("palette").GetVariantSelection()
+    assert selected == "clay"
+    with pytest.raises(ValueError, match="palette is 'mud', allowed: "):
+        batch(tmp_path / "graph.json", tmp_path / "other", palette="mud", **QUICK)
+
+
+def test_graphs_come_from_parquet(calm, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow")
+    source, _, _ = calm
+    texts = [line for line in source.read_text().splitlines() if line.endswith("}")]
+    parquet.write_table(pyarrow.table({"graph": texts}), tmp_path / "graphs.parquet")
+    found = list(find_graphs([str(tmp_path / "graphs.parquet")]))
+    assert [entry.error for entry in found] == ["", ""]
+    assert [entry.text for entry in found] == [entry.text for entry in find_graphs([str(source)]) if entry.text]
 
 
 def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path):
