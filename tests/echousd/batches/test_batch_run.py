@@ -170,8 +170,8 @@ def test_palettes_openings_and_dressing_vary(tmp_path):
     assert openings[0] == openings[2] == json.loads(graph.to_json())["room"]["openings"]
     assert openings[0] not in (openings[1], openings[3])
     root = next((tmp_path / "run" / "rooms").glob("*/graph_000002/graph_000002.usda"))
-    selected = Usd.Stage.Open(str(root)).GetPrimAtPath("/Room").GetVariantSet("palette").GetVariantSelection()
-    assert selected == "clay"
+    stage = Usd.Stage.Open(str(root))
+    assert stage.GetPrimAtPath("/Room").GetVariantSet("palette").GetVariantSelection() == "clay"
     with pytest.raises(ValueError, match="palette is 'mud', allowed: "):
         batch(tmp_path / "graph.json", tmp_path / "other", palette="mud", **QUICK)
 
