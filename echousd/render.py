@@ -103,7 +103,7 @@ def top_view(scenery: Scenery) -> View:
 
 def eye_view(scenery: Scenery) -> View:
     """From a corner inside the room, where least is hidden, at the height of a standing person's eyes."""
-    from echousd.room.cameras import APERTURE, WIDE, inside_view
+    from echousd.views import APERTURE, WIDE, inside_view
 
     lower, upper = scenery.bounds
     x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
@@ -116,7 +116,7 @@ def corner_view(scenery: Scenery) -> View:
     """From above a corner, the one where least is hidden, the whole scene in the picture."""
     from scipy.spatial import ConvexHull
 
-    from echousd.room.cameras import APERTURE, FOCAL_LENGTH, perspective_view
+    from echousd.views import APERTURE, FOCAL_LENGTH, perspective_view
 
     points = scenery.triangles.reshape(-1, 3).astype(float)
     points = points[ConvexHull(points, qhull_options="QJ").vertices]  # nothing else reaches the picture's border

@@ -67,6 +67,32 @@ def test_no_circle(imports):
     assert [sorted(group) for group in networkx.strongly_connected_components(graph) if len(group) > 1] == []
 
 
+def package_of(module):
+    """`echousd.room` of `echousd.room.dressing.floors`, `echousd.packing` of itself."""
+    return ".".join(module.split(".")[:2])
+
+
+def test_no_circle_between_packages(imports):
+    graph = networkx.DiGraph()
+    for module, names in imports.items():
+        for name in names:
+            target = name if name in imports else name.rpartition(".")[0]
+            packages = {package_of(module), package_of(target)}
+            if target in imports and len(packages) == 2 and all(name.startswith("echousd.") for name in packages):
+                graph.add_edge(package_of(module), package_of(target))
+    assert graph.number_of_edges() > 40
+    assert [sorted(group) for group in networkx.strongly_connected_components(graph) if len(group) > 1] == []
+
+
+def test_commands_are_functions_of_their_modules():
+    """`register` only adds them, so that they can be called and read by themselves."""
+    for path in (ROOT / "echousd" / "cli").glob("*.py"):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and node.name == "register":
+                inner = [part.name for part in ast.walk(node) if isinstance(part, ast.FunctionDef) and part is not node]
+                assert inner == [], path
+
+
 @pytest.mark.parametrize("package", FORBIDDEN)
 def test_packages_know_only_those_below(imports, package):
     wrong = [

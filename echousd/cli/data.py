@@ -10,7 +10,7 @@ import typer
 from echousd.cli.output import say_json
 
 if TYPE_CHECKING:
-    from echomodel.data.report import Row
+    from echomodel.metrics.report import Row
 
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 
@@ -112,9 +112,9 @@ def report(
 
     Example: echousd data report --count 2000 --worst 20
     """
-    from echomodel.data.report import compare, left_out, section_means
     from echomodel.data.room_files import load_rooms
     from echomodel.data.rooms import generate_rooms
+    from echomodel.metrics.report import compare, left_out, section_means
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
     others = None if real is None else load_rooms(real)

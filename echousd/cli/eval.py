@@ -101,7 +101,7 @@ def layout(
 def _print(result: dict, console: Console) -> None:
     from rich.table import Table
 
-    from echomodel.data.report import rows_between
+    from echomodel.metrics.report import rows_between
 
     modes = [mode for mode in ("generation", "change", "add", "complete") if mode in result]
     table = Table("relations kept", *modes, "n", box=None)

@@ -13,8 +13,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
-from echousd.room.cameras import Volume, view_matrix
+from echousd.room.cameras import Volume
 from echousd.room.room import RoomData
+from echousd.views import view_matrix
 
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room

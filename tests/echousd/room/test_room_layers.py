@@ -7,9 +7,9 @@ from small_room import OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.room import RoomOptions
-from echousd.room.cameras import perspective_view
 from echousd.sight import Furniture
 from echousd.stage import read_graph
+from echousd.views import perspective_view
 
 
 @pytest.fixture(scope="module")
