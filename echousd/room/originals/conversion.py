@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
@@ -59,7 +59,7 @@ def converted(model: ModelFile) -> Mapping[str, bytes]:
         with model.opened() as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scene = trimesh.load_scene(file, file_type=model.suffix[1:], resolver=beside, process=False)
-        parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+        parts = list(_parts(scene))
         if not parts:
             raise ValueError(f"{model}: holds no triangles")
         images = Images(beside)
@@ -71,7 +71,30 @@ def converted(model: ModelFile) -> Mapping[str, bytes]:
     return {CONVERTED: layer_bytes(layer, ".usdc"), **images.files}
 
 
-def _layer(parts: list[trimesh.Trimesh], images: Images) -> Sdf.Layer:
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One mesh of a scene in the scene's frame: points (v, 3), faces (f, 3), texture coordinates (v, 2), material."""
+
+    points: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None
+    material: Any
+
+
+def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+            continue
+        points = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces)[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else np.asarray(mesh.faces)
+        uv = getattr(mesh.visual, "uv", None)
+        whole = uv is not None and len(uv) == len(points) and bool(np.isfinite(uv).all())
+        yield _Part(points, faces, np.asarray(uv) if whole else None, getattr(mesh.visual, "material", None))
+
+
+def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
     stage = new_stage(ROOT[1:], ".usdc")
     root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
@@ -80,7 +103,7 @@ def _layer(parts: list[trimesh.Trimesh], images: Images) -> Sdf.Layer:
     taken: set[str] = set()
     for number, part in enumerate(parts):
         mesh = _write_mesh(stage, f"{ROOT}/mesh_{number}", part)
-        material = getattr(part.visual, "material", None)
+        material = part.material
         if material is None:
             continue
         if id(material) not in looks:
@@ -94,29 +117,27 @@ def _layer(parts: list[trimesh.Trimesh], images: Images) -> Sdf.Layer:
     return stage.GetRootLayer()
 
 
-def _write_mesh(stage: Usd.Stage, path: str, part: trimesh.Trimesh) -> UsdGeom.Mesh:
+def _write_mesh(stage: Usd.Stage, path: str, part: _Part) -> UsdGeom.Mesh:
     mesh = UsdGeom.Mesh.Define(stage, path)
-    points, faces = np.asarray(part.vertices, np.float32), np.asarray(part.faces, np.int32)
+    points, faces = part.points.astype(np.float32), part.faces.astype(np.int32)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces).ravel()))
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
     primvars = UsdGeom.PrimvarsAPI(mesh)
-    whole = part.copy()
-    whole.merge_vertices(merge_tex=True, merge_norm=True)
-    normals, index = creased_normals(whole if len(whole.faces) == len(faces) else part)
+    whole = trimesh.Trimesh(part.points, part.faces, process=False)
+    flat = None if part.uv is not None else box_projection(whole)
+    whole.merge_vertices()  # along the seams of texture coordinates, so that shading has none
+    normals, index = creased_normals(whole)
     told = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
     told.Set(Vt.Vec3fArray.FromNumpy(normals))
     told.SetIndices(Vt.IntArray.FromNumpy(index))
-    uv = getattr(part.visual, "uv", None)
-    if uv is not None and len(uv) == len(points) and np.isfinite(uv).all():
-        st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
-        st.Set(Vt.Vec2fArray.FromNumpy(np.asarray(uv, np.float32)))
-    else:
-        st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-        st.Set(Vt.Vec2fArray.FromNumpy(box_projection(part).reshape(-1, 2).astype(np.float32)))
+    kind = UsdGeom.Tokens.vertex if flat is None else UsdGeom.Tokens.faceVarying
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, kind)
+    values = part.uv if flat is None else flat.reshape(-1, 2)
+    st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(values, np.float32)))
     return mesh
 
 
