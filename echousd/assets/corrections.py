@@ -14,19 +14,27 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.describe import PLACEMENT
 from echousd.assets.record import AssetRecord, vector
 
-COLUMNS = ("id", "use", "category", "turn", "metres", "name", "width", "height", "depth", "licence", "author", "fault")
+COLUMNS = ("id", "use", "category", "turn", "metres", "found", "name", "width", "height", "depth", "licence", "fault")
 Corrections = Mapping[str, Mapping[str, str]]
 
 
-def write_table(path: Path, records: Iterable[AssetRecord]) -> None:
-    """Write the table: edit `use` (1 or 0), `category`, `turn` and `metres`; `turn` is in degrees, counter-clockwise
-    from above, and `metres` the unit of the model's file, both empty where what was found is right."""
+def write_table(path: Path, records: Iterable[AssetRecord], said: Corrections | None = None) -> None:
+    """Write the table: what a person may say of each model, and beside it what was found.
+
+    `use` 0 leaves a model out, `category` is of the vocabulary, `turn` is in degrees, counter-clockwise from above, and
+    `metres` is the unit of the model's file. Empty where what was found is right.
+
+    Arguments:
+        said: what was said already, which stays.
+    """
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COLUMNS)
         for r in records:
+            row = (said or {}).get(r.id, {})
+            wishes = [row.get(name, "") for name in COLUMNS[1:5]]
             size = [f"{length:.3f}" for length in r.dims]
-            writer.writerow([r.id, int(r.usable), r.category, "", "", r.name, *size, r.licence, r.author, r.fault])
+            writer.writerow([r.id, *wishes, r.category, r.name, *size, r.licence, r.fault])
 
 
 def read_corrections(path: Path) -> Corrections:
@@ -61,8 +69,15 @@ def _check(row: Mapping[str, str], where: str) -> None:
         raise ValueError(f"{where}: {error}") from None
 
 
+def said_of(row: Mapping[str, str]) -> str:
+    """What a row corrects, as the index remembers it; "" for one that corrects nothing."""
+    said = [row.get("category", ""), row.get("turn", ""), row.get("metres", ""), "0" if row.get("use") == "0" else ""]
+    return "|".join(said) if any(said) else ""
+
+
 def corrected(record: AssetRecord, row: Mapping[str, str]) -> AssetRecord:
     """The record as a person's row of the table wants it."""
+    record = replace(record, corrected=said_of(row))
     category = vocabulary().category(row["category"]).name if row["category"] else record.category
     if category != record.category:
         place = PLACEMENT[vocabulary().category(category).support]

@@ -54,7 +54,7 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool) -> Ass
     metres = entry.metres or found.metres
     known = extents * metres if metres else entry.dims
     category, confidence = entry.category, 1.0
-    if not category:
+    if not category and not entry.decided:
         labels = (*entry.words, *found.labels)
         category, confidence = category_of(labels, entry.name, entry.group, known)
     if metres is None and entry.dims is None:

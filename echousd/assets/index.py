@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
@@ -12,7 +12,7 @@ from pathlib import Path
 
 from echousd.assets.catalogues import catalogue_of
 from echousd.assets.catalogues.entry import Entry
-from echousd.assets.corrections import Corrections, corrected, read_corrections
+from echousd.assets.corrections import Corrections, corrected, read_corrections, said_of
 from echousd.assets.describe import described, relative, stamp
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import arrow, read_library, write_library
@@ -70,26 +70,21 @@ def index(
     fresh: list[Entry] = []
     for entry in entries:
         old = before.get(entry.key)
-        if old is not None and old.stamp and old.stamp == stamp(entry.file.path) and _same_place(old, entry, file):
+        if old is not None and _stays(old, entry, file, wishes):
             done[entry.key] = old
         else:
             fresh.append(entry)
     saved = time.monotonic()
     for count, record in enumerate(_read(fresh, file, workers), 1):
-        done[record.id] = record
+        done[record.id] = corrected(record, wishes[record.id]) if record.id in wishes else record
         if progress:
             progress(len(done), len(entries))
         if time.monotonic() - saved > SAVED and count < len(fresh):
             write_library(file, done.values(), {"unfinished": True})
             saved = time.monotonic()
-    records = _told(done, wishes)
-    write_library(file, records.values())
-    faults = [record.fault for record in records.values() if record.fault]
-    return Indexed(file, len(records), sum(r.usable for r in records.values()), len(fresh), (*said, *faults))
-
-
-def _told(done: Mapping[str, AssetRecord], wishes: Corrections) -> dict[str, AssetRecord]:
-    return {key: corrected(record, wishes[key]) if key in wishes else record for key, record in done.items()}
+    write_library(file, done.values())
+    faults = [record.fault for record in done.values() if record.fault]
+    return Indexed(file, len(done), sum(r.usable for r in done.values()), len(fresh), (*said, *faults))
 
 
 def _entries(folders: Sequence[Path], tell: Callable[[str], None]) -> Iterator[Entry]:
@@ -107,8 +102,11 @@ def _entries(folders: Sequence[Path], tell: Callable[[str], None]) -> Iterator[E
             yield replace(entry, key=key)
 
 
-def _same_place(old: AssetRecord, entry: Entry, file: Path) -> bool:
-    return old.uri.partition("!")[0] == relative(entry.file.path, file)
+def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: Corrections) -> bool:
+    """Whether a row is still true: the file is the same one, and nobody corrects it otherwise than before."""
+    unchanged = bool(old.stamp) and old.stamp == stamp(entry.file.path)
+    place = old.uri.partition("!")[0] == relative(entry.file.path, file)
+    return unchanged and place and old.corrected == said_of(wishes.get(old.id, {}))
 
 
 def _read(entries: list[Entry], file: Path, workers: int) -> Iterator[AssetRecord]:

@@ -27,7 +27,8 @@ def category_of(
         dims: (3) metres, where they are known.
     """
     for label in labels:
-        found = known_word(label)
+        plain = re.sub(r"\.[nv]\.\d+$", "", label)  # of WordNet
+        found = known_word(plain) or _within(plain)
         if found:
             return _refined(found, dims), LABELLED * _likeliness(found, dims)
     for text, confidence in ((name, CALLED), (group, SHELVED)):

@@ -54,3 +54,32 @@ def index(
     if len(done.faults) > SHOWN:
         say(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
     say(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")
+
+
+@assets_app.command(epilog="Example: echousd assets review models.parquet")
+def review(
+    library: Annotated[Path, typer.Argument(help="Index (.parquet).", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder; default: INDEX_review, beside it.")
+    ] = None,
+) -> None:
+    """Write what there is to look at and to correct: a page, a sheet of pictures for each category, and the table.
+
+    The table lies beside the index; what it says counts when the library is indexed again.
+    """
+    from echousd.assets.corrections import read_corrections, write_table
+    from echousd.assets.review import write_page, write_sheets
+    from echousd.assets.table import read_library
+
+    found = read_library(library)
+    records = list(found.records.values())
+    folder = output or library.with_name(f"{library.stem}_review")
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: is a file, the output must be a folder")
+    sheets = write_sheets(folder, records)
+    write_page(folder / "review.html", records)
+    table = library.with_suffix(".csv")
+    write_table(table, records, read_corrections(table) if table.exists() else None)
+    say(f"page     {folder / 'review.html'}")
+    say(f"sheets   {len(sheets)} in {folder}")
+    say(f"table    {table}: correct it and run echousd assets index again")

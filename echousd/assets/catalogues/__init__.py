@@ -8,7 +8,7 @@ from pathlib import Path
 from echousd.assets.catalogues.entry import Catalogue
 
 # The first that a path is one of counts; a plain folder is everything else.
-MODULES = ("sweethome", "folder")
+MODULES = ("sweethome", "abo", "objaverse", "hssd", "future3d", "folder")
 
 
 def catalogue_of(path: Path) -> Catalogue:

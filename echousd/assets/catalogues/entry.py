@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -21,7 +21,8 @@ class Entry:
     Arguments:
         key: unique in the catalogue. file: where it lies.
         name: what it is called. words: of its class, the surest first. group: the shelf it lies on.
-        category: of the vocabulary, where the catalogue says it for certain.
+        category: of the vocabulary, where the catalogue says it for certain. decided: whether it does, even where that
+            is none.
         dims: width, height, depth in metres after `turn`, None where only the mesh knows.
         metres: per unit, None where the file or its size says.
         turn: (3, 3) the model's axes to the object frame, None where nobody says. front_known: whether `turn` tells the
@@ -35,6 +36,7 @@ class Entry:
     words: tuple[str, ...] = ()
     group: str = ""
     category: str = ""
+    decided: bool = False
     dims: np.ndarray | None = None
     metres: float | None = None
     turn: np.ndarray | None = None
@@ -43,7 +45,6 @@ class Entry:
     author: str = ""
     placement: str = ""
     tags: tuple[str, ...] = ()
-    extra: Mapping[str, str] = field(default_factory=dict)
 
 
 class Catalogue(Protocol):

@@ -45,6 +45,7 @@ def _entry(entry: MeshEntry) -> Entry:
         words=(),
         group=entry.group,
         category=category,
+        decided=True,
         dims=entry.size,
         turn=entry.turn,
         front_known=True,

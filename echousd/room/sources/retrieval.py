@@ -96,9 +96,6 @@ def given_pieces(
         shapes: the room's source. among: names of the objects that are looked at, None = all. timer: is told.
     """
     nodes = [node for node in graph.nodes if among is None or node.name in among]
-    for node in nodes:
-        if node.asset is None and source_of(node, shapes) in RETRIEVED and wishes.library is None:
-            raise ValueError(f"object {node.name!r}: from a library, but none is given; name one (--assets LIB)")
     named = [node for node in nodes if node.asset is not None]
     if not named:
         return Retrieved()

@@ -93,8 +93,6 @@ def test_faults_name_the_object_and_the_file(library, tmp_path):
     def made(graph, **options):
         return echousd.generate(graph, model=StandIn(), **options)
 
-    with pytest.raises(ValueError, match=r"object 'bed': from a library, but none is given; name one \(--assets LIB\)"):
-        made(small_graph(), shapes="library")
     with pytest.raises(ValueError, match=r"object 'lamp': .*nowhere.glb: no such file"):
         made(small_graph().update_node("lamp", asset="nowhere.glb"), shapes="boxes")
     with pytest.raises(ValueError, match=r"object 'lamp': .*lib.parquet: asset 'moon' is not in it"):

@@ -1,0 +1,68 @@
+"""Tables and lists that catalogues come with, packed or not, read with doubt."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+MAX_TEXT = 2 * 2**30  # bytes of one table, unpacked
+
+
+def text_of(path: Path) -> str:
+    """The text of a file, unpacked where it ends in `.gz`; raises ValueError that names it."""
+    try:
+        if path.suffix == ".gz":
+            with gzip.open(path) as file:
+                content = file.read(MAX_TEXT + 1)
+        else:
+            with path.open("rb") as file:
+                content = file.read(MAX_TEXT + 1)
+    except (OSError, EOFError) as error:
+        raise ValueError(f"{path}: cannot be read ({error})") from None
+    if len(content) > MAX_TEXT:
+        raise ValueError(f"{path}: more than {MAX_TEXT} bytes, allowed for a table: that many")
+    return content.decode("utf-8-sig", "replace")
+
+
+def json_of(path: Path) -> Any:
+    """The plain data of a JSON file; raises ValueError that names it."""
+    try:
+        return json.loads(text_of(path))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ValueError(f"{path}: cannot be read as JSON ({error})") from None
+
+
+def json_lines(path: Path) -> Iterator[Mapping[str, Any]]:
+    """The mappings of a file with one in each line; lines that are none are left out."""
+    for line in text_of(path).splitlines():
+        try:
+            found = json.loads(line) if line.strip() else None
+        except (json.JSONDecodeError, RecursionError):
+            continue
+        if isinstance(found, dict):
+            yield found
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The rows of a CSV table, its column names in lower case; raises ValueError that names it."""
+    try:
+        reader = csv.DictReader(io.StringIO(text_of(path)))
+        return [{str(k).strip().lower(): v or "" for k, v in row.items() if isinstance(v, str)} for row in reader]
+    except csv.Error as error:
+        raise ValueError(f"{path}: cannot be read as a table ({error})") from None
+
+
+def words(value: Any) -> str:
+    """A text from what a catalogue says: a text, or the English one of several languages, or the first."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, list) and value:
+        english = [v for v in value if isinstance(v, dict) and str(v.get("language_tag", "en")).startswith("en")]
+        first = (english or value)[0]
+        return words(first.get("value", "") if isinstance(first, dict) else first)
+    return ""

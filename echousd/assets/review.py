@@ -1,0 +1,87 @@
+"""A library to look through: every model with its picture, by category, as a page and as sheets of pictures."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image, ImageDraw
+
+from echomodel.files import whole_file
+from echousd.assets.record import AssetRecord
+from echousd.assets.shape import SIDE
+
+WIDE = 10  # pictures in a row of a sheet
+LABEL = 24  # pixels below a picture
+STYLE = """body{font:13px sans-serif;margin:2em}div{display:inline-block;width:11em;vertical-align:top;margin:.4em}
+img{width:96px;height:96px}b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
+DOUBT = 0.7  # confidence below which a row is coloured
+
+
+def write_page(path: Path, records: Sequence[AssetRecord]) -> None:
+    """Write an HTML page that stands alone: models by category, those that cannot be used last with the reason."""
+    parts = [f"<!doctype html><meta charset=utf-8><title>Models</title><style>{STYLE}</style>"]
+    parts.append(f"<h1>{sum(r.usable for r in records)} of {len(records)} models usable</h1>")
+    for category, members in grouped(records).items():
+        parts.append(f"<h2>{category} ({len(members)})</h2>")
+        parts += map(_card, members)
+    out = [record for record in records if not record.usable]
+    if out:
+        parts.append(f"<h2>not used ({len(out)})</h2><ul>")
+        parts += [f"<li>{html.escape(r.id)}: {html.escape(r.fault)}" for r in out]
+        parts.append("</ul>")
+    with whole_file(path) as beside:
+        beside.write_text("\n".join(parts) + "\n", "utf-8")
+
+
+def _card(record: AssetRecord) -> str:
+    picture = base64.b64encode(record.thumbnail).decode()
+    size = " × ".join(f"{length:.2f}" for length in record.dims)
+    doubt = " class=doubt" if min(record.confidence, record.front_confidence) < DOUBT else ""
+    told = f"{size} m<br>category {record.confidence:.2f}, front {record.front_confidence:.2f}"
+    whose = html.escape(f"{record.licence} {record.author}")
+    return (
+        f"<div{doubt}><img src='data:image/png;base64,{picture}'><b>{html.escape(record.name)}</b>"
+        f"<span>{html.escape(record.id)}</span><span>{told}</span><i>{whose}</i></div>"
+    )
+
+
+def grouped(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:
+    """The usable models by category, both in alphabetical order."""
+    found: dict[str, list[AssetRecord]] = {}
+    for record in sorted(records, key=lambda record: (record.category, record.id)):
+        if record.usable:
+            found.setdefault(record.category, []).append(record)
+    return found
+
+
+def sheet(records: Sequence[AssetRecord], title: str = "") -> Image.Image:
+    """One picture of all models of a list, seen from their front right above, with their names."""
+    rows = -(-len(records) // WIDE)
+    whole = Image.new("RGB", (WIDE * SIDE, 22 + max(rows, 1) * (SIDE + LABEL)), "white")
+    draw = ImageDraw.Draw(whole)
+    draw.text((4, 4), title, fill="black")
+    for number, record in enumerate(records):
+        x, y = number % WIDE * SIDE, 22 + number // WIDE * (SIDE + LABEL)
+        with Image.open(io.BytesIO(record.thumbnail), formats=("PNG",)) as picture:
+            whole.paste(picture.convert("RGB"), (x, y))
+        draw.text((x + 2, y + SIDE), record.name[:16], fill="black")
+        draw.text((x + 2, y + SIDE + 11), record.id.rsplit("/", 1)[-1][:16], fill="grey")
+    return whole
+
+
+def write_sheets(folder: Path, records: Sequence[AssetRecord]) -> list[Path]:
+    """A PNG for each category in a folder; returns them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for category, members in grouped(records).items():
+        out = io.BytesIO()
+        sheet(members, f"{category} ({len(members)}), front to the lower left").save(out, "PNG")
+        path = folder / f"{category}.png"
+        with whole_file(path) as beside:
+            beside.write_bytes(out.getvalue())
+        paths.append(path)
+    return paths
