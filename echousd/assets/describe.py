@@ -24,11 +24,12 @@ PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "c
 BLOCK = 2**20
 
 
-def described(entry: Entry, library: Path, *, full: bool = True) -> AssetRecord:
+def described(entry: Entry, library: Path, *, full: bool = True, encoder: object = None) -> AssetRecord:
     """The row of a model; what is wrong with it is its `fault`.
 
     Arguments:
         entry: of a catalogue. library: the index, which its paths become relative to.
+        encoder: a model whose encoder makes the descriptor, None = there is none.
         full: with picture and level surfaces, which a model that is not chosen among others does not need.
     """
     record = AssetRecord(
@@ -43,12 +44,12 @@ def described(entry: Entry, library: Path, *, full: bool = True) -> AssetRecord:
     )
     try:
         record = replace(record, sha256=digest_of(entry.file))
-        return _read(record, entry, measure(entry.file), full)
+        return _read(record, entry, measure(entry.file), full, encoder)
     except ValueError as error:
         return replace(record, fault=str(error))
 
 
-def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool) -> AssetRecord:
+def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encoder: object) -> AssetRecord:
     turn = np.array(Z_UP if found.z_up else UPRIGHT).reshape(3, 3) if entry.turn is None else entry.turn
     extents = np.ptp(found.points @ turn.T, axis=0)
     metres = entry.metres or found.metres
@@ -88,7 +89,13 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool) -> Ass
     placement = entry.placement or (PLACEMENT[row.support] if row else "floor")
     shape = found.turned(np.array(record.turn).reshape(3, 3))
     shape.apply_scale(np.array(record.dims) / np.maximum(np.array(record.high) - np.array(record.low), 1e-12))
-    return replace(record, placement=placement, supports=supports(shape), thumbnail=thumbnail(shape), fault=fault)
+    record = replace(record, placement=placement, supports=supports(shape), thumbnail=thumbnail(shape), fault=fault)
+    if encoder is not None and not fault:
+        from echousd.assets.descriptor import descriptors, grid_of
+
+        (numbers,) = descriptors(encoder, grid_of(shape)[None]).tolist()
+        record = replace(record, descriptor=tuple(round(number, 5) for number in numbers))
+    return record
 
 
 def _faced(record: AssetRecord, entry: Entry, found: Measured) -> AssetRecord:

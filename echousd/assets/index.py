@@ -46,6 +46,7 @@ def index(
     *,
     workers: int = 1,
     table: Path | None = None,
+    descriptors: bool = False,
     progress: Progress | None = None,
 ) -> Indexed:
     """Index the models of some folders and libraries.
@@ -54,6 +55,7 @@ def index(
         folders: each a library of a known kind (`echousd.assets.catalogues`), a folder of models, or one model.
         file: the Parquet file; models in it whose files have neither another size nor another time are not read again.
         workers: processes. table: a person's corrections (`echousd.assets.corrections`), None = none.
+        descriptors: of every shape, by the encoder of the weights that ship (for `--shapes guided`).
         progress: called with (models done, models in all).
 
     Raises ValueError where a folder is none, nothing is found, or the file is no index and cannot be replaced.
@@ -70,12 +72,12 @@ def index(
     fresh: list[Entry] = []
     for entry in entries:
         old = before.get(entry.key)
-        if old is not None and _stays(old, entry, file, wishes):
+        if old is not None and _stays(old, entry, file, wishes) and (old.descriptor or old.fault or not descriptors):
             done[entry.key] = old
         else:
             fresh.append(entry)
     saved = time.monotonic()
-    for count, record in enumerate(_read(fresh, file, workers), 1):
+    for count, record in enumerate(_read(fresh, file, workers, descriptors), 1):
         done[record.id] = corrected(record, wishes[record.id]) if record.id in wishes else record
         if progress:
             progress(len(done), len(entries))
@@ -109,17 +111,27 @@ def _stays(old: AssetRecord, entry: Entry, file: Path, wishes: Corrections) -> b
     return unchanged and place and old.corrected == said_of(wishes.get(old.id, {}))
 
 
-def _read(entries: list[Entry], file: Path, workers: int) -> Iterator[AssetRecord]:
+def _read(entries: list[Entry], file: Path, workers: int, descriptors: bool) -> Iterator[AssetRecord]:
     if workers < 2 or len(entries) < FEW:
+        encoder = _encoder(descriptors)
         for entry in entries:
-            yield described(entry, file)
+            yield described(entry, file, encoder=encoder)
         return
     packs = [entries[start : start + PACK] for start in range(0, len(entries), PACK)]
     # spawned: USD and numpy hold threads that do not survive a fork
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(_pack, pack, file) for pack in packs]):
+        for future in as_completed([pool.submit(_pack, pack, file, descriptors) for pack in packs]):
             yield from future.result()
 
 
-def _pack(entries: list[Entry], file: Path) -> list[AssetRecord]:
-    return [described(entry, file) for entry in entries]
+def _pack(entries: list[Entry], file: Path, descriptors: bool) -> list[AssetRecord]:
+    encoder = _encoder(descriptors)
+    return [described(entry, file, encoder=encoder) for entry in entries]
+
+
+def _encoder(wanted: bool) -> object:
+    if not wanted:
+        return None
+    from echomodel.loading import load_model
+
+    return load_model(None)

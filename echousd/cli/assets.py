@@ -27,6 +27,9 @@ def index(
     table: Annotated[
         Path | None, typer.Option(help="Table of corrections; default: beside the index, where there is one.")
     ] = None,
+    descriptors: Annotated[
+        bool, typer.Option("--descriptors", help="Also say what each shape is like, for generate --shapes guided.")
+    ] = False,
 ) -> None:
     """Index a library: what its models are, how large, where their front is, and whose they are.
 
@@ -47,6 +50,7 @@ def index(
             output,
             workers=workers or os.cpu_count() or 1,
             table=table or output.with_suffix(".csv"),
+            descriptors=descriptors,
             progress=lambda count, of: bar.update(task, completed=count, total=of),
         )
     for fault in done.faults[:SHOWN]:

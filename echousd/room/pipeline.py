@@ -22,6 +22,7 @@ from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
+from echousd.room.sources.guided import shape_nearness
 from echousd.room.sources.mixing import check_sources, mixed_shapes, sources_of
 from echousd.room.sources.retrieval import anchored, given_pieces, retrieved, with_given_sizes
 from echousd.room.sources.source import FACES, ShapeRequest
@@ -142,7 +143,8 @@ def generate(
 
     graph, boxes, notes, more = laid_out(graph)
     left_out = (*left_out, *more)
-    models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given, timer=timer)
+    near = shape_nearness(graph, boxes, shapes, wishes, seed, echo, steps, timer)
+    models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given, near, timer=timer)
     if models.sizes != sizes:  # real sizes shape the layout
         sizes |= models.sizes
         graph, boxes, notes, more = laid_out(graph)

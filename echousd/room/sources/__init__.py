@@ -15,6 +15,8 @@ MODULES = {
     "sdf": "echousd.room.sources.sdf",
     "boxes": "echousd.room.sources.boxes",
     "library": "echousd.room.sources.library",
+    "guided": "echousd.room.sources.guided",
+    "independent": "echousd.room.sources.independent",
     "own": "echousd.room.sources.own",
 }
 

@@ -1,0 +1,56 @@
+"""Numbers that say what a shape is like: the shape branch's latent of its signed distances, made coarse."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+import trimesh
+from scipy import ndimage
+
+from echomodel.data.tsdf import RESOLUTION, truncated, voxels_from_points
+from echomodel.echo import EchoModel
+from echousd.assets.record import AssetRecord
+from echousd.assets.shape import sampled
+
+CELLS = 4  # of the descriptor along a side
+SAMPLES = 60_000
+WEIGHT = 4.0  # of the distance of two descriptors (0 to 2) against the other costs of a choice
+
+
+def grid_of(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(64, 64, 64) float32 signed distances of any mesh in its box, true to a voxel; by flood fill from outside."""
+    points = voxels_from_points(sampled(mesh, SAMPLES)[0], *mesh.bounds)
+    shell = np.zeros((RESOLUTION,) * 3, bool)
+    shell[tuple(np.clip(np.rint(points), 0, RESOLUTION - 1).astype(int).T)] = True
+    parts, _ = ndimage.label(np.pad(~shell, 1, constant_values=True))
+    outside = (parts == parts[0, 0, 0])[1:-1, 1:-1, 1:-1]
+    away = ndimage.distance_transform_edt(outside)
+    depth = ndimage.distance_transform_edt(~outside)
+    return truncated(np.where(outside, away - 0.5, 0.5 - depth))
+
+
+def descriptors(model: object, grids: np.ndarray) -> np.ndarray:
+    """(n, d) float32 of unit length from (n, 64, 64, 64) signed distances; raises ValueError without an encoder."""
+    if not isinstance(model, EchoModel) or "autoencoder" not in model.model.parts:
+        raise ValueError("these weights have no encoder of shapes; use --shapes library or other weights")
+    with torch.no_grad():
+        latent = model.model.autoencoder.encode(torch.as_tensor(np.asarray(grids, np.float32)))
+        coarse = torch.nn.functional.adaptive_avg_pool3d(latent, CELLS).flatten(1)
+    coarse = coarse - coarse.mean(1, keepdim=True)
+    return np.asarray(torch.nn.functional.normalize(coarse, dim=1), np.float32)
+
+
+def nearness(found: np.ndarray, names: Sequence[str], records: Sequence[AssetRecord]) -> dict[str, Mapping[str, float]]:
+    """Object name -> id of a model -> cost of its shape against the generated one.
+
+    Arguments:
+        found: (n, d) descriptors of the generated shapes of `names`. records: models, those without a descriptor cost
+            as much as one that is not alike at all.
+    """
+    width = found.shape[1]
+    known = np.array([r.descriptor if len(r.descriptor) == width else np.zeros(width) for r in records], np.float32)
+    away = WEIGHT * (1.0 - found @ known.reshape(len(records), width).T)
+    ids = [record.id for record in records]
+    return {name: dict(zip(ids, row, strict=True)) for name, row in zip(names, away.tolist(), strict=True)}
