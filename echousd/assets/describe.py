@@ -51,6 +51,9 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
 
 def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encoder: object) -> AssetRecord:
     turn = np.array(Z_UP if found.z_up else UPRIGHT).reshape(3, 3) if entry.turn is None else entry.turn
+    if found.yaw:
+        c, s = np.cos(found.yaw), np.sin(found.yaw)
+        turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ turn
     extents = np.ptp(found.points @ turn.T, axis=0)
     metres = entry.metres or found.metres
     known = extents * metres if metres else entry.dims

@@ -20,7 +20,7 @@ def measure(model: ModelFile) -> Measured:
         if model.suffix in STAGES:
             with model.opened():
                 pass
-            found = measured_stage(model.path)
+            found = measured_stage(model.path, model.prim)
         else:
             found = _mesh(model)
     except ImportError:

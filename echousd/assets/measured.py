@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import trimesh
@@ -15,6 +15,8 @@ class Measured:
     Arguments:
         points: (v, 3) float. faces: (f, 3) int.
         metres: per unit, None where the file does not say. z_up: whether +Z points up.
+        above: (4, 4) float, from the frame above its root prim to its own frame, as only a prim below others has one.
+        yaw: radians by which a prim of a stage stands turned about its up axis, counter-clockwise seen from above.
         others: as in `AssetRecord`.
     """
 
@@ -23,6 +25,8 @@ class Measured:
     metres: float | None = None
     z_up: bool = False
     prim: str = ""
+    above: np.ndarray = field(default_factory=lambda: np.eye(4))
+    yaw: float = 0.0
     labels: tuple[str, ...] = ()
     materials: tuple[str, ...] = ()
     licence: str = ""

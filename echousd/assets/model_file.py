@@ -29,11 +29,13 @@ class ModelFile:
     Arguments:
         path: the file, or the archive that holds it. top: folder that the model's own files are looked for below.
         member: name in the archive, "" where there is none.
+        prim: path of the model's prim in a stage that holds more than it, "" = its root.
     """
 
     path: Path
     top: Path
     member: str = ""
+    prim: str = ""
 
     @property
     def suffix(self) -> str:

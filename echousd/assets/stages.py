@@ -12,18 +12,24 @@ from echousd.assets.measured import Measured
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
-from echousd.stage.foreign import labels
+from echousd.stage.foreign import object_box
 from echousd.stage.forms import SkippedForms, forms
+from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
 
 IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".tga", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".hdr")
 
 
-def measured_stage(path: Path) -> Measured:
-    """What a USD file says of the model in it; raises StageError (a ValueError) as `open_stage` does."""
+def measured_stage(path: Path, prim_path: str = "") -> Measured:
+    """What a USD file says of the model in it; raises StageError (a ValueError) as `open_stage` does.
+
+    Arguments:
+        path: of the file. prim_path: of the model's prim where the stage holds more than it, "" = its root.
+    """
     stage = open_stage(path)
-    root = root_prim(stage, path)
+    root = root_prim(stage, path) if not prim_path else named_prim(stage, path, prim_path)
     cache = UsdGeom.XformCache()
+    box = object_box(root) if prim_path else None
     points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkippedForms)
@@ -47,6 +53,8 @@ def measured_stage(path: Path) -> Measured:
         metres=metres_per_unit(stage) if _says_unit(stage) else None,
         z_up=up_axis(stage) == UsdGeom.Tokens.z,
         prim=str(root.GetPath()),
+        above=np.array(cache.GetParentToWorldTransform(root)).T,
+        yaw=0.0 if box is None else box.yaw,
         labels=tuple(dict.fromkeys(word for prim in prims[:50] for word in labels(prim))),
         materials=tuple(dict.fromkeys(p.GetName() for p in prims if p.IsA(UsdShade.Material))),
         licence=words.get("asset_license") or words.get("license") or words.get("licence") or "",
@@ -69,6 +77,15 @@ def root_prim(stage: Usd.Stage, path: Path) -> Usd.Prim:
         names = ", ".join(prim.GetName() for prim in roots[:5]) or "none"
         raise StageError(f"{path}: no default prim and {len(roots)} root prims ({names}), allowed: a default prim")
     return roots[0]
+
+
+def named_prim(stage: Usd.Stage, path: Path, prim_path: str) -> Usd.Prim:
+    """The prim at a path; raises StageError where there is none."""
+    valid = Sdf.Path.IsValidPathString(prim_path) and Sdf.Path(prim_path).IsPrimPath()
+    prim = stage.GetPrimAtPath(prim_path) if valid else None
+    if not prim:
+        raise StageError(f"{path}: no prim <{prim_path}>, allowed: the path of a prim of the stage")
+    return prim
 
 
 def missing_files(path: Path) -> list[str]:

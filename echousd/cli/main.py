@@ -35,6 +35,7 @@ TOPICS: tuple[str, ...] = (
     "export",
     "texture",
     "assets",
+    "adopt",
     "check",
     "train",
     "convert",

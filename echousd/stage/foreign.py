@@ -96,10 +96,17 @@ def foreign_graph(
     Arguments:
         names: what has no label is known by the name of its asset or prim.
     """
-    stage = opened(stage)
+    return foreign_pieces(opened(stage), room_type, names=names)[0]
+
+
+def foreign_pieces(
+    stage: Usd.Stage, room_type: str | None = None, *, names: bool = False
+) -> tuple[SceneGraph, dict[str, str]]:
+    """The graph as `foreign_graph` reads it, and the prim path of every node."""
     found = _read(stage, names=names)
     floor = next((box for _, box in found.floors), None)
-    return _graph(stage, [node for _, node in found.nodes], floor, room_type, found.words)
+    graph = _graph(stage, [node for _, node in found.nodes], floor, room_type, found.words)
+    return graph, {node.name: str(path) for path, node in found.nodes}
 
 
 def foreign_rooms(stage: Usd.Stage | str | os.PathLike[str], *, names: bool = False) -> dict[str, SceneGraph]:
@@ -234,6 +241,12 @@ def _over(node: Node, floor: Box) -> bool:
     cos, sin = math.cos(floor.yaw), math.sin(floor.yaw)
     along = (abs(cos * x - sin * z), abs(sin * x + cos * z))
     return along[0] <= floor.size[0] / 2 and along[1] <= floor.size[2] / 2 and -0.5 < y < STOREY
+
+
+def object_box(prim: Usd.Prim) -> Box | None:
+    """The upright box around a prim of a stage, turned as the prim is; None where it has no bounds."""
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
+    return StageFrame.of(prim.GetStage()).box(_object_bound(cache, prim))
 
 
 def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:

@@ -22,22 +22,34 @@ from echousd.room.originals.original import Original
 
 def is_file(asset: str) -> bool:
     """Whether a node's `asset` is the file of a model, and not the id of one in a library."""
-    return Path(asset).suffix.lower() in MODELS
+    return Path(split(asset)[0]).suffix.lower() in MODELS
 
 
-def own_record(asset: str, category: str) -> AssetRecord:
-    """The row of a model of one's own, as if it were indexed; raises ValueError that names the file."""
-    path = Path(asset)
-    file = ModelFile(path, path.parent)
-    record = described(Entry(path.name, file, path.stem, category=category), path, full=False)
-    if record.fault:
-        raise ValueError(record.fault)
-    return record
+def split(asset: str) -> tuple[str, str]:
+    """(file, prim path) of `kitchen.usda</World/Sofa>`, the path empty where none is told."""
+    file, angle, prim = asset.partition("<")
+    return (file, prim.removesuffix(">")) if angle and prim.endswith(">") else (asset, "")
+
+
+def joined(file: str, prim: str) -> str:
+    """The inverse of `split`."""
+    return f"{file}<{prim}>" if prim else file
 
 
 def own_file(asset: str) -> ModelFile:
     """Where a model of one's own lies; its textures may lie in its folder and below."""
-    return ModelFile(Path(asset), Path(asset).parent)
+    file, prim = split(asset)
+    return ModelFile(Path(file), Path(file).parent, prim=prim)
+
+
+def own_record(asset: str, category: str) -> AssetRecord:
+    """The row of a model of one's own, as if it were indexed; raises ValueError that names the file."""
+    file = own_file(asset)
+    key = joined(file.path.name, file.prim)
+    record = described(Entry(key, file, file.path.stem, category=category), file.path, full=False)
+    if record.fault:
+        raise ValueError(record.fault)
+    return record
 
 
 def library_file(library: Library, record: AssetRecord) -> ModelFile:
@@ -69,9 +81,12 @@ def geometry_of(model: ModelFile, record: AssetRecord, category: str, size: Vect
 
 
 def _original(model: ModelFile, found: Measured, pose: np.ndarray) -> Original:
-    if model.suffix in STAGES:
-        return Original(pose, found.prim, model.path.absolute(), bodies=found.bodies, colliders=found.colliders)
-    return Original(pose, ROOT, files=converted(model))
+    if model.suffix not in STAGES:
+        return Original(pose, ROOT, files=converted(model))
+    # a payload brings the prim's own transform, and none of those above it
+    return Original(
+        pose @ found.above, found.prim, model.path.absolute(), bodies=found.bodies, colliders=found.colliders
+    )
 
 
 def hull_of(mesh: trimesh.Trimesh, category: str) -> Collider:

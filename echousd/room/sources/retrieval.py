@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from echousd.assets.describe import relative
 from echousd.assets.model_file import ModelFile
 from echousd.assets.record import AssetRecord, Vector
 from echousd.graph import SceneGraph
-from echousd.room.originals.loading import is_file, library_file, own_file, own_record
+from echousd.room.originals.loading import is_file, joined, library_file, own_file, own_record, split
 from echousd.room.progress import StageTimer
 from echousd.room.styles import ALIKE, ROOM_STYLE
 
@@ -62,7 +62,7 @@ def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
     if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
         return graph
     nodes = (
-        node.replaced(asset=(folder.absolute() / node.asset).as_posix())
+        node.replaced(asset=_moved(node.asset, lambda file: (folder.absolute() / file).as_posix()))
         if node.asset is not None and is_file(node.asset)
         else node
         for node in graph.nodes
@@ -70,12 +70,17 @@ def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
     return graph.replaced(nodes=tuple(nodes))
 
 
+def _moved(asset: str, change: Callable[[str], str]) -> str:
+    file, prim = split(asset)
+    return joined(change(file), prim)
+
+
 def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
     """The graph with the files of assets relative to a room's folder, as a saved room tells them."""
     if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
         return graph
     nodes = (
-        node.replaced(asset=relative(Path(node.asset), folder.absolute() / "graph"))
+        node.replaced(asset=_moved(node.asset, lambda file: relative(Path(file), folder.absolute() / "graph")))
         if node.asset is not None and is_file(node.asset)
         else node
         for node in graph.nodes

@@ -1,0 +1,59 @@
+"""`echousd adopt`: a half-furnished stage of somebody's is completed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(epilog="Example: echousd adopt loft.usd -o out/loft --room living_room")(adopt)
+
+
+def adopt(
+    stage: Annotated[Path, typer.Argument(help="Stage with labels and bounds.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the room.", show_default=False)],
+    room: Annotated[str | None, typer.Option(help="Room type; default: as the stage looks.")] = None,
+    add: Annotated[
+        list[str] | None,
+        typer.Option(help="Object to add, name:category; default: what such a room usually holds and this one lacks."),
+    ] = None,
+    relate: Annotated[list[str] | None, typer.Option(help='Relation to keep: "lamp close by sofa".')] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
+    shapes: Annotated[
+        str | None, typer.Option(help="Of new objects: parts, sdf, library, boxes; default: parts.")
+    ] = None,
+    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
+    walls: Annotated[bool, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = False,
+    dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "none",
+    force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
+    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+) -> None:
+    """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
+
+    The stage is not written; the room refers to the pieces in it.
+    """
+    from echousd.cli.generate import progress_bar, report, telling_faults
+    from echousd.cli.output import say
+    from echousd.room.output import check_output, writing
+
+    check_output(output, flat=False, force=force)
+    with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
+        from echousd.room.adopting import adopted
+        from echousd.room.pipeline import generate
+        from echousd.room.progress import StageTimer
+        from echousd.room.room import RoomOptions
+        from echousd.room.written import write_room
+
+        graph = adopted(stage, room=room, add=add, relate=relate or ())
+        made = generate(
+            graph, seed=seed, shapes=shapes, assets=assets, options=RoomOptions(walls=walls, dress=dress),
+            progress=listen,
+        )  # fmt: skip
+        written = write_room(made, output, StageTimer(listen), force=force)
+    kept = sum(node.asset is not None for node in graph.nodes)
+    say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
+    report([written])
