@@ -46,6 +46,7 @@ def edit(
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     faces: Annotated[int, typer.Option(help="Face budget of each new mesh.", min=100)] = 5000,
+    drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most, the best is kept.", min=1, max=64)] = None,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
     ] = True,
@@ -64,6 +65,7 @@ def edit(
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
     options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces, "assets": assets}
+    options["drafts"] = drafts
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,

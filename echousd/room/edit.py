@@ -20,7 +20,7 @@ from echousd.graph.floors import with_plan_of
 from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
-from echousd.room.layouts import check_objects, finished_boxes, room_floor, sample_boxes, with_sizes
+from echousd.room.layouts import best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
 from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
@@ -52,6 +52,7 @@ def edit(
     shapes: str | None = None,
     model: RoomModel | str | Path | None = None,
     repair: bool = True,
+    drafts: int | None = None,
     steps: int | None = None,
     faces: int = FACES,
     progress: StageListener | None = None,
@@ -68,13 +69,14 @@ def edit(
             those of the room.
         seed: of the new randomness.
         shapes: as for `generate`; None = what the room is made of.
-        model, repair, steps, faces, progress, assets: as for `generate`.
+        model, repair, drafts, steps, faces, progress, assets: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
     check_seed(seed)
+    check_drafts(drafts)
     if shapes is not None:
         shape_source(shapes)
     timer, wishes = StageTimer(progress), wishes_of(assets)
@@ -114,10 +116,10 @@ def edit(
             if model_used is None:
                 layouts.append(_boxes_of(pinned))
                 continue
-            (found,) = sample_boxes(
-                model_used, pinned, seed=seed, number=number, steps=steps, change=change, timer=timer
+            found, told = best_boxes(
+                model_used, pinned, styles, seed=seed, number=number, repair=repair, steps=steps, change=change,
+                drafts=drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
             )  # fmt: skip
-            found, told = finished_boxes(pinned, found, styles, repair, timer)
             layouts.append(found)
             notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
         return layouts

@@ -22,7 +22,8 @@ from echousd.room.verdicts import layout_outcome
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
 
-DRAFTS = 8  # of which the best is kept
+DRAFTS, MOST_DRAFTS = 8, 64  # of which the best is kept
+ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 400  # of one room: repair grows faster than their number
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
@@ -54,7 +55,7 @@ def sample_boxes(
 
     Arguments:
         number: which draws: equal numbers and counts give equal drafts.
-        count: drafts that are drawn at once; without a `change` only.
+        count: drafts that are drawn at once.
     """
     centre, nodes = floor_centre(graph), graph.nodes
     batch = GraphBatch.pack([graph_batch(graph)] * count)
@@ -70,7 +71,7 @@ def sample_boxes(
     if steps is not None:
         extra["steps"] = steps
     if change is not None:
-        extra["edit"] = change
+        extra["edit"] = repeated(change, len(nodes), count)
     with timer.stage("layout") as tell, one_thread():
         found = model.sample_layout(batch, generator=seeded(seed, "layout", number), progress=tell, **extra)
     return [
@@ -91,11 +92,12 @@ def best_boxes(
     sized: Boxes | None = None,
     drawn: Boxes | None = None,
     steps: int | None = None,
+    change: GraphEdit | None = None,
     timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:
     """The best of several drafts after repair: kept relations first, then collisions, then the living rules.
 
-    Further drafts are drawn, all at once, only where the first one leaves something to be wished for.
+    Further drafts are drawn, a few at once, only where those before leave something to be wished for.
 
     Arguments:
         drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
@@ -104,13 +106,15 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    for start, count in ((0, 1), (DRAWN_LATER, drafts - 1)):
-        if count < 1 or (best is not None and not any(worth)):
+    for start, count in _rounds(drafts):
+        if best is not None and not any(worth):
             break
         for draft in (
             [drawn]
             if drawn is not None and not start
-            else sample_boxes(model, graph, seed=seed, number=number + start, count=count, steps=steps, timer=timer)
+            else sample_boxes(
+                model, graph, seed=seed, number=number + start, count=count, steps=steps, change=change, timer=timer
+            )
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
@@ -125,6 +129,35 @@ def best_boxes(
                 break
     assert best is not None
     return best
+
+
+def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
+    """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
+    from echomodel.protocols import GraphEdit
+
+    shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
+    return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
+
+
+def check_drafts(drafts: int | None) -> None:
+    """Raise ValueError for a number of drafts that is not allowed."""
+    if drafts is not None and not 1 <= drafts <= MOST_DRAFTS:
+        raise ValueError(f"drafts is {drafts}, allowed: 1 to {MOST_DRAFTS}")
+
+
+def most_drafts(model: RoomModel, objects: int) -> int:
+    """How many drafts a model draws at most where nobody says it: the published ones take a thousand steps for one."""
+    return usual_drafts(objects) if model.preset == "compact" else 1
+
+
+def _rounds(drafts: int) -> list[tuple[int, int]]:
+    """What is added to the number of the draws, and how many are drawn at once, until all drafts are drawn."""
+    out, left = [(0, 1)], drafts - 1
+    for count in (*ROUNDS, drafts):
+        if left > 0:
+            out.append((len(out) * DRAWN_LATER, min(count, left)))
+            left -= count
+    return out
 
 
 def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]]) -> tuple[float, ...]:

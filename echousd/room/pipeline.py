@@ -16,7 +16,15 @@ from echousd.graph.floors import check_space, with_floor, with_placed_openings, 
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
-from echousd.room.layouts import best_boxes, check_objects, plan_boxes, room_floor, usual_drafts, with_sizes
+from echousd.room.layouts import (
+    best_boxes,
+    check_drafts,
+    check_objects,
+    most_drafts,
+    plan_boxes,
+    room_floor,
+    with_sizes,
+)
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
 from echousd.room.progress import StageTimer
@@ -94,8 +102,7 @@ def generate(
         shape_source(shapes)
     if samples < 1 or samples > 1000:
         raise ValueError(f"samples is {samples}, allowed: 1 to 1000")
-    if drafts is not None and not 1 <= drafts <= 64:
-        raise ValueError(f"drafts is {drafts}, allowed: 1 to 64")
+    check_drafts(drafts)
     if fit not in FITS:
         raise ValueError(f"fit is {fit!r}, allowed: {', '.join(FITS)}")
     check_seed(seed)
@@ -125,7 +132,7 @@ def generate(
     crowded = check_space(graph)
     proposed = with_floor(graph, seed)
     free, graph = proposed is not graph, proposed
-    drafts = drafts or (usual_drafts(len(graph.nodes)) if echo.preset == "compact" else 1)
+    drafts = drafts or most_drafts(echo, len(graph.nodes))
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
         styles = style_groups(graph)

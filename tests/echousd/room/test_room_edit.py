@@ -9,8 +9,10 @@ from pxr import Usd
 from small_room import StandIn, small_graph
 
 import echousd
+from echomodel.protocols import GraphEdit
 from echousd.graph import Relation
 from echousd.room.edit import edit, touched
+from echousd.room.layouts import repeated
 from echousd.room.reading import read_room
 
 
@@ -102,6 +104,37 @@ def test_model_is_told_what_was_edited(root):
         pairs = {(s, o) for s, _, o in told.before.tolist()}
         assert (wardrobe, bed) in pairs  # as it was before
         assert graph.names.index("chair") not in {end for pair in pairs for end in pair}
+
+
+def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
+    old, model = read_room(root), StandIn(0.4)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    seen = []
+
+    def wishes(graph, found):
+        seen.append(found[0])
+        return (0, 0, 1 if len(seen) == 3 else 2)
+
+    monkeypatch.setattr("echousd.room.layouts._wishes", wishes)
+    room = edit(root, graph, model=model, seed=9, shapes="boxes")
+    assert len(seen) == 8  # none was perfect
+    assert room.boxes is seen[2]
+    sizes = [len(told.added) // len(graph.nodes) for told in model.edits if told is not None]
+    assert sizes[:3] == [1, 2, 5]
+    for boxes in seen:  # whatever is drawn, what the edit does not touch stays
+        torch.testing.assert_close(boxes.position[:6], old.boxes.position, atol=1e-6, rtol=0)
+    seen.clear()
+    edit(root, graph, model=model, seed=9, shapes="boxes", drafts=1)
+    assert not seen
+    with pytest.raises(ValueError, match="drafts is 65, allowed: 1 to 64"):
+        edit(root, graph, model=model, drafts=65)
+
+
+def test_an_edit_is_told_once_for_every_copy_of_the_graph():
+    change = GraphEdit(torch.tensor([[0, 1, 2], [2, 7, 1]]), torch.tensor([False, False, True]))
+    twice = repeated(change, 3, 2)
+    assert twice.before.tolist() == [[0, 1, 2], [2, 7, 1], [3, 1, 5], [5, 7, 4]]
+    assert twice.added.tolist() == [False, False, True, False, False, True]
 
 
 def test_owner_of_a_shared_asset_may_go(root):
