@@ -1,4 +1,4 @@
-"""Relation guidance: the denoised boxes are nudged towards the relations, and onto the floor, at every step."""
+"""Relation guidance: at every step boxes are nudged towards the relations, onto the floor and out of doorways."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.floors import footprint, signed_distance
+from echomodel.openingrows import kept_free
 from echomodel.rules import margins, measured
 from echomodel.samplers import Predict
 from echomodel.vocabulary import vocabulary
@@ -23,6 +24,7 @@ def relation_guided(
     strength: float,
     rounds: int = 2,
     floor: Tensor | None = None,
+    openings: Tensor | None = None,
 ) -> Predict:
     """Follow `predict` by gradient steps on the missed margins of the relations, in the normalised box space.
 
@@ -38,10 +40,12 @@ def relation_guided(
         rounds: steps after each call of the denoiser.
         floor: (N, K, 2) float32, corners of the floor under each node (`GraphBatch.floor`), NaN = unknown; None = all
             unknown.
+        openings: (N, O, ROW) float32, what each node must keep out of the way of (`echomodel.openingrows`), NaN = none;
+            None = no node of any.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
     wanted = triplets[torch.isin(triplets[:, 1], known)]
-    if not len(wanted) and floor is None:
+    if not len(wanted) and floor is None and openings is None:
         return predict
     weights = [entry.emphasis for entry in vocabulary().predicates]
     emphasis = torch.tensor(weights, device=wanted.device)[wanted[:, 1]]
@@ -57,10 +61,13 @@ def relation_guided(
                 # the logarithm bounds the pull of a relation that is missed by far
                 pull = (torch.log1p(missed / SLACK) * emphasis).sum()
                 if floor is not None:
-                    beyond = (
-                        outside(boxes, floor).square().sum(1) + 1e-12
-                    ).sqrt()  # one pull a box: it may overhang twice
+                    # one pull a box: it may overhang twice
+                    beyond = (outside(boxes, floor).square().sum(1) + 1e-12).sqrt()
                     pull = pull + torch.log1p(beyond / SLACK).sum()
+                if openings is not None:
+                    rigid = Boxes(boxes.size.detach(), boxes.position, boxes.yaw)  # none is asked to shrink
+                    blocked = (SLACK - kept_free(rigid, openings)).clamp_min(0)
+                    pull = pull + torch.log1p(blocked / SLACK).sum()
                 (slope,) = torch.autograd.grad(pull * SLACK, free)
             norm = slope.norm(dim=1, keepdim=True).clamp_min(1e-6)
             clean = clean - strength * weight * slope * (1 / norm).clamp(max=1 / 0.05)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.floors import rectangle
 from echomodel.guidance import outside, relation_guided
+from echomodel.openingrows import kept_free, opening_rows
+from echomodel.openings import Opening
 from echomodel.rules import verdicts
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
@@ -82,3 +85,22 @@ def test_nothing_to_measure_leaves_the_denoiser_alone() -> None:
 
     same = relation_guided(predict, TRIPLETS[3:], STATISTICS.scale(), rules="strict", strength=0.1)
     assert same is predict
+
+
+def test_furniture_is_pulled_out_of_the_way_of_doors() -> None:
+    room = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    door = Opening("door", "door", 0, 1.5, 0.9, 2.0, 0.0)
+    rows = opening_rows([door], room)[None].expand(2, -1, -1)
+    boxes = Boxes(torch.full((2, 3), 0.5), torch.tensor([[0.1, 0.0, -1.5], [1.2, 0.0, 1.5]]), torch.zeros(2))
+    before = kept_free(boxes, rows)
+    assert before[0] < -0.1
+    assert before[1] > 0
+    x = boxes.encode(STATISTICS.scale())
+    none = torch.zeros(0, 3, dtype=torch.int64)
+    pull = relation_guided(
+        lambda x, level: x, none, STATISTICS.scale(), rules="strict", strength=0.2, rounds=60, openings=rows
+    )
+    guided = Boxes.decode(pull(x, torch.full((2,), 0.1)), STATISTICS.scale())
+    assert kept_free(guided, rows).min() > 0
+    torch.testing.assert_close(guided.position[1], boxes.position[1])
+    torch.testing.assert_close(guided.size, boxes.size)

@@ -23,6 +23,7 @@ from echomodel.progress import StepListener
 from echomodel.protocols import GraphEdit
 from echomodel.randomness import Randomness, for_scenes, uniform
 from echomodel.samplers import Predict, guided, sample
+from echomodel.vocabulary import vocabulary
 
 TRUST = 2.0  # a draft that keeps a share of what is told is begun on with this power of it as probability
 MOST_TOLD = 4.0  # relations an object; graphs that tell more leave nothing for a draft to add
@@ -104,6 +105,7 @@ def _denoised(
         conditional = relation_guided(
             conditional, graph.triplets, scale,
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
+            openings=_in_the_way(graph),
         )  # fmt: skip
     vectors = sample(
         how.sampler or config.sampler, conditional,
@@ -116,6 +118,15 @@ def _denoised(
     if how.known is None or how.known_mask is None:
         return boxes
     return boxes.replaced(how.known_mask, how.known)
+
+
+def _in_the_way(graph: GraphBatch) -> Tensor | None:
+    """(N, O, ROW) the openings that each node must leave free: those of its room where it stands on the floor."""
+    if not bool(torch.isfinite(graph.openings).any()):
+        return None
+    floor = [kind.support == "floor" for kind in vocabulary().categories]
+    stands = torch.tensor(floor, device=graph.category.device)[graph.category]
+    return torch.where(stands[:, None, None], graph.openings[graph.scene], torch.nan)
 
 
 def _predictor(model: CompactModel, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
