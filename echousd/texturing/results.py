@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -126,8 +127,6 @@ def image_of(content: bytes, where: str, stem: str) -> tuple[str, bytes]:
 
     Raises TextureError, which calls it `where`, for what is no image or too large.
     """
-    import io
-
     from PIL import Image
 
     if not content:

@@ -211,3 +211,15 @@ def test_colours_are_a_function_of_the_place():
     points = np.random.default_rng(0).random((50, 3))
     assert color_at(points).shape == (50, 3)
     assert len(np.unique(color_at(points).round(3), axis=0)) == 50
+
+
+def test_rooms_with_z_up_are_painted_alike(tmp_path):
+    data = echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(up_axis="Z", walls=True)
+    )
+    root = data.save(tmp_path / "bedroom", preview=False)
+    job = export_job(root, tmp_path / "job", "generic", resolution=256)
+    paint(tmp_path / "job")
+    import_look(root, tmp_path / "job", preview=False)
+    assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
+    assert not check_room(root).errors
