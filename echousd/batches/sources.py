@@ -78,7 +78,10 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
         for name, category, style in zip(names, room.categories, room.styles or [-1] * len(room), strict=True)
     )
     edges = told_relations(
-        torch.from_numpy(label_relations(room)), Boxes.from_room(room), relations, torch.Generator().manual_seed(number)
+        torch.from_numpy(label_relations(room, headings=True)),
+        Boxes.from_room(room),
+        relations,
+        torch.Generator().manual_seed(number),
     ).tolist()
     told = tuple(Relation(names[s], words.predicates[p].name, names[o]) for s, p, o in edges)
     floor = tuple((round(float(x), 4), round(float(z), 4)) for x, z in room.floor_polygon)

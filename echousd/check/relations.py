@@ -32,7 +32,7 @@ def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[Measu
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import margins, verdicts
+    from echomodel.rules import fronts, margins, verdicts
 
     words = vocabulary()
     index = {thing.node.name: i for i, thing in enumerate(room.objects)}
@@ -47,8 +47,9 @@ def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[Measu
     polygon = None if room.spec is None else floor_of_room(room.spec)
     centre = np.zeros(2) if polygon is None else (polygon.max(0) + polygon.min(0)) / 2
     center = torch.as_tensor(centre)
-    verdict = verdicts(boxes, triplets, rules=rules, center=center).tolist()
-    margin = margins(boxes, triplets, rules=rules, center=center).tolist()
+    headed = fronts(thing.node.category for thing in room.objects)
+    verdict = verdicts(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
+    margin = margins(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
     # Meshes are stored in single precision: a relation that holds to a tenth of a millimetre holds.
     return tuple(
         MeasuredRelation(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))

@@ -63,7 +63,9 @@ def linearise(
         equals.extend([equal] * len(value))
         kinds.append(np.broadcast_to(np.asarray(kind, int), len(value)))
 
-    margin, gradient = relation_margins(size, position, yaw, problem.triplets, rules=rules, centre=centre)
+    margin, gradient = relation_margins(
+        size, position, yaw, problem.triplets, rules=rules, centre=centre, fronts=problem.fronts
+    )
     add(margin - slack, gradient, RELATION)
 
     apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)

@@ -6,6 +6,7 @@ in the columns of `geometry`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ class Pairs:
         axis: (p, 2, 2, 2) float, the two horizontal unit vectors (x, z) along each footprint's sides.
         half: (p, 2, 2) float, metres, half of the side along each of them.
         columns: columns of the gradient that hold the logarithms of these two sides.
+        fronts: (p,) bool, pairs in which both have a front; None = in none.
     """
 
     size: np.ndarray
@@ -37,13 +39,15 @@ class Pairs:
     axis: np.ndarray
     half: np.ndarray
     columns: tuple[int, int]
+    fronts: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.size)
 
     def take(self, rows: np.ndarray) -> Pairs:
         """The pairs of these numbers."""
-        return Pairs(self.size[rows], self.position[rows], self.axis[rows], self.half[rows], self.columns)
+        fronts = None if self.fronts is None else self.fronts[rows]
+        return Pairs(self.size[rows], self.position[rows], self.axis[rows], self.half[rows], self.columns, fronts)
 
     def flat(self) -> np.ndarray:
         """(p, 2) float: in x and z from the second box to the first, metres."""
@@ -58,16 +62,26 @@ class Pairs:
         return np.zeros((len(self), 2, COLUMNS))
 
 
-def pairs_of(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, ends: np.ndarray, *, oriented: bool) -> Pairs:
+def pairs_of(
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    ends: np.ndarray,
+    *,
+    oriented: bool,
+    fronts: np.ndarray | None = None,
+) -> Pairs:
     """The pairs `ends` (p, 2) of n boxes.
 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians.
         oriented: False reads footprints as the published measurements do: yaw ignored, width and depth exchanged.
+        fronts: (n,) bool, boxes that have a front; None = none.
     """
     half = 0.5 * size[:, PLAN if oriented else PLAN[::-1]]
     axis = axes(yaw if oriented else np.zeros_like(yaw))
-    return Pairs(size[ends], position[ends], axis[ends], half[ends], (3, 5) if oriented else (5, 3))
+    both = None if fronts is None else fronts[ends].all(1)
+    return Pairs(size[ends], position[ends], axis[ends], half[ends], (3, 5) if oriented else (5, 3), both)
 
 
 def overlap_ratio(pair: Pairs) -> Values:
@@ -191,13 +205,15 @@ def centre_inside(pair: Pairs) -> Values:
     return room[r, best], gradient
 
 
-def mirror_distance(pair: Pairs, *, point: bool) -> Values:
+def mirror_distance(pair: Pairs, *, images: Sequence[int]) -> Values:
     """Smallest distance in plan of the second box to a mirror image of the first, metres.
 
-    Mirrors are the x axis, the z axis and (`point`) the origin, so positions must be relative to the room's centre.
+    Arguments:
+        pair: their positions are relative to the room's centre.
+        images: which mirrors may be used: 0 turns x around, 1 turns z around, 2 both.
     """
     r = np.arange(len(pair))
-    signs = np.array([(-1, 1), (1, -1), (-1, -1)], float)[: 3 if point else 2]
+    signs = np.array([(-1, 1), (1, -1), (-1, -1)], float)[list(images)]
     plan = pair.position[:, :, None, PLAN]
     away = plan[:, FIRST] * signs - plan[:, SECOND]
     best = np.square(away).sum(-1).argmin(1)
@@ -207,3 +223,10 @@ def mirror_distance(pair: Pairs, *, point: bool) -> Values:
     gradient = pair.zeros()
     gradient[:, FIRST, PLAN], gradient[:, SECOND, PLAN] = signs[best] * away, -away
     return distance, gradient
+
+
+def mirror_likeness(pair: Pairs) -> np.ndarray:
+    """(2, p) cosine between the second box's front and that of the first one's images with x and with z turned."""
+    first, second = pair.axis[:, FIRST, 1], pair.axis[:, SECOND, 1]
+    across, along = (first * second).T
+    return np.stack([along - across, across - along])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -46,6 +47,11 @@ class Problem:
     pairs: np.ndarray
     order: np.ndarray
     handicap: np.ndarray
+
+    @cached_property
+    def fronts(self) -> np.ndarray:
+        """(n,) bool, which of the boxes have a front."""
+        return np.array([vocabulary().category(word).front for word in self.categories], bool)
 
 
 def pose(

@@ -20,6 +20,7 @@ from echousd.repair.footprints import (
     centre_inside,
     corner_distance,
     mirror_distance,
+    mirror_likeness,
     overlap_ratio,
     pairs_of,
     penetration,
@@ -28,23 +29,38 @@ from echousd.repair.geometry import COLUMNS, spread
 
 
 def relation_margins(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *, rules: str, centre: np.ndarray
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    triplets: np.ndarray,
+    *,
+    rules: str,
+    centre: np.ndarray,
+    fronts: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The margins of the relations and their gradients; 0 where the rules do not measure the predicate.
 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians; triplets: (e, 3) int.
         rules: `strict` or `sgfront`; centre: (2,) float, x and z of the room's centre.
+        fronts: (n,) bool, boxes that have a front; None = none.
 
     Returns: margins (e,) float and gradient (e, n, 6) float in the columns of `geometry`.
     """
     ends = triplets[:, [0, 2]]
-    value, gradient = pair_margins(size, position, yaw, triplets, rules=rules, centre=centre)
+    value, gradient = pair_margins(size, position, yaw, triplets, rules=rules, centre=centre, fronts=fronts)
     return value, spread(gradient, ends, len(size))
 
 
 def pair_margins(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, *, rules: str, centre: np.ndarray
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    triplets: np.ndarray,
+    *,
+    rules: str,
+    centre: np.ndarray,
+    fronts: np.ndarray | None = None,
 ) -> Values:
     """The margins as `relation_margins`, their gradients (e, 2, 6) by the two boxes of each relation alone."""
     from echomodel.rules import sets
@@ -52,7 +68,7 @@ def pair_margins(
     told = sets.rule_set(rules)
     measured, strict = told.margins, told is sets.STRICT
     ends, predicate = triplets[:, [0, 2]], triplets[:, 1]
-    every = pairs_of(size, position - (centre[0], 0.0, centre[1]), yaw, ends, oriented=told.oriented)
+    every = pairs_of(size, position - (centre[0], 0.0, centre[1]), yaw, ends, oriented=told.oriented, fronts=fronts)
     value, gradient = np.zeros(len(triplets)), every.zeros()
     known = [number for number in np.unique(predicate).tolist() if number in measured]
     rows = {number: vocabulary().predicates[number] for number in known}
@@ -67,8 +83,15 @@ def pair_margins(
 
 
 def _smaller(one: Values, two: Values) -> Values:
-    first = one[0] <= two[0]
-    return np.where(first, one[0], two[0]), np.where(first[:, None, None], one[1], two[1])
+    return _where(one[0] <= two[0], one, two)
+
+
+def _larger_of(one: Values, two: Values) -> Values:
+    return _where(one[0] >= two[0], one, two)
+
+
+def _where(chosen: np.ndarray, one: Values, two: Values) -> Values:
+    return np.where(chosen, one[0], two[0]), np.where(chosen[:, None, None], one[1], two[1])
 
 
 def _automatic(
@@ -113,10 +136,17 @@ def _close(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
 
 
 def _symmetrical(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
-    from echomodel.rules.sets import NEAR
+    from echomodel.rules.sets import LOOK, NEAR
 
-    distance, gradient = mirror_distance(pair, point=not strict)
-    return NEAR - distance, -gradient
+    distance, gradient = mirror_distance(pair, images=(0, 1) if strict else (0, 1, 2))
+    near = NEAR - distance, -gradient
+    if not strict or pair.fronts is None:
+        return near
+    images = []
+    for number, like in enumerate(mirror_likeness(pair)):
+        distance, gradient = mirror_distance(pair, images=(number,))
+        images.append(_smaller((NEAR - distance, -gradient), (like - LOOK, pair.zeros())))
+    return _where(pair.fronts, _larger_of(*images), near)
 
 
 def _above(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:

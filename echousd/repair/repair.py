@@ -243,8 +243,9 @@ def repair_boxes(
     end = stacked(found.size, found.position, problem.carrier, None, fixed)
     ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
-    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre))
-    margin, _ = relation_margins(found.size, end, turn, triplets, rules=rules, centre=centre)
+    headed = torch.from_numpy(problem.fronts)
+    verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
+    margin, _ = relation_margins(found.size, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts)
     hit, beyond = collisions(problem, found.size, end, turn), outside(problem, found.size, end, turn)
     failures = (
         set(np.flatnonzero(verdict.numpy() == 0).tolist()),

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 
 from echomodel.boxes import Boxes
-from echomodel.rules import margins, verdicts
+from echomodel.rules import fronts, margins, verdicts
 from echousd.graph import SceneGraph
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import pair_indices, separation
@@ -56,8 +56,9 @@ def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict")
     if not graph.relations:
         return ()
     triplets, centre = graph_batch(graph).triplets, floor_centre(graph)[[0, 2]]
-    state = verdicts(boxes, triplets, rules=rules, center=centre).tolist()
-    margin = margins(boxes, triplets, rules=rules, center=centre).tolist()
+    headed = fronts(node.category for node in graph.nodes)
+    state = verdicts(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
+    margin = margins(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
     return tuple(
         Verdict(r.subject, r.predicate, r.object, STATES[s], None if s < 0 else m)
         for r, s, m in zip(graph.relations, state, margin, strict=True)

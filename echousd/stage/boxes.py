@@ -24,7 +24,7 @@ def relations_from_boxes(graph: SceneGraph, *, rules: str = "strict", per_object
     from echomodel.rules import label_relations
 
     boxes = room_boxes(graph)
-    found = label_relations(boxes, rules=rules)
+    found = label_relations(boxes, rules=rules, headings=True)
     if per_object is not None:
         from echomodel.rules.telling import told_of_room
 

@@ -56,7 +56,7 @@ def graph_of(room: RoomBoxes, rules: str | None = "strict") -> SceneGraph:
     )
     edges = room.relations
     if edges is None and rules is not None:
-        edges = label_relations(room, rules=rules)
+        edges = label_relations(room, rules=rules, headings=True)
     spelled = {predicate.id: predicate.name for predicate in words.predicates}
     relations = tuple(Relation(names[s], spelled[p], names[o]) for s, p, o in ([] if edges is None else edges.tolist()))
     polygon = tuple((float(x), float(z)) for x, z in room.floor_polygon) or None

@@ -35,6 +35,7 @@ class Category:
         density: mass over the volume of the whole box, kg/m³ (furniture is mostly hollow).
         ade20k: its name among the 150 classes of ADE20K.
         colour: of its boxes in pictures of graphs, `#rrggbb`.
+        front: one side of it is its front; what has none may stand at any heading.
         wall: it stands with its back to a wall (in at least four of five real rooms).
         carries: a lamp, a television or a plant may stand on its top.
         hangs: it may also hang on a wall.
@@ -56,6 +57,7 @@ class Category:
     density: float
     ade20k: str
     colour: str = "#eeeeee"
+    front: bool = True
     wall: bool = False
     carries: bool = False
     hangs: bool = False

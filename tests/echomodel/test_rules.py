@@ -1,5 +1,6 @@
 """Rules: the published measurements number by number, the strict ones against slow twins, and labelling."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,8 +11,9 @@ from safetensors.torch import load_file
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
+from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rules import label_relations, label_rooms, margins, measured, rule_set, verdicts
+from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
 from echomodel.vocabulary import vocabulary
 
@@ -117,6 +119,19 @@ def test_strict_rules_say_what_the_words_say():
     assert verdicts(boxes, triplets).tolist() == list(told.values())
     margin = margins(boxes, triplets)
     assert [(m >= 0) == (v != 0) for m, v in zip(margin.tolist(), told.values(), strict=True)] == [True] * len(told)
+
+
+def test_symmetry_of_what_has_a_front_includes_its_heading():
+    boxes = boxes_of(np.ones((4, 3)), [[0, 0, 1.5], [0, 0, -1.5], [0, 0, -1.5], [0, 0, -1.5]])
+    boxes = Boxes(boxes.size, boxes.position, torch.tensor([0.0, math.pi / 2, math.pi, math.pi - 0.4]))
+    triplets = torch.tensor([[0, 12, 1], [0, 12, 2], [0, 12, 3], [0, 12, 0]])[:3]
+    beds, tables = fronts(["single_bed"] * 4), fronts(["side_table", "bed", "Teppich", "stool"])
+    assert beds.tolist() == [True] * 4
+    assert tables.tolist() == [False, True, False, False]
+    assert verdicts(boxes, triplets).tolist() == [1, 1, 1]  # places alone
+    assert verdicts(boxes, triplets, fronts=tables).tolist() == [1, 1, 1]
+    assert verdicts(boxes, triplets, fronts=beds).tolist() == [0, 1, 1]  # at right angles; mirrored; 23 degrees off
+    assert verdicts(boxes, triplets, fronts=beds, rules="sgfront").tolist() == [1, 1, 1]
 
 
 def test_symmetry_is_about_the_axes_of_the_rooms_centre():

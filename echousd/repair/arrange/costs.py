@@ -175,5 +175,8 @@ def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarr
     rows = np.broadcast_to(told, (count, len(told), 3)).copy()
     own = np.broadcast_to((told == i) & [True, False, True], rows.shape)
     rows[own] = np.broadcast_to(n + np.arange(count)[:, None, None], rows.shape)[own]
-    margin, _ = pair_margins(size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre)
+    fronts = np.append(setting.fronts, np.repeat(setting.fronts[i], count))
+    margin, _ = pair_margins(
+        size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre, fronts=fronts
+    )
     return np.maximum(SLACK - margin.reshape(count, -1), 0.0)

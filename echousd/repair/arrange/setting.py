@@ -102,6 +102,11 @@ class Setting:
         return np.array(counts) > 1
 
     @cached_property
+    def fronts(self) -> np.ndarray:
+        """(n,) bool, which of the boxes have a front."""
+        return np.array([kind.front for kind in self.kinds], bool)
+
+    @cached_property
     def movable(self) -> np.ndarray:
         """(n,) bool, seats that are moved aside to open something."""
         return np.array([kind.role == "seat" and not kind.access for kind in self.kinds])

@@ -66,15 +66,17 @@ def relation_scores(
     rules: str = "strict",
     scene: Tensor | None = None,
     center: Tensor | None = None,
+    fronts: Tensor | None = None,
     subset: Tensor | None = None,
 ) -> RelationScores:
     """Count the kept relations of any number of scenes.
 
     Arguments:
-        boxes, triplets, rules, scene, center: as for `echomodel.rules.verdicts`; boxes from any source.
+        boxes, triplets, rules, scene, center, fronts: as for `echomodel.rules.verdicts`; boxes from any source. Without
+            `fronts` `symmetrical_to` goes by places alone, as the published table does.
         subset: (E,) bool, the triplets to count; default all.
     """
-    verdict = verdicts(boxes, triplets, rules=rules, scene=scene, center=center)
+    verdict = verdicts(boxes, triplets, rules=rules, scene=scene, center=center, fronts=fronts)
     counted = verdict >= 0
     if subset is not None:
         counted &= subset

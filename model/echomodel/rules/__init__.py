@@ -1,7 +1,7 @@
 """Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for repair and guidance."""
 
 from echomodel.rules.labels import label_relations, label_rooms
-from echomodel.rules.margins import margins, measured, verdicts
+from echomodel.rules.margins import fronts, margins, measured, verdicts
 from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, rule, rule_set
 from echomodel.rules.turned import aligned, centred, facing, opposite  # registers them
 
@@ -12,6 +12,7 @@ __all__ = [
     "aligned",
     "centred",
     "facing",
+    "fronts",
     "label_relations",
     "label_rooms",
     "margins",

@@ -31,6 +31,8 @@ class PairGeometry:
         size_s, size_o: (P, 3) float, extents along x, y, z at yaw 0, metres.
         position_s, position_o: (P, 3) float, centre of the bottom face relative to the room's centre, metres.
         yaw_s, yaw_o: (P,) float, radians about +Y.
+        fronts: (P,) bool, pairs in which both have a front, so that their headings count where a rule asks for them;
+            None = in none.
         oriented: False reproduces the published measurements: yaw ignored, x and z extents swapped (SPEC 13.1).
     """
 
@@ -41,6 +43,7 @@ class PairGeometry:
     yaw_s: Tensor
     yaw_o: Tensor
     oriented: bool = True
+    fronts: Tensor | None = None
 
     @cached_property
     def offset(self) -> Tensor:
@@ -118,14 +121,33 @@ class PairGeometry:
     def mirror_distance(self, *, point: bool) -> Tensor:
         """(P,) smallest distance of the object to a mirror image of the subject in plan: about the room's x axis, its
         z axis, and (`point`) its centre, metres."""
-        images = [[-1.0, 1.0], [1.0, -1.0]] + ([[-1.0, -1.0]] if point else [])
-        signs = torch.tensor(images, dtype=self.position_s.dtype, device=self.position_s.device)
+        return self.mirror_distances[:, : 3 if point else 2].amin(-1)
+
+    @cached_property
+    def mirror_distances(self) -> Tensor:
+        """(P, 3) distances of the object to the subject's mirror images about x axis, z axis and centre, metres."""
+        plan = [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
+        signs = torch.tensor(plan, dtype=self.position_s.dtype, device=self.position_s.device)
         mirrored = self.position_s[:, None, [0, 2]] * signs
-        squared = (mirrored - self.position_o[:, None, [0, 2]]).square().sum(-1).amin(-1)
-        return squared.clamp_min(TINY).sqrt()
+        return (mirrored - self.position_o[:, None, [0, 2]]).square().sum(-1).clamp_min(TINY).sqrt()
+
+    @cached_property
+    def mirror_likeness(self) -> Tensor:
+        """(P, 2) cosine between the object's front and that of the subject's images with x and with z mirrored."""
+        across = self.yaw_s.sin() * self.yaw_o.sin()
+        along = self.yaw_s.cos() * self.yaw_o.cos()
+        return torch.stack([along - across, across - along], -1)
 
 
-def pairs(boxes: BoxesLike, subject: Tensor, object_: Tensor, centre: Tensor, *, oriented: bool) -> PairGeometry:
+def pairs(
+    boxes: BoxesLike,
+    subject: Tensor,
+    object_: Tensor,
+    centre: Tensor,
+    *,
+    oriented: bool,
+    fronts: Tensor | None = None,
+) -> PairGeometry:
     """The geometry of the pairs (subject[i], object_[i]).
 
     Arguments:
@@ -133,11 +155,13 @@ def pairs(boxes: BoxesLike, subject: Tensor, object_: Tensor, centre: Tensor, *,
         subject, object_: (P,) int64 indices of nodes.
         centre: (N, 3) float, centre of each node's room.
         oriented: see `PairGeometry`.
+        fronts: (N,) bool, boxes that have a front; None = none.
     """
     position = boxes.position - centre
     return PairGeometry(
         boxes.size[subject], boxes.size[object_], position[subject], position[object_],
         boxes.yaw[subject], boxes.yaw[object_], oriented,
+        None if fronts is None else fronts[subject] & fronts[object_],
     )  # fmt: skip
 
 

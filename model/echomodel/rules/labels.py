@@ -10,7 +10,7 @@ import torch
 
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import pairs
-from echomodel.rules.margins import _Tensors
+from echomodel.rules.margins import _Tensors, fronts
 from echomodel.rules.sets import RuleSet, rule_set
 from echomodel.vocabulary import UnknownWord, vocabulary
 
@@ -19,7 +19,12 @@ SLACK = 3e-4
 
 
 def label_relations(
-    room: RoomBoxes, *, rules: str = "strict", drop: float = 0.0, rng: np.random.Generator | None = None
+    room: RoomBoxes,
+    *,
+    rules: str = "strict",
+    drop: float = 0.0,
+    rng: np.random.Generator | None = None,
+    headings: bool = False,
 ) -> np.ndarray:
     """All relations that hold in a room, less a random share.
 
@@ -28,6 +33,7 @@ def label_relations(
         rules: `strict` or `sgfront`.
         drop: probability with which each directed edge is left out (SG-FRONT itself shows about half of them).
         rng: source of the dropping; needed where drop > 0.
+        headings: `symmetrical_to` asks how furniture with a front is turned, too (rooms to learn from go by places).
 
     Returns:
         (E, 3) int64 [subject, predicate id, object], sorted by subject, object, predicate.
@@ -35,11 +41,16 @@ def label_relations(
     Raises:
         ValueError: unknown rules, a drop outside 0..1, or drop > 0 without rng.
     """
-    return label_rooms([room], rules=rules, drop=drop, rng=rng)[0]
+    return label_rooms([room], rules=rules, drop=drop, rng=rng, headings=headings)[0]
 
 
 def label_rooms(
-    rooms: Sequence[RoomBoxes], *, rules: str = "strict", drop: float = 0.0, rng: np.random.Generator | None = None
+    rooms: Sequence[RoomBoxes],
+    *,
+    rules: str = "strict",
+    drop: float = 0.0,
+    rng: np.random.Generator | None = None,
+    headings: bool = False,
 ) -> list[np.ndarray]:
     """`label_relations` for many rooms in one pass (same result, less overhead per room)."""
     chosen = rule_set(rules)
@@ -48,7 +59,7 @@ def label_rooms(
     if drop > 0.0 and rng is None:
         raise ValueError("drop > 0 needs rng, a numpy random generator")
     starts = np.concatenate([[0], np.cumsum([len(room) for room in rooms])])
-    found = _label(rooms, starts, chosen)
+    found = _label(rooms, starts, chosen, headings)
     owner = np.searchsorted(starts, found[:, 0], side="right") - 1
     found -= np.stack([starts[owner], np.zeros_like(owner), starts[owner]], -1)
     out = []
@@ -60,13 +71,16 @@ def label_rooms(
     return out
 
 
-def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet) -> np.ndarray:
+def _label(rooms: Sequence[RoomBoxes], starts: np.ndarray, rules: RuleSet, headings: bool) -> np.ndarray:
     subject, object_ = _ordered_pairs(starts)
     if not len(subject):
         return np.zeros((0, 3), np.int64)
     boxes = _Tensors(_Joined(rooms), torch.float64)
     centre = torch.from_numpy(np.concatenate([_centres(room) for room in rooms]))
-    pair = pairs(boxes, torch.from_numpy(subject), torch.from_numpy(object_), centre, oriented=rules.oriented)
+    headed = fronts(word for room in rooms for word in room.categories) if headings else None
+    pair = pairs(
+        boxes, torch.from_numpy(subject), torch.from_numpy(object_), centre, oriented=rules.oriented, fronts=headed
+    )
     same_category, same = _likeness(rooms, subject, object_)
     columns = {predicate: rule(pair).numpy() >= SLACK for predicate, rule in rules.labels.items()}
     for predicate in rules.same_category & columns.keys():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable
 
 import torch
 from torch import Tensor
 
 from echomodel.rules.geometry import BoxesLike, pairs
 from echomodel.rules.sets import RuleSet, rule_set
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import UnknownWord, vocabulary
 
 
 class _Tensors:
@@ -41,6 +42,7 @@ def margins(
     rules: str = "strict",
     scene: Tensor | None = None,
     center: Tensor | None = None,
+    fronts: Tensor | None = None,
     rigid: bool = False,
 ) -> Tensor:
     """Signed margin of every relation, >= 0 iff it is satisfied; differentiable in size, position and yaw.
@@ -51,13 +53,20 @@ def margins(
         rules: `strict` or `sgfront`.
         scene: (N,) int64, scene of each node; needed where `center` holds several rows.
         center: (2,) or (S, 2) float, x and z of the rooms' centres; default the origin. Only `symmetrical_to` asks.
+        fronts: (N,) bool, boxes that have a front (`echomodel.rules.fronts`), whose headings `symmetrical_to` measures
+            in the set `strict`, too; None = none.
         rigid: relations of place have no gradient in the sizes: furniture moves aside, it does not shrink.
 
     Returns:
         (E,) float, in metres (sides, close by, standing on, above, symmetrical to) or as a ratio (sizes, overlap);
         0 where the rules do not measure the predicate. Never NaN or infinite for finite boxes.
     """
-    return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center, rigid)
+    return _margins(_Tensors(boxes), triplets, rule_set(rules), scene, center, fronts, rigid)
+
+
+def fronts(categories: Iterable[str]) -> Tensor:
+    """(N,) bool, which of the categories have a front; words that the vocabulary does not hold have none."""
+    return torch.tensor([_has_front(word) for word in categories], dtype=torch.bool)
 
 
 def verdicts(
@@ -67,12 +76,13 @@ def verdicts(
     rules: str = "strict",
     scene: Tensor | None = None,
     center: Tensor | None = None,
+    fronts: Tensor | None = None,
 ) -> Tensor:
     """Hard verdict of every relation: (E,) int8, 1 kept, 0 broken, -1 not measured. Arguments as for `margins`."""
     chosen = rule_set(rules)
     triplets = torch.as_tensor(triplets)
     with torch.no_grad():
-        margin = _margins(_Tensors(boxes, torch.float64), triplets, chosen, scene, center)
+        margin = _margins(_Tensors(boxes, torch.float64), triplets, chosen, scene, center, fronts)
     predicate = triplets[:, 1]
     kept = torch.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     unmeasured = torch.full_like(kept, -1, dtype=torch.int8)
@@ -85,11 +95,13 @@ def _margins(
     rules: RuleSet,
     scene: Tensor | None,
     center: Tensor | None,
+    fronts: Tensor | None,
     rigid: bool = False,
 ) -> Tensor:
     triplets = torch.as_tensor(triplets, device=boxes.size.device)
     centre = node_centres(boxes.position, scene, center)
     out = boxes.size.new_zeros(len(triplets))
+    headed = None if fronts is None else torch.as_tensor(fronts, device=boxes.size.device)
     placed = boxes.of_fixed_size() if rigid else boxes
     sizes = {entry.id for entry in vocabulary().predicates if entry.measures == "size"}  # all others are of place
     for predicate, rule in rules.margins.items():
@@ -97,7 +109,7 @@ def _margins(
         if len(chosen):
             subject, object_ = triplets[chosen, 0], triplets[chosen, 2]
             of = boxes if predicate in sizes else placed
-            pair = pairs(of, subject, object_, centre, oriented=rules.oriented)
+            pair = pairs(of, subject, object_, centre, oriented=rules.oriented, fronts=headed)
             out = out.index_copy(0, chosen, rule(pair))
     return out
 
@@ -113,6 +125,13 @@ def node_centres(position: Tensor, scene: Tensor | None, center: Tensor | None) 
             plan = plan[0] if scene is None else plan[torch.as_tensor(scene)]
         out[:, [0, 2]] = plan.expand(len(position), 2)
     return out
+
+
+def _has_front(word: str) -> bool:
+    try:
+        return vocabulary().category(word).front
+    except UnknownWord:
+        return False
 
 
 def _among(predicate: Tensor, ids: frozenset[int]) -> Tensor:

@@ -5,6 +5,7 @@ A rule is registered here or with `@rule("name")` in a module that `echomodel.ru
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,6 +23,7 @@ VOLUME = 0.15  # relative difference of volume for bigger and smaller
 HEIGHT = 0.1  # relative difference of the tops for taller and shorter
 TOUCH = 0.04  # metres of vertical play for standing on
 NEAR = 0.45  # metres for close by and symmetrical to
+LOOK = math.cos(math.radians(30.0))  # of the angle between two ways that are the same
 
 
 @dataclass(frozen=True)
@@ -147,7 +149,12 @@ def _above(pair: PairGeometry) -> Tensor:
 
 
 def _symmetrical(pair: PairGeometry) -> Tensor:
-    return NEAR - pair.mirror_distance(point=False)
+    """One image of the subject is near the object and, where both have a front, looks the way that the object looks."""
+    if pair.fronts is None:
+        return NEAR - pair.mirror_distance(point=False)
+    near = NEAR - pair.mirror_distances[:, :2]
+    alike = torch.where(pair.fronts[:, None], pair.mirror_likeness - LOOK, near)
+    return torch.minimum(near, alike).amax(-1)
 
 
 def _named(margins: Mapping[str, Margin], *, open_: Collection[str] = ()) -> dict[str, Rule]:

@@ -5,15 +5,12 @@ They are measured, repaired and guided to, but rooms are not labelled with them,
 
 from __future__ import annotations
 
-import math
-
 import torch
 from torch import Tensor
 
 from echomodel.rules.geometry import TINY, PairGeometry
-from echomodel.rules.sets import rule
+from echomodel.rules.sets import LOOK, rule
 
-LOOK = math.cos(math.radians(30.0))  # of the angle between a front and what it faces
 LINE = 0.1  # metres beside the line
 
 

@@ -186,17 +186,22 @@ def test_noisy_rooms_get_their_relations_back() -> None:
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
 @pytest.mark.parametrize("square", [False, True])
-def test_margins_and_gradients_are_those_of_the_rules(rules: str, square: bool) -> None:
+@pytest.mark.parametrize("headed", [False, True])
+def test_margins_and_gradients_are_those_of_the_rules(rules: str, square: bool, headed: bool) -> None:
     rng = np.random.default_rng(1)
     n = 6
     size, position = rng.uniform(0.4, 1.2, (n, 3)), rng.normal(0, 0.6, (n, 3)) * (1, 0.4, 1)
     yaw = rng.integers(-1, 3, n) * np.pi / 2 if square else rng.uniform(-3, 3, n)
     triplets = np.array([(i, p, j) for i in range(n) for j in range(n) if i != j for p in range(16)])
-    value, gradient = relation_margins(size, position, yaw, triplets, rules=rules, centre=np.array([0.2, -0.1]))
+    fronts = np.arange(n) < (4 if headed else 0)
+    value, gradient = relation_margins(
+        size, position, yaw, triplets, rules=rules, centre=np.array([0.2, -0.1]), fronts=fronts
+    )
     tensors = [torch.tensor(v, requires_grad=True) for v in (size, position)]
     plain = margins(
-        Boxes(*tensors, torch.as_tensor(yaw)), torch.as_tensor(triplets), rules=rules, center=torch.tensor([0.2, -0.1])
-    )
+        Boxes(*tensors, torch.as_tensor(yaw)), torch.as_tensor(triplets), rules=rules,
+        center=torch.tensor([0.2, -0.1]), fronts=torch.as_tensor(fronts),
+    )  # fmt: skip
     # The rules enlarge one of two footprints by 7.3 micrometres, the closed form by less.
     np.testing.assert_allclose(value, plain.detach().numpy(), rtol=1e-6, atol=5e-5)
     assert len({int(p) for p in triplets[np.abs(gradient).sum((1, 2)) > 0, 1]}) >= 11  # every rule has a slope
@@ -268,3 +273,18 @@ def test_who_may_reach_into_whom():
         (("ottoman", "l_shaped_sofa"), 0.5),
     ):
         assert allowed_overlap(words, size, pairs) == pytest.approx(share * 0.4)
+
+
+def test_two_beds_that_mirror_each_other_are_turned_alike() -> None:
+    graph = SceneGraph(
+        RoomSpec("bedroom", size=(4.4, 4.4), height=2.7),
+        (Node("a", "single_bed"), Node("b", "single_bed")),
+        (Relation("a", "symmetrical_to", "b"),),
+    )
+    place = [(-1.1, 0, -1.2), (-1.1, 0, 1.2)]
+    done = repair(graph, boxes([(1.0, 0.5, 2.0)] * 2, place, [np.pi / 2, 0.0]))
+    assert not done.broken
+    turn = done.boxes.yaw.numpy()
+    images = (-turn[0], np.pi - turn[0])
+    alike = [abs(np.exp(1j * turn[1]) - np.exp(1j * image)) for image in images]
+    assert min(alike) < 0.3
