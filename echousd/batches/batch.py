@@ -20,6 +20,7 @@ from echousd.room.folder import check_writable
 from echousd.room.lock import locked
 
 if TYPE_CHECKING:
+    from echousd.batches.work import Job
     from echousd.graph import SceneGraph
     from echousd.room import Room
 
@@ -126,10 +127,11 @@ def run_batch(
     with locked(place):
         _agree_on(plan, out, resume=resume or shard[1] > 1)
         valid = _valid(plan, out, shard)
+        rounds = {name: row.get("rounds", 1) for name, row in read_journals(out).items() if name in valid}
         journal = Journal(place)
         pool = executor or _executor(ray, workers, len(plan.entries), timeout, memory)
         seen = out.resolve() if ray else out  # workers elsewhere stand in another folder
-        run = Run(plan, plan.packs(shard), valid, seen, journal, max_failures=max_failures, until=until, tell=progress)
+        run = Run(plan, plan.packs(shard), valid, seen, journal, rounds, max_failures, until, progress)
         try:
             end = run.execute(pool)
         finally:
@@ -150,7 +152,7 @@ def generate_many(
     Raises ValueError for the first graph that no room can be made of.
     """
     from echomodel.loading import load_model
-    from echousd.batches.work import Job, generated, layouts
+    from echousd.batches.work import Job, layouts
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
@@ -160,11 +162,33 @@ def generate_many(
     while pack := [graph for _, graph in zip(range(PACK), waiting)]:  # noqa: B905  # the last pack is shorter
         own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
         jobs = [Job("", "", s, asked, graph.to_json()) for s, graph in zip(own, pack, strict=True)]
-        for k, (job, (text, boxes, error)) in enumerate(zip(jobs, layouts(jobs), strict=True)):
-            if error:
-                raise ValueError(f"graph {number + k}: {error}")
-            yield generated(replace(job, text=text, boxes=boxes))
+        sampled = layouts(jobs)
+        for k, found in enumerate(sampled):
+            if found.error:
+                raise ValueError(f"graph {number + k}: {found.error}")
+            jobs[k] = replace(jobs[k], text=found.text, rounds=found.rounds)
+        rooms: dict[int, Room | None] = {k: _judged(job) for k, job in enumerate(jobs)}
+        while wanting := [k for k, room in rooms.items() if room is None]:
+            for k, found in zip(wanting, layouts([jobs[k] for k in wanting]), strict=True):
+                jobs[k] = replace(jobs[k], rounds=found.rounds)
+                rooms[k] = _judged(jobs[k])
+        for k in range(len(pack)):
+            made = rooms.pop(k)
+            assert made is not None
+            yield made
         number += len(pack)
+
+
+def _judged(job: Job) -> Room | None:
+    """The room of a job, None where it wants further drafts."""
+    from echousd.batches.work import generated
+    from echousd.room.layouts import DraftsWanted
+
+    try:
+        found: Room = generated(job)
+    except DraftsWanted:
+        return None
+    return found
 
 
 def _executor(ray: str, workers: int | None, rooms: int, timeout: float | None, memory: int | None) -> Executor:

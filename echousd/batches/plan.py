@@ -19,7 +19,7 @@ from echousd.naming import as_identifier
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
-PACK = 8  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
+PACK = 32  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
 SHELF = 1000  # rooms in one folder
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from echousd.batches.plan import PACK, STORE, Entry, Plan
 
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
 FULL = "No space left on device"
+NOTHING: tuple[work.Rows, ...] = ([],)
 
 
 @dataclass
@@ -50,11 +51,28 @@ class BatchProgress:
 
 
 @dataclass
+class _Pack:
+    """Rooms whose layouts are sampled together.
+
+    Arguments:
+        round: of drafts that was sampled last.
+        open: ids of those whose drafts nobody has judged yet.
+        wanting: those that want the next round, which is sampled together, too: job, or None of a room that is there.
+    """
+
+    entries: tuple[Entry, ...]
+    round: int = 0
+    open: set[str] = field(default_factory=set)
+    wanting: dict[Entry, work.Job | None] = field(default_factory=dict)
+
+
+@dataclass
 class Run:
     """One shard of a plan on an executor.
 
     Arguments:
-        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid.
+        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid; rounds: how many
+            rounds of drafts they took.
         folder: of the run. journal: of the shard.
         max_failures: failed rooms after which the run stops, None = never. until: `time.time()` at which it does.
     """
@@ -64,11 +82,14 @@ class Run:
     skip: frozenset[str]
     folder: Path
     journal: Journal
+    rounds: dict[str, int] = field(default_factory=dict)
     max_failures: int | None = None
     until: float | None = None
     tell: Callable[[BatchProgress], None] | None = None
     stopped: str = ""
     _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
+    _more: deque[_Pack] = field(default_factory=deque)
+    _of: dict[str, _Pack] = field(default_factory=dict)
     _tries: dict[str, int] = field(default_factory=dict)
     _asked: dict[str, Any] = field(default_factory=dict)
 
@@ -78,11 +99,13 @@ class Run:
         progress = BatchProgress(sum(map(len, self.packs)), done=len(self.skip))
         waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
         layouts_out = 0
-        while waiting or self._ready or self._asked:
+        while waiting or self._ready or self._asked or self._more:
             self._check_stop(progress)
             while not self.stopped:
                 wanted = waiting and len(self._ready) + PACK * layouts_out < 2 * executor.workers
-                if wanted and executor.free(network=True):
+                if self._more and executor.free(network=True):
+                    layouts_out += self._submit_further(executor, self._more.popleft())
+                elif wanted and executor.free(network=True):
                     layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
                 elif self._ready and executor.free():
                     entry, job = self._ready.popleft()
@@ -97,6 +120,9 @@ class Run:
                     self._submit(executor, outcome.task, asked)
                 elif isinstance(asked, Entry):
                     self._ended(asked, outcome, progress)
+                elif isinstance(asked, _Pack):
+                    layouts_out -= 1
+                    self._drawn_further(asked, outcome)
                 else:
                     layouts_out -= 1
                     self._drawn(asked, outcome, progress)
@@ -125,6 +151,13 @@ class Run:
         self._submit(executor, Task(f"layouts {pack[0].number}", work.layouts, jobs, network=True), good)
         return 1
 
+    def _submit_further(self, executor: Executor, pack: _Pack) -> int:
+        gone = (NOTHING,) * (pack.round + 1)  # of a room that is there: only its next drafts are drawn again
+        jobs = [job or self._job(entry, rounds=gone) for entry, job in pack.wanting.items()]
+        key = f"round {pack.round + 1} {pack.entries[0].number}"
+        self._submit(executor, Task(key, work.layouts, jobs, network=True), pack)
+        return 1
+
     def _submit(self, executor: Executor, task: Task, asked: Any) -> None:
         self._asked[task.key] = asked
         executor.submit(task)
@@ -134,18 +167,53 @@ class Run:
         return self._tries[key] <= TRIES and not self.stopped
 
     def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: BatchProgress) -> None:
-        """Rooms whose layouts were sampled are ready; if the pack was too much for a worker, each is tried alone."""
-        alone: list[tuple[str, Any, str]] = [("", None, "")] * len(pack)
-        found = outcome.value if outcome.fate == "done" else alone
-        for entry, (text, boxes, error) in zip(pack, found, strict=True):
+        """Rooms whose first drafts were sampled are ready; if the pack was too much for a worker, each is alone."""
+        found = outcome.value if outcome.fate == "done" else [work.Sampled()] * len(pack)
+        together = _Pack(pack)
+        self._expect(together)
+        for entry, sampled in zip(pack, found, strict=True):
             if entry.id in self.skip:
                 continue
-            if error:
-                self._fail(entry, error, progress)
+            if sampled.error:
+                self._fail(entry, sampled.error, progress)
                 continue
-            self._ready.append((entry, self._job(entry, text, boxes)))
+            self._begin(together, entry, self._job(entry, sampled.text, sampled.rounds))
+
+    def _drawn_further(self, pack: _Pack, outcome: Outcome) -> None:
+        """Rooms have more drafts; if those were too much for a worker, each is made alone from the beginning."""
+        found = outcome.value if outcome.fate == "done" else [work.Sampled()] * len(pack.wanting)
+        asked = dict(pack.wanting)
+        pack.round += 1
+        self._expect(pack)
+        for (entry, job), sampled in zip(asked.items(), found, strict=True):
+            if job is not None:
+                self._begin(pack, entry, replace(job, rounds=sampled.rounds))
+
+    def _expect(self, pack: _Pack) -> None:
+        """Rooms that are there and took a later round are packed into that again."""
+        wanted = [entry for entry in pack.entries if self.rounds.get(entry.id, 0) > pack.round + 1]
+        pack.wanting = dict.fromkeys(wanted)
+
+    def _begin(self, pack: _Pack, entry: Entry, job: work.Job) -> None:
+        pack.open.add(entry.id)
+        self._of[entry.id] = pack
+        self._ready.append((entry, job))
+
+    def _judged(self, entry: Entry, job: work.Job | None) -> None:
+        """The drafts of a room will do or the room is lost (None), or it wants further ones."""
+        pack = self._of.pop(entry.id)
+        pack.open.discard(entry.id)
+        if job is not None:
+            pack.wanting[entry] = job
+        if not pack.open and any(pack.wanting.values()):
+            pack.wanting = dict(sorted(pack.wanting.items(), key=lambda item: item[0].number))
+            self._more.append(pack)
 
     def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
+        wants = outcome.fate == "done" and not outcome.value
+        self._judged(entry, outcome.task.given if wants else None)
+        if wants:
+            return
         if outcome.fate != "done":
             if FULL in outcome.error:
                 self.stopped = f"{self.folder}: {FULL.lower()}; make room and go on with --resume"
@@ -170,7 +238,7 @@ class Run:
             return False
         return True
 
-    def _job(self, entry: Entry, text: str = "", boxes: Any = None) -> work.Job:
+    def _job(self, entry: Entry, text: str = "", rounds: tuple[tuple[work.Rows, ...], ...] = ()) -> work.Job:
         options = self.plan.options[entry.options]
         return work.Job(
             entry.id,
@@ -179,6 +247,6 @@ class Run:
             options,
             text or self.plan.graphs.get(entry.graph, ""),
             entry.draw,
-            boxes,
+            rounds,
             "" if options.self_contained else str(self.folder / STORE),
         )

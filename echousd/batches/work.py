@@ -13,6 +13,8 @@ from typing import Any
 from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
 from echousd.batches.sources import sampled_graph
+from echousd.graph import SceneGraph
+from echousd.room.layouts import DraftsWanted, Drawn, most_drafts
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
 
@@ -24,7 +26,7 @@ class Job:
     Arguments:
         id: its name; folder: where it goes; store: where its assets go, "" = into the folder.
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
-        seed, options: as in the plan. boxes: of its first layout, or None to sample them alone.
+        seed, options: as in the plan. rounds: drafts of its first layout, round by round; none = sampled alone.
     """
 
     id: str
@@ -33,46 +35,59 @@ class Job:
     options: BatchOptions
     text: str = ""
     draw: tuple[str, int, int] | None = None
-    boxes: Rows | None = None
+    rounds: tuple[tuple[Rows, ...], ...] = ()
     store: str = ""
 
 
-def layouts(jobs: list[Job]) -> list[tuple[str, Rows | None, str]]:
-    """Text of the graph, boxes and error of every room of a pack; a room with an error has no boxes.
+@dataclass(frozen=True)
+class Sampled:
+    """What the network made of a job: text of its graph and its drafts, or an error."""
+
+    text: str = ""
+    rounds: tuple[tuple[Rows, ...], ...] = ()
+    error: str = ""
+
+
+def layouts(jobs: list[Job]) -> list[Sampled]:
+    """The next round of drafts of a pack of rooms, which all had as many rounds.
 
     A graph that the network refuses does not cost the others theirs: all are sampled alone then.
     """
     from echomodel.loading import load_model
-    from echousd.room.packed import sample_many
+    from echousd.room.packed import sample_round
 
-    graphs: dict[int, Any] = {}
-    errors: dict[int, str] = {}
+    graphs: dict[int, SceneGraph] = {}
+    out = [Sampled() for _ in jobs]
     for i, job in enumerate(jobs):
         try:
             graphs[i] = _checked(job)
         except ValueError as error:
-            errors[i] = str(error)
-    rows: dict[int, Rows] = {}
+            out[i] = Sampled(error=str(error))
+
+    def sample(model: Any, rows: list[int], steps: int | None) -> None:
+        chosen, seeds = [graphs[i] for i in rows], [jobs[i].seed for i in rows]
+        most = [jobs[i].options.drafts or most_drafts(model, len(graphs[i].nodes)) for i in rows]
+        found = sample_round(model, chosen, seeds, most, number=len(jobs[rows[0]].rounds), steps=steps)
+        for i, drafts in zip(rows, found, strict=True):
+            out[i] = Sampled(graphs[i].to_json(), (*jobs[i].rounds, tuple(map(_rows, drafts))))
+
     asked = {i: (jobs[i].options.weights, jobs[i].options.preset, jobs[i].options.steps) for i in graphs}
     for weights, preset, steps in dict.fromkeys(asked.values()):
         same = [i for i in graphs if asked[i] == (weights, preset, steps)]
         model = load_model(weights or None, preset)
         try:
-            found = sample_many(model, [graphs[i] for i in same], [jobs[i].seed for i in same], steps=steps)
-            rows |= {i: _rows(boxes) for i, boxes in zip(same, found, strict=True)}
+            sample(model, same, steps)
         except ValueError:
             for i in same:
                 try:
-                    (boxes,) = sample_many(model, [graphs[i]], [jobs[i].seed], steps=steps)
-                    rows[i] = _rows(boxes)
+                    sample(model, [i], steps)
                 except ValueError as error:
-                    errors[i] = str(error)
-    texts = [graphs[i].to_json() if i in graphs else "" for i in range(len(jobs))]
-    return [(texts[i], rows.get(i), errors.get(i, "")) for i in range(len(jobs))]
+                    out[i] = Sampled(error=str(error))
+    return out
 
 
 def room(job: Job) -> dict[str, Any]:
-    """Make, save and judge one room, and return its row of the manifest.
+    """Make, save and judge one room, and return its row of the manifest; {} if it wants another round of drafts first.
 
     Raises ValueError as `generate` and `Room.save` do.
     """
@@ -80,25 +95,23 @@ def room(job: Job) -> dict[str, Any]:
     folder = Path(job.folder)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        made = generated(job)
+        try:
+            made = generated(job)
+        except DraftsWanted:
+            return {}
         root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
-    facts = _facts(made, root)
+    facts = {**_facts(made, root), "rounds": max(1, len(job.rounds))}
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
     facts["seconds"] = round(time.perf_counter() - started, 3)
     return facts
 
 
 def generated(job: Job) -> Any:
-    """The room (`Room`) of a job."""
-    import torch
-
-    from echomodel.boxes import Boxes
+    """The room (`Room`) of a job; raises DraftsWanted where it has drafts and none of them is good enough."""
     from echousd.room.pipeline import generate
 
-    drawn = None
-    if job.boxes is not None:
-        numbers = torch.tensor(job.boxes, dtype=torch.float32)
-        drawn = Boxes(numbers[:, :3].contiguous(), numbers[:, 3:6].contiguous(), numbers[:, 6].contiguous())
+    drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
+    drawn = Drawn(drafts, elsewhere=True) if drafts else None
     asked = job.options
     return generate(
         _checked(job), seed=job.seed, shapes=asked.shapes, model=asked.weights or None, preset=asked.preset,
@@ -109,7 +122,6 @@ def generated(job: Job) -> Any:
 
 def _checked(job: Job) -> Any:
     """The graph, if a room can be made of it; raises ValueError."""
-    from echousd.graph import SceneGraph
     from echousd.graph.doors import check_doors
     from echousd.graph.floors import check_space
     from echousd.room.layouts import check_objects
@@ -130,6 +142,15 @@ def _rows(boxes: Any) -> Rows:
     """float32 as the nearest Python floats, which give the same float32 again."""
     fields = (boxes.size.tolist(), boxes.position.tolist(), boxes.yaw.tolist())
     return [[*size, *position, yaw] for size, position, yaw in zip(*fields, strict=True)]
+
+
+def _boxes(rows: Rows) -> Any:
+    import torch
+
+    from echomodel.boxes import Boxes
+
+    numbers = torch.tensor(rows, dtype=torch.float32)
+    return Boxes(numbers[:, :3].contiguous(), numbers[:, 3:6].contiguous(), numbers[:, 6].contiguous())
 
 
 def _facts(made: Any, root: Path) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,23 @@ def check_objects(graph: SceneGraph, file: str = "") -> None:
 def usual_drafts(objects: int) -> int:
     """Layouts that are drawn where nobody says how many: fewer for very many objects, which take long enough."""
     return max(1, min(DRAFTS, CROWD // max(objects, 1)))
+
+
+class DraftsWanted(Exception):  # no error: the caller draws them and asks again
+    """What was drawn leaves something to be wished for, and further ones are drawn elsewhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Drafts of the first layout that were sampled already (`echousd.room.packed`).
+
+    Arguments:
+        rounds: the first draft alone, then those of the following rounds (`draft_rounds`) that were wanted.
+        elsewhere: raise `DraftsWanted` in place of drawing further ones.
+    """
+
+    rounds: tuple[tuple[Boxes, ...], ...]
+    elsewhere: bool = False
 
 
 def sample_boxes(
@@ -90,7 +108,7 @@ def best_boxes(
     drafts: int = 1,
     repair: bool = True,
     sized: Boxes | None = None,
-    drawn: Boxes | None = None,
+    drawn: Drawn | None = None,
     steps: int | None = None,
     change: GraphEdit | None = None,
     timer: StageTimer,
@@ -101,20 +119,19 @@ def best_boxes(
 
     Arguments:
         drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
-        drawn: the first draft, where it was sampled already.
+        drawn: drafts that were sampled already.
         others: as `sample_boxes` and `finished_boxes`.
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    for start, count in _rounds(drafts):
+    for at, (start, count) in enumerate(draft_rounds(drafts)):
         if best is not None and not any(worth):
             break
-        for draft in (
-            [drawn]
-            if drawn is not None and not start
-            else sample_boxes(
-                model, graph, seed=seed, number=number + start, count=count, steps=steps, change=change, timer=timer
-            )
+        given = drawn.rounds[at] if drawn is not None and at < len(drawn.rounds) else ()
+        if not given and drawn is not None and drawn.elsewhere:
+            raise DraftsWanted
+        for draft in given or sample_boxes(
+            model, graph, seed=seed, number=number + start, count=count, steps=steps, change=change, timer=timer
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
@@ -150,7 +167,7 @@ def most_drafts(model: RoomModel, objects: int) -> int:
     return usual_drafts(objects) if model.preset == "compact" else 1
 
 
-def _rounds(drafts: int) -> list[tuple[int, int]]:
+def draft_rounds(drafts: int) -> list[tuple[int, int]]:
     """What is added to the number of the draws, and how many are drawn at once, until all drafts are drawn."""
     out, left = [(0, 1)], drafts - 1
     for count in (*ROUNDS, drafts):

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import torch
-
 from echomodel.boxes import Boxes
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.randomness import SceneGenerators
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_floor
-from echousd.room.layouts import sample_boxes
+from echousd.room.layouts import draft_rounds, sample_boxes
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.tensors import floor_centre, graph_batch, seeded
@@ -21,7 +19,7 @@ from echousd.room.tensors import floor_centre, graph_batch, seeded
 if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
-NODES = 256  # of one pass of the network: larger products, bounded memory
+NODES = 512  # of one pass of the network: larger products, bounded memory
 
 
 def sample_many(
@@ -36,23 +34,52 @@ def sample_many(
         model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
         graphs, seeds: as many of each. steps: sampling steps, None for the model's own.
     """
-    found: dict[int, Boxes] = {}
+    return [boxes for (boxes,) in sample_round(model, graphs, seeds, [1] * len(graphs), steps=steps)]
+
+
+def sample_round(
+    model: RoomModel,
+    graphs: Sequence[SceneGraph],
+    seeds: Sequence[int],
+    drafts: Sequence[int],
+    *,
+    number: int = 0,
+    steps: int | None = None,
+) -> list[tuple[Boxes, ...]]:
+    """The drafts of one round (`draft_rounds`) of the first layout of every graph; arguments as for `sample_many`.
+
+    Arguments:
+        drafts: how many each graph gets at most in all rounds. number: of the round, 0 = the first draft.
+    """
+    starts, counts = zip(*(draft_rounds(most)[number] for most in drafts), strict=True)
+    start = starts[0]
+    found: dict[int, tuple[Boxes, ...]] = {}
     with_floors = [with_floor(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
     together = [i for i, graph in enumerate(with_floors) if isinstance(model, EchoModel) and not _given(graph)]
-    for pack in packs(together, [len(graph.nodes) for graph in with_floors]):
-        batches = [graph_batch(with_floors[i]) for i in pack]
-        generator = SceneGenerators([seeded(seeds[i], "layout") for i in pack], [b.num_nodes for b in batches])
+    for pack in packs(together, [len(graph.nodes) * n for graph, n in zip(with_floors, counts, strict=True)]):
+        owners = [i for i in pack for _ in range(counts[i])]
+        batches = {i: graph_batch(with_floors[i]) for i in pack}
+        generators = {i: seeded(seeds[i], "layout", start) for i in pack}  # one draws all drafts of its scene
+        rows = [batches[i].num_nodes for i in owners]
         with one_thread():
             assert isinstance(model, EchoModel)
-            drawn = model.sample_layout(GraphBatch.pack(batches), generator=generator, steps=steps)
-        rows = torch.tensor([batch.num_nodes for batch in batches]).tolist()
+            drawn = model.sample_layout(
+                GraphBatch.pack([batches[i] for i in owners]),
+                generator=SceneGenerators([generators[i] for i in owners], rows),
+                steps=steps,
+            )
         fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
-        for i, size, position, yaw in zip(pack, *fields, strict=True):
+        for i, size, position, yaw in zip(owners, *fields, strict=True):
             graph = with_floors[i]
-            found[i] = rounded_boxes(graph, Boxes(size, position + floor_centre(graph), yaw))
+            boxes = rounded_boxes(graph, Boxes(size, position + floor_centre(graph), yaw))
+            found[i] = (*found.get(i, ()), boxes)
     for i, graph in enumerate(with_floors):
         if i not in found:
-            (found[i],) = sample_boxes(model, graph, seed=seeds[i], number=0, steps=steps, timer=StageTimer())
+            found[i] = tuple(
+                sample_boxes(
+                    model, graph, seed=seeds[i], number=start, count=counts[i], steps=steps, timer=StageTimer()
+                )
+            )
     return [found[i] for i in range(len(graphs))]
 
 

@@ -17,6 +17,7 @@ from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
 from echousd.room.layouts import (
+    Drawn,
     best_boxes,
     check_drafts,
     check_objects,
@@ -60,7 +61,7 @@ def generate(
     faces: int = FACES,
     options: RoomOptions | None = None,
     progress: StageListener | None = None,
-    drawn: Boxes | None = None,
+    drawn: Drawn | None = None,
     assets: AssetWishes | str | Path | None = None,
 ) -> Room:
     """Make a room from a scene graph.
@@ -89,7 +90,7 @@ def generate(
         faces: face budget of each mesh.
         options: how the room is written.
         progress: called with (stage, done, total).
-        drawn: the first draft of the first layout, where it was sampled already (`echousd.room.packed`).
+        drawn: drafts of the first layout that were sampled already (`echousd.room.packed`).
         assets: index of a library (`echousd assets index`), or what is asked of one.
 
     Raises:
@@ -136,10 +137,10 @@ def generate(
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
         styles = style_groups(graph)
-        first = drawn if drawn is not None and len(drawn) == len(graph.nodes) else None  # none of them left out
+        whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
         return best_boxes(
-            echo, with_given_sizes(graph, sizes), styles, seed=seed, drafts=drafts, repair=repair, drawn=first,
-            steps=steps, timer=timer,
+            echo, with_given_sizes(graph, sizes), styles, seed=seed, drafts=drafts, repair=repair,
+            drawn=drawn if whole else None, steps=steps, timer=timer,
         )  # fmt: skip
 
     def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:

@@ -14,7 +14,8 @@ class SceneGenerators:
     """One generator a scene, so that a scene draws the same numbers whatever it is packed with.
 
     Arguments:
-        each: S generators; nodes: how many nodes each of the S scenes has, in the order of the pack.
+        each: S generators; nodes: how many nodes each of the S scenes has, in the order of the pack. Scenes in a row
+            that have one generator draw from it together, as they would if they were packed alone.
     """
 
     each: Sequence[torch.Generator]
@@ -23,6 +24,17 @@ class SceneGenerators:
     def __post_init__(self) -> None:
         if len(self.each) != len(self.nodes):
             raise ValueError(f"{len(self.each)} generators for {len(self.nodes)} scenes, expected one each")
+
+    @property
+    def shared(self) -> list[tuple[torch.Generator, int, int]]:
+        """Every generator with its scenes in a row and their nodes, as (generator, scenes, nodes)."""
+        out: list[tuple[torch.Generator, int, int]] = []
+        for generator, nodes in zip(self.each, self.nodes, strict=True):
+            if out and out[-1][0] is generator:
+                out[-1] = (generator, out[-1][1] + 1, out[-1][2] + nodes)
+            else:
+                out.append((generator, 1, nodes))
+        return out
 
 
 Randomness = torch.Generator | SceneGenerators
@@ -45,7 +57,7 @@ def normal(
         raise ValueError(f"noise for {shape[0]} rows, expected a multiple of the pack's {total} nodes")
     drawn = [
         normal((draws * count, *rest), generator, device, dtype).reshape(draws, count, *rest)
-        for generator, count in zip(source.each, source.nodes, strict=True)
+        for generator, _, count in source.shared
     ]
     return torch.cat(drawn, dim=1).reshape(shape[0], *rest)
 
@@ -62,7 +74,7 @@ def uniform(scenes: int, source: Randomness) -> Tensor:
     """(S,) float32 in [0, 1), one for each scene."""
     if isinstance(source, torch.Generator):
         return torch.rand(scenes, generator=source)
-    return torch.cat([torch.rand(1, generator=generator) for generator in source.each])
+    return torch.cat([torch.rand(count, generator=generator) for generator, count, _ in source.shared])
 
 
 def whole_numbers(source: Randomness, scenes: int) -> list[tuple[int, int]]:
@@ -70,4 +82,4 @@ def whole_numbers(source: Randomness, scenes: int) -> list[tuple[int, int]]:
     if isinstance(source, torch.Generator):
         seed = int(torch.randint(2**62, (1,), generator=source))
         return [(seed, number) for number in range(scenes)]
-    return [(int(torch.randint(2**62, (1,), generator=generator)), 0) for generator in source.each]
+    return [pair for generator, count, _ in source.shared for pair in whole_numbers(generator, count)]

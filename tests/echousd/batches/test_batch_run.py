@@ -123,6 +123,50 @@ def test_a_run_that_was_ended_is_gone_on_with_to_the_same_bytes(calm, tmp_path):
     assert again.calls == []
 
 
+def test_further_drafts_of_a_pack_are_drawn_together_whatever_was_ended(tmp_path, monkeypatch):
+    things = ("stool", "desk", "plant", "wardrobe", "double_bed")
+    graphs = [
+        SceneGraph.from_json(
+            json.dumps({"room": {"type": "bedroom"}, "nodes": [{"name": n, "category": n} for n in some]})
+        )
+        for some in (things[:1], things[:2], things[1:3], things[2:], things[3:])
+    ]
+    source = tmp_path / "graphs.jsonl"
+    source.write_text("".join(json.dumps(json.loads(graph.to_json())) + "\n" for graph in graphs))
+    # one room is pleased with anything, one with the third draft, one with nothing
+    limit = {1: 9.0, 2: 0.3, 3: -9.0}
+    monkeypatch.setattr(
+        "echousd.room.layouts._wishes",
+        lambda graph, found: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
+    )
+    options, out = {**QUICK, "drafts": 5}, tmp_path / "run"
+    calm = Inline()
+    batch(source, tmp_path / "calm", executor=calm, workers=1, **options)
+    assert [row.get("error", "") for row in read_journals(tmp_path / "calm").values()] == [""] * 5
+    rounds = [row["rounds"] for row in read_journals(tmp_path / "calm").values()]
+    assert {1, 3} <= set(rounds)
+    assert [key for key in calm.calls if key.startswith("round")] == ["round 1 0", "round 2 0"]
+    for resume in (False, True, True):
+        with pytest.raises(KeyboardInterrupt):
+            batch(source, out, executor=Inline(), workers=1, resume=resume, progress=_stop_when_done(), **options)
+    again = Inline({"round 1 0": ["died"], "round 2 0": ["died"]})
+    assert batch(source, out, executor=again, workers=1, resume=True, **options).complete
+    assert digests(out) == digests(tmp_path / "calm")
+    for room, place in zip(generate_many(graphs, **options), sorted((out / "rooms").glob("*/*")), strict=True):
+        told = json.loads((place / f"{place.name}.json").read_text())
+        assert json.loads(room.graph.to_json()) == told["graph"]
+
+
+def _stop_when_done():
+    """Ends a run after the first room that it makes."""
+
+    def tell(progress):
+        if progress.made:
+            raise KeyboardInterrupt
+
+    return tell
+
+
 def _interrupt(progress):
     raise KeyboardInterrupt
 

@@ -6,9 +6,12 @@ import pytest
 import torch
 
 from echomodel.loading import load_model
-from echomodel.randomness import SceneGenerators, normal
+from echomodel.randomness import SceneGenerators, normal, uniform, whole_numbers
 from echousd.graph import SceneGraph
-from echousd.room.packed import packs, sample_many
+from echousd.graph.floors import with_floor
+from echousd.room.layouts import draft_rounds, sample_boxes
+from echousd.room.packed import packs, sample_many, sample_round
+from echousd.room.progress import StageTimer
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 
@@ -28,6 +31,31 @@ def test_generators_and_scenes_must_agree():
         SceneGenerators([generator(0)], [1, 2])
     with pytest.raises(ValueError, match="noise for 4 rows, expected a multiple of the pack's 3 nodes"):
         normal((4, 2), SceneGenerators([generator(0)], [3]), "cpu")
+
+
+def test_scenes_of_one_generator_draw_as_they_would_alone():
+    def source():
+        one = generator(1)
+        return SceneGenerators([one, one, generator(2)], [2, 3, 4])
+
+    drawn = normal((18, 3), source(), "cpu").reshape(2, 9, 3)
+    assert torch.equal(drawn[:, :5].reshape(10, 3), torch.randn((10, 3), generator=generator(1)))
+    assert torch.equal(uniform(3, source())[:2], uniform(2, generator(1)))
+    assert whole_numbers(source(), 3)[:2] == whole_numbers(generator(1), 2)
+
+
+def test_further_drafts_are_those_of_single_runs():
+    graphs = [SceneGraph.from_stage(SAMPLES / f"{name}.usda") for name in ("bedroom", "study")]
+    model, seeds = load_model(None), (4, 5)
+    for number in (1, 2):
+        packed = sample_round(model, graphs, seeds, [5, 8], number=number, steps=4)
+        for graph, seed, most, drafts in zip(graphs, seeds, (5, 8), packed, strict=True):
+            start, count = draft_rounds(most)[number]
+            alone = sample_boxes(
+                model, with_floor(graph, seed), seed=seed, number=start, count=count, steps=4, timer=StageTimer()
+            )
+            for a, b in zip(alone, drafts, strict=True):
+                assert float((a.position - b.position).abs().max()) < 5e-4
 
 
 def test_packs_keep_the_order_and_the_budget():
