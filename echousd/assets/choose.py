@@ -32,12 +32,14 @@ class AssetWishes:
         stretch: see `STRETCH`; models with joints or colliders of their own are never stretched.
         licences: which are allowed (`echousd.assets.licences.allowed`), empty = all.
         text: words that the models shall be like, "" = none.
+        collect: take models along with all that they need, instead of referring to where they lie.
     """
 
     library: Library | None = None
     stretch: float = STRETCH
     licences: tuple[str, ...] = ()
     text: str = ""
+    collect: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stretch) and 1 <= self.stretch <= 4):
@@ -63,12 +65,14 @@ def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishe
     return AssetWishes() if assets is None else AssetWishes(read_library(assets))
 
 
-def asked_of(assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None) -> AssetWishes:
+def asked_of(
+    assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None, collect: bool = False
+) -> AssetWishes:
     """What the options of a command ask for; raises ValueError for an option that is not allowed."""
     words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
     if licences is not None and not words:
         raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
-    return AssetWishes(None if assets is None else read_library(assets), stretch, words)
+    return AssetWishes(None if assets is None else read_library(assets), stretch, words, collect=collect)
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,8 +97,8 @@ def misfit(category: str, dims: Sequence[float] | np.ndarray) -> float:
     return best
 
 
-def likely_unit(category: str, extents: np.ndarray) -> float | None:
+def likely_unit(category: str, extents: Sequence[float] | np.ndarray) -> float | None:
     """Metres of the unit in which a model is likeliest to be drawn, None where none gives a size of such furniture."""
-    found = [(misfit(category, extents * unit), place) for place, unit in enumerate(UNITS)]
+    found = [(misfit(category, np.asarray(extents) * unit), place) for place, unit in enumerate(UNITS)]
     best, place = min(found)
     return UNITS[place] if best < 0.5 else None

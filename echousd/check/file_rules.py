@@ -50,7 +50,8 @@ def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
                 where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
-                is_layer = bool(Sdf.FileFormat.FindByExtension(full))
+                # what a layer outside names is outside with it: the layer itself is told
+                is_layer = bool(Sdf.FileFormat.FindByExtension(full)) or not reach.holds(layer.realPath)
                 yield Finding(
                     _holder(layer, path), f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer
                 )

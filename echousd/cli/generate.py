@@ -68,6 +68,9 @@ def generate(
     licenses: Annotated[
         str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
     ] = None,
+    collect: Annotated[
+        bool, typer.Option("--collect", help="Take models along with their files instead of referring to them.")
+    ] = False,
     samples: Annotated[int, typer.Option(help="Layouts of the same furniture, as one variant set.", min=1)] = 1,
     drafts: Annotated[
         int | None, typer.Option(help="Layouts to choose the best from; default: 8.", min=1, max=64)
@@ -134,7 +137,7 @@ def generate(
         finally:
             gc.enable()
         options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
-        wishes = asked_of(assets, stretch=stretch, licences=licenses)
+        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []
 

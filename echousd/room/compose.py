@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     files: dict[str, bytes] = {}
     made: dict[str, Asset] = {}
     for name, user in room.asset_users.items():
-        made[name] = _asset(room, name, user, shelf.place if shelf else (folder or Path.cwd()) / "assets" / name)
+        made[name] = _asset(room, name, user, shelf, (folder or Path.cwd()) / "assets" / name)
         files.update(made[name].files)
     files |= attribution.files(room)
     dressing = dress(room)
@@ -257,16 +257,21 @@ def _add_sublayers(layer: Sdf.Layer, names: Sequence[str]) -> None:
     layer.subLayerPaths = [f"./layers/{name}.usda" for name in names]
 
 
-def _asset(room: RoomData, name: str, user: str, folder: Path) -> Asset:
+def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:
     geometry = room.geometry[user]
-    if name in room.carried and geometry.original is not None:
-        return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
+    if geometry.original is not None:
+        if shelf is not None:  # a model lies once in the store, however many rooms place it in whatever size
+            kept = shelf.kept_apart(name, geometry.original.files, geometry.original.main)
+            original = replace(geometry.original, layer=kept, files={}) if kept else geometry.original
+            geometry, folder = replace(geometry, original=original), shelf.place
+        assert geometry.original is not None
+        if name in room.carried:
+            return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
+        data = _asset_data(room, name, geometry)
+        return Asset(name, {}, component.files(name, room.graph.node(user).category, geometry, data, folder))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
-    if geometry.original is not None:
-        data = _asset_data(room, name, geometry)
-        return Asset(name, {}, component.files(name, room.graph.node(user).category, geometry, data, folder))
     return _written(room, name, room.graph.node(user).category, room.styles[user], geometry)
 
 

@@ -44,6 +44,16 @@ class Shelf:
         """Where an asset will lie, whatever its key: as deep in the store."""
         return Path(os.path.realpath(self.store.root)) / "00" / "0"
 
+    def kept_apart(self, asset: str, files: Mapping[str, bytes], main: str) -> Path | None:
+        """Put somebody else's model (name -> content) into the store by itself; returns its layer, None for no files.
+
+        Its key stands in the manifest, as the component that refers to it lies in the store, where nobody looks.
+        """
+        if not files:
+            return None
+        key = self.keys[f"originals/{asset}"] = self.store.put(files)
+        return Path(os.path.realpath(self.store.root)) / key[:2] / key / main
+
     def put(self, files: Mapping[str, bytes]) -> None:
         """Put the assets and images among a room's files (relative path -> content) into the store."""
         units: dict[str, dict[str, bytes]] = {}

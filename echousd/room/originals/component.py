@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf
 
 from echousd.room.assets import component_layer, geometry_layer
 from echousd.room.geometry import Geometry
-from echousd.room.originals.original import CONVERTED, Original
+from echousd.room.originals.original import Original
 from echousd.room.paths import component_file, original_file, payload_file, piece_name
 from echousd.stage.files import layer_bytes
 
@@ -55,7 +55,7 @@ def carried(name: str, original: Original, old: Mapping[str, bytes], folder: Pat
 def reference(name: str, original: Original, folder: Path) -> str:
     """The path from an asset's component to the model: relative, with forward slashes."""
     if original.layer is None:
-        return f"./{original_file(name, CONVERTED).split('/', 2)[2]}"
+        return f"./{original_file(name, original.main).split('/', 2)[2]}"
     try:
         path = Path(os.path.relpath(original.layer, folder.absolute())).as_posix()
     except ValueError:  # on another drive

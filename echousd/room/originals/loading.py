@@ -16,8 +16,9 @@ from echousd.assets.record import AssetRecord, Vector
 from echousd.assets.table import Library
 from echousd.room.colliders import collider
 from echousd.room.geometry import Collider, Geometry, Origin, Part
+from echousd.room.originals.collecting import collected
 from echousd.room.originals.conversion import ROOT, converted
-from echousd.room.originals.original import Original
+from echousd.room.originals.original import CONVERTED, Original
 
 
 def is_file(asset: str) -> bool:
@@ -65,28 +66,31 @@ def library_file(library: Library, record: AssetRecord) -> ModelFile:
     return model
 
 
-def geometry_of(model: ModelFile, record: AssetRecord, category: str, size: Vector, source: str) -> Geometry:
+def geometry_of(
+    model: ModelFile, record: AssetRecord, category: str, size: Vector, source: str, *, collect: bool = False
+) -> Geometry:
     """The geometry of a model that fills `size` metres; raises ValueError that names its file.
 
     Arguments:
         model, record: the model's file and its row. category: of the object. source: name of the shape source.
+        collect: take a USD model along with all that it needs, instead of referring to where it lies.
     """
     found = measure(model)
     pose = record.pose(size)
     points = found.points @ pose[:3, :3].T + pose[:3, 3]
     mesh = trimesh.Trimesh(points, found.faces, process=False)
-    original = _original(model, found, pose)
+    original = _original(model, found, pose, collect)
     origin = Origin(source, record.licence, record.author, asset=record.id, sha256=record.sha256)
     return Geometry((Part("mesh", mesh, {}),), (hull_of(mesh, category),), origin, original=original)
 
 
-def _original(model: ModelFile, found: Measured, pose: np.ndarray) -> Original:
+def _original(model: ModelFile, found: Measured, pose: np.ndarray, collect: bool) -> Original:
     if model.suffix not in STAGES:
         return Original(pose, ROOT, files=converted(model))
     # a payload brings the prim's own transform, and none of those above it
-    return Original(
-        pose @ found.above, found.prim, model.path.absolute(), bodies=found.bodies, colliders=found.colliders
-    )
+    main, files = collected(model) if collect else (CONVERTED, {})
+    layer = None if collect else model.path.absolute()
+    return Original(pose @ found.above, found.prim, layer, files, main, found.bodies, found.colliders)
 
 
 def hull_of(mesh: trimesh.Trimesh, category: str) -> Collider:

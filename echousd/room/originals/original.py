@@ -19,7 +19,8 @@ class Original:
         pose: (4, 4) float, its frame and unit to the object's frame, in metres.
         prim: path of its root prim.
         layer: the USD file that holds it, which stays where it is and as it is; None where `files` hold it.
-        files: name -> content of a model that was converted to USD, `CONVERTED` among them, to be written beside it.
+        files: name -> content of a model that was converted to USD or is taken along, to be written beside it.
+        main: which of the files is the model.
         bodies, colliders: it has rigid bodies or colliders of its own, so that it gets none of ours.
     """
 
@@ -27,5 +28,6 @@ class Original:
     prim: str
     layer: Path | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
+    main: str = CONVERTED
     bodies: bool = False
     colliders: bool = False

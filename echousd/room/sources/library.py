@@ -46,7 +46,9 @@ class LibraryAssets:
                 if first is None:
                     heads.append(row)
                     box = (float(size[row][0]), float(size[row][1]), float(size[row][2]))
-                    geometry[node.name] = geometry_of(files[node.name], record, node.category, box, self.name)
+                    geometry[node.name] = geometry_of(
+                        files[node.name], record, node.category, box, self.name, collect=request.retrieved.collect
+                    )
                 owners[node.name] = node.name if first is None else request.graph.nodes[first].name
                 tell(done, len(request.rows))
         return Shapes(owners, geometry)

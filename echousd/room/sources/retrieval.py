@@ -35,12 +35,14 @@ class Retrieved:
         chosen: object name -> model. files: object name -> where it lies.
         sizes: object name -> (3) metres that the layout must give it, as the model cannot be stretched to another.
         missing: objects that the library has nothing for.
+        collect: take models along with all that they need.
     """
 
     chosen: Mapping[str, AssetRecord] = field(default_factory=dict)
     files: Mapping[str, ModelFile] = field(default_factory=dict)
     sizes: Mapping[str, Vector] = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+    collect: bool = False
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -113,7 +115,7 @@ def given_pieces(
             except (ValueError, ImportError) as error:
                 raise ValueError(f"object {node.name!r}: {error}") from None
     sizes = {node.name: chosen[node.name].dims for node in named if node.size is None}
-    return Retrieved(chosen, files, sizes)
+    return Retrieved(chosen, files, sizes, collect=wishes.collect)
 
 
 def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
@@ -167,7 +169,7 @@ def retrieved(
             files[node.name] = library_file(wishes.library, record)
             if not fits(record, size[i], wishes.stretch) and node.size is None:
                 sizes[node.name] = record.dims
-    return Retrieved(found.chosen, files, sizes, tuple(found.missing))
+    return Retrieved(found.chosen, files, sizes, tuple(found.missing), wishes.collect)
 
 
 def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping[str, str]) -> list[Asked]:

@@ -1,15 +1,22 @@
+import shutil
+import zipfile
+
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom
-from small_models import chest, small_library, write_usd
+from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
+from small_models import chest, picture, seat, small_library, write_obj, write_usd
 from small_room import StandIn, small_graph
 
 import echousd
+from echousd.assets.choose import Asked, AssetWishes, asked_of, choose
 from echousd.assets.index import index
+from echousd.assets.table import read_library
 from echousd.check import check_room
+from echousd.export import export
 from echousd.room.edit import edit
 from echousd.room.reading import read_room
 from echousd.stage import open_stage
+from echousd.store import Store
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +121,138 @@ def test_a_model_that_vanished_or_changed_since_it_was_indexed_is_told(tmp_path)
     (folder / "storage/thing_17.usda").unlink()
     with pytest.raises(ValueError, match=r"thing_17.usda: no such file; index the folder again"):
         echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
+
+
+def test_collected_models_make_a_room_that_needs_no_library(tmp_path):
+    folder = small_library(tmp_path / "models")
+    write_usd(folder / "storage/thing_17.usda", chest(1.6, 2.2, 0.6), label="wardrobe", texture="./oak.png")
+    (folder / "storage/oak.png").write_bytes(picture())
+    wishes = asked_of(index([folder], tmp_path / "lib.parquet").file, collect=True)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=wishes)
+    root = room.save(tmp_path / "out/bedroom", preview=False)
+    shutil.rmtree(folder)
+    moved = tmp_path / "elsewhere"
+    shutil.move(root.parent, moved)
+    stage = open_stage(moved / root.name)
+    form = stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model/form")
+    assert UsdGeom.Mesh(form).GetPointsAttr().Get()
+    assert list((moved / "assets/wardrobe/original").rglob("*.png"))
+    assert check_room(moved / root.name).ok
+    packed = export(moved / root.name, tmp_path / "room.usdz")
+    names = zipfile.ZipFile(packed).namelist()
+    assert any(name.endswith(".png") for name in names)
+
+
+def test_a_room_packs_models_of_a_library_where_that_is_allowed(tmp_path):
+    folder = small_library(tmp_path / "models")
+    file = index([folder], tmp_path / "lib.parquet").file
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
+    root = room.save(tmp_path / "out/bedroom", preview=False)
+    with pytest.raises(ValueError, match=r"allowed: files in .* \(--search DIR adds one\)"):
+        export(root, tmp_path / "room.usdz")
+    assert export(root, tmp_path / "room.usdz", search=[folder]).stat().st_size > 10_000
+
+
+def test_models_lie_once_in_a_store(library, tmp_path):
+    for number in range(3):
+        graph = small_graph(size=(4.0 + 0.2 * number, 3.4))
+        room = echousd.generate(graph, seed=number, model=StandIn(0.05 * number), shapes="library", assets=library)
+        root = room.save(tmp_path / f"room_{number}", preview=False, store=tmp_path / "store")
+        assert open_stage(root).GetPrimAtPath("/Room/Objects/lamp/lamp_placed/lamp_model/mesh_0")
+        assert check_room(root).ok
+    layers = list((tmp_path / "store").rglob("model.usdc"))
+    assert len(layers) == 3  # chair-like lamp, pendant, nightstand: what is no USD is converted once
+    store = Store.open(tmp_path / "store")
+    assert store.collect([tmp_path / f"room_{number}" for number in range(3)], grace=0) == []
+    assert not list(store.wrong())
+    graph = read_room(root).graph.add_node("chest", "wardrobe").relate("chest", "close_by", "bed")
+    edit(root, graph, model=StandIn(), shapes="boxes").save(root.parent, preview=False)
+    assert store.collect([tmp_path / f"room_{number}" for number in range(3)], grace=0, dry=True) == []
+    assert open_stage(root).GetPrimAtPath("/Room/Objects/lamp/lamp_placed/lamp_model/mesh_0")
+
+
+def test_nothing_out_of_the_library_is_taken(tmp_path):
+    (tmp_path / "secret.png").write_bytes(picture())
+    folder = tmp_path / "models"
+    write_obj(folder, "wardrobe", chest(1.6, 2.2, 0.6), texture="../secret.png")
+    write_obj(folder, "double_bed", seat(1.8, 1.0, 2.1), texture=str(tmp_path / "secret.png"))
+    write_usd(folder / "nightstand.usda", chest(0.5, 0.5, 0.4), texture="../secret.png")
+    done = index([folder], tmp_path / "lib.parquet")
+    found = read_library(done.file).records
+    assert found["wardrobe.obj"].missing == ("../secret.png",)
+    assert found["double_bed.obj"].missing == (str(tmp_path / "secret.png"),)
+    graph = small_graph()
+    room = echousd.generate(graph, model=StandIn(), shapes="library", assets=done.file)
+    assert not any(path.endswith(".png") for g in room.geometry.values() if g.original for path in g.original.files)
+    with pytest.raises(ValueError, match=r"nightstand.usda: depends on .*secret.png, allowed: files below .*models"):
+        echousd.generate(graph, model=StandIn(), shapes="library", assets=asked_of(done.file, collect=True))
+
+
+def test_variants_payloads_and_materials_of_a_model_are_kept(tmp_path):
+    inner = write_usd(tmp_path / "models/parts/body.usda", chest(1.6, 2.2, 0.6))
+    stage = Usd.Stage.CreateNew(str(tmp_path / "models/wardrobe.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    root = UsdGeom.Xform.Define(stage, "/wardrobe").GetPrim()
+    stage.SetDefaultPrim(root)
+    UsdGeom.Xform.Define(stage, "/wardrobe/geo").GetPrim().GetPayloads().AddPayload("./parts/body.usda")
+    colours = root.GetVariantSets().AddVariantSet("finish")
+    for name in ("oak", "white"):
+        colours.AddVariant(name)
+    colours.SetVariantSelection("white")
+    stage.Save()
+    done = index([tmp_path / "models"], tmp_path / "lib.parquet")
+    record = read_library(done.file).records["wardrobe.usda"]
+    assert (done.models, record.variants, inner.exists()) == (1, ("finish=white",), True)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    assert room.notes[0].startswith("the library has nothing for bed, nightstand_left, nightstand_right, lamp, pendant")
+    saved = open_stage(room.save(tmp_path / "bedroom", preview=False))
+    model = saved.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model")
+    assert model.GetVariantSet("finish").GetVariantNames() == ["oak", "white"]
+    form = saved.GetPrimAtPath(f"{model.GetPath()}/geo/form")
+    material = UsdShade.MaterialBindingAPI(form).ComputeBoundMaterial()[0]
+    assert material.GetPath() == f"{model.GetPath()}/geo/Looks/paint"
+
+
+def test_models_with_colliders_of_their_own_keep_them_and_are_not_stretched(tmp_path):
+    path = write_usd(tmp_path / "models/wardrobe.usda", chest(1.5, 2.1, 0.58))
+    stage = Usd.Stage.Open(str(path))
+    UsdPhysics.CollisionAPI.Apply(stage.GetPrimAtPath("/piece/form"))
+    stage.Save()
+    done = index([tmp_path / "models"], tmp_path / "lib.parquet")
+    assert read_library(done.file).records["wardrobe.usda"].rigid
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    assert room.boxes.size[room.names.index("wardrobe")].tolist() == pytest.approx([1.5, 2.1, 0.58], abs=1e-3)
+    saved = open_stage(room.save(tmp_path / "bedroom", preview=False))
+    assert not saved.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_collider")
+    assert saved.GetPrimAtPath("/Room/Objects/wardrobe").HasAPI(UsdPhysics.RigidBodyAPI)
+    assert check_room(tmp_path / "bedroom/bedroom.usda").ok
+
+
+def test_licences_are_filtered(library):
+    wishes = asked_of(library, licences="CC-BY")
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=wishes)
+    assert not any(geometry.origin.asset for geometry in room.geometry.values())  # all of them are CC0
+    with pytest.raises(ValueError, match="--licenses is '', allowed: licences with commas between"):
+        asked_of(library, licences="")
+    with pytest.raises(ValueError, match="stretch is 9, allowed: 1 to 4"):
+        asked_of(library, stretch=9)
+
+
+def test_objects_of_a_set_share_a_model_and_others_do_not_repeat(tmp_path):
+    for name in ("a", "b", "c"):
+        write_obj(tmp_path / "models", f"armchair_{name}", seat(0.8, 0.9, 0.8))
+    library = read_library(index([tmp_path / "models"], tmp_path / "lib.parquet").file)
+    wishes = AssetWishes(library)
+    alone = [Asked(f"chair_{i}", "armchair", "room", (0.8, 0.9, 0.8)) for i in range(3)]
+    assert len({record.id for record in choose(wishes, alone, 1).chosen.values()}) == 3
+    together = [Asked(f"chair_{i}", "armchair", "oak", (0.8, 0.9, 0.8), "chair_0") for i in range(3)]
+    assert len({record.id for record in choose(wishes, together, 1).chosen.values()}) == 1
+    found = {choose(wishes, alone[:1], seed).chosen["chair_0"].id for seed in range(12)}
+    assert len(found) > 1  # the seed decides among equally good ones
+    near = {"chair_0": {"armchair_b.obj": 0.0, "armchair_a.obj": 2.0, "armchair_c.obj": 2.0}}
+    assert all(
+        choose(wishes, alone[:1], seed, nearness=near).chosen["chair_0"].id == "armchair_b.obj" for seed in range(5)
+    )
+    assert choose(wishes, [Asked("bed", "double_bed", "room", (1.8, 1, 2))], 0).missing == ["bed"]
+    assert choose(wishes, [Asked("seat", "lounge_chair", "room", (0.8, 0.9, 0.8))], 0).chosen  # kin of an armchair
