@@ -7,7 +7,7 @@ import os
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -219,6 +219,11 @@ def _unlike(record: AssetRecord, company: Sequence[AssetRecord]) -> float:
     return 1.0 - sum(shares) / len(shares)
 
 
-def _words(record: AssetRecord) -> set[str]:
-    text = " ".join([*record.tags, *record.materials]).lower().replace("_", " ")
-    return {word for word in text.split() if len(word) > 2 and word.isalpha()}
+def _words(record: AssetRecord) -> frozenset[str]:
+    return _split((*record.tags, *record.materials))
+
+
+@lru_cache(maxsize=1 << 16)
+def _split(texts: tuple[str, ...]) -> frozenset[str]:
+    words = " ".join(texts).lower().replace("_", " ").split()
+    return frozenset(word for word in words if len(word) > 2 and word.isalpha())

@@ -13,6 +13,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues.entry import Entry
 from echousd.assets.front import SURE, front_by_shape
 from echousd.assets.licences import UNKNOWN, spdx
+from echousd.assets.likeness import named_by_shape
 from echousd.assets.measure import measure
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import ModelFile
@@ -86,6 +87,10 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     dims = entry.dims if entry.dims is not None else (high - low) * float(metres or 1.0)
     record = replace(record, low=vector(low), high=vector(high), dims=vector(np.maximum(dims, 1e-4)))
     record = _faced(record, entry, found)
+    if category and not (entry.category or entry.decided):
+        shape = found.turned(np.array(record.turn).reshape(3, 3))
+        category = named_by_shape(category, shape, np.array(record.dims))
+        record = replace(record, category=category)
     row = vocabulary().category(category) if category else None
     if not full:
         return record

@@ -14,6 +14,8 @@ from echomodel.vocabulary import normalised, vocabulary
 
 LABELLED, CALLED, MEANT, SHELVED = 0.97, 0.9, 0.75, 0.55  # confidence in a category by where its word stands
 UNITS = (1.0, 0.01, 0.001, 0.0254)  # metres of units that models come in, the likeliest first
+GENERAL = {"table": "table", "sofa": "sofa", "stool": "stool", "double_bed": "bed"}  # what sizes make more particular
+OFFICE = {"chair": "office_chair", "dining_table": "desk"}  # what a general word means on the shelf of offices
 SLACK = 1.6  # how far beyond the sizes that 90 % of real ones have a size is still believed
 
 
@@ -30,14 +32,14 @@ def category_of(
         plain = re.sub(r"\.[nv]\.\d+$", "", label)  # of WordNet
         found = known_word(plain) or _within(plain)
         if found:
-            return _refined(found, dims), LABELLED * _likeliness(found, dims)
+            return _refined(found, dims, group), LABELLED * _likeliness(found, dims)
+    size = np.ones(3) if dims is None else dims
     for text, confidence in ((name, CALLED), (group, SHELVED)):
-        found = known_word(text) or _within(text)
+        plain = re.sub(r"[_\-]+", " ", text)
+        found = known_word(text) or _within(text, 2) or class_by_name(plain, group, size) or _within(text)
         if found:
-            return _refined(found, dims), confidence * _likeliness(found, dims)
-        guessed = class_by_name(re.sub(r"[_\-]+", " ", text), "", np.ones(3) if dims is None else dims)
-        if guessed:
-            return guessed, (MEANT if text == name else SHELVED) * _likeliness(guessed, dims)
+            surely = confidence if known_word(text) or _within(text) else min(confidence, MEANT)
+            return _refined(found, dims, group), surely * _likeliness(found, dims)
     return "", 0.0
 
 
@@ -61,10 +63,10 @@ def known_word(text: str) -> str:
     return ""
 
 
-def _within(text: str) -> str:
-    """The longest name or alias of a category among the words of a text, the last where several are as long."""
+def _within(text: str, least: int = 1) -> str:
+    """The longest name or alias of a category, of `least` words, in a text; the last where several are as long."""
     words = [word for word in normalised(re.sub(r"\d+", " ", text)).split("_") if word]
-    for length in range(min(len(words), 4), 0, -1):
+    for length in range(min(len(words), 4), least - 1, -1):
         for start in range(len(words) - length, -1, -1):
             found = known_word("_".join(words[start : start + length]))
             if found:
@@ -72,11 +74,11 @@ def _within(text: str) -> str:
     return ""
 
 
-def _refined(category: str, dims: Sequence[float] | np.ndarray | None) -> str:
-    """A general word made as particular as the size allows: a table that nobody can sit at is a coffee table."""
-    if dims is None or category not in ("table", "sofa"):
-        return category
-    return class_by_name(category, "", dims) or category
+def _refined(category: str, dims: Sequence[float] | np.ndarray | None, group: str) -> str:
+    """A general word made as particular as size and shelf allow: a table that nobody can sit at is a coffee table."""
+    if dims is not None and category in GENERAL:
+        category = class_by_name(GENERAL[category], "", dims) or category
+    return OFFICE.get(category, category) if "office" in group.lower() else category
 
 
 def _likeliness(category: str, dims: Sequence[float] | np.ndarray | None) -> float:

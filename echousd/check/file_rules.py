@@ -41,8 +41,8 @@ def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
     reach = Reach.of(stage)
     told = set()
     for layer in stage.GetUsedLayers():
-        if layer == stage.GetSessionLayer():
-            continue
+        if layer == stage.GetSessionLayer() or (layer.realPath and not reach.holds(layer.realPath)):
+            continue  # what a layer outside names is outside with it; the layer itself is told
         for path in _asset_paths(layer):
             if not path or (layer.identifier, path) in told or ABSOLUTE.match(path):
                 continue
@@ -50,8 +50,7 @@ def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
             full = layer.ComputeAbsolutePath(path)
             if full and not reach.holds(full):
                 where = f"{layer.GetDisplayName()}: asset path {path!r} leads out of the room's folder"
-                # what a layer outside names is outside with it: the layer itself is told
-                is_layer = bool(Sdf.FileFormat.FindByExtension(full)) or not reach.holds(layer.realPath)
+                is_layer = bool(Sdf.FileFormat.FindByExtension(full))
                 yield Finding(
                     _holder(layer, path), f"{where} {reach.places[0]}, allowed: a file below it", warning=is_layer
                 )
