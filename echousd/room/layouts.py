@@ -16,7 +16,7 @@ from echousd.graph import SceneGraph
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.shell import floor_polygon
-from echousd.room.styles import equal_sizes
+from echousd.room.styles import equal_sizes, unequal_pairs
 from echousd.room.tensors import floor_centre, graph_batch, seeded
 from echousd.room.verdicts import layout_outcome
 
@@ -198,7 +198,7 @@ def finished_boxes(
     graph = _with_homeless_unlocked(graph)
     with timer.stage("repair"):
         found = repaired(graph, boxes)
-        same = _alike(graph, found.boxes, styles, boxes)
+        same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits
             second = repaired(with_sizes(graph, same), same, config=RepairConfig(arrange=False))
@@ -235,9 +235,8 @@ def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.nda
     return size, position, yaw
 
 
-def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], judged_by: Boxes | None = None) -> Boxes:
+def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
     names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
     free = np.array([node.size is None and not node.locked for node in graph.nodes])
-    measured = None if judged_by is None else np.asarray(judged_by.size, float)
-    size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, measured)
+    size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 ALIKE = 0.15  # largest relative difference of an extent that may be the same piece of furniture
 EQUAL = 1e-3  # largest relative difference of an extent within one asset
-AGREEMENT = 0.75  # least intersection over union of two shapes in their boxes
 ROOM_STYLE = "room"
 
 
@@ -62,58 +61,68 @@ def equal_sizes(
     styles: Mapping[str, str],
     size: np.ndarray,
     free: np.ndarray,
-    judged_by: np.ndarray | None = None,
+    unequal: Collection[tuple[int, int]] = (),
 ) -> np.ndarray:
-    """(n, 3) sizes in which objects of one category and one style group that are nearly alike are exactly alike.
+    """(n, 3) sizes in which objects of one category and one style group are exactly alike.
+
+    Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and
+    those of a set whose size is given that size.
 
     Arguments:
         names, categories: n words each.
         styles: object name -> style, see `style_groups`.
         size: (n, 3) float, metres.
         free: (n,) bool, sizes that may change.
-        judged_by: (n, 3) float, sizes that say who is alike, if not `size`.
+        unequal: pairs (i, j), i < j, that the graph tells to differ in size.
     """
-    judged_by = size if judged_by is None else judged_by
     out = np.array(size, float)
-    left = [i for i in range(len(names)) if free[i] and styles[names[i]] != ROOM_STYLE]
+    apart = set(unequal)
+    left = [i for i in range(len(names)) if styles[names[i]] != ROOM_STYLE]
     while left:
-        first = left[0]
-        group = [
-            i
-            for i in left
-            if categories[i] == categories[first]
-            and styles[names[i]] == styles[names[first]]
-            and np.abs(judged_by[i] / judged_by[first] - 1).max() <= ALIKE
-        ]
-        out[group] = size[group].min(0)  # the smallest fits wherever one of them does
+        first, group = left[0], []
+        for i in left:
+            told = categories[i] == categories[first] and styles[names[i]] == styles[names[first]]
+            if told and not any((j, i) in apart for j in group):
+                group.append(i)
         left = [i for i in left if i not in group]
+        given = [i for i in group if not free[i]]
+        if given:
+            for i in set(group) - set(given):
+                out[i] = size[given[int(np.abs(np.log(size[given] / size[i])).sum(1).argmin())]]
+        elif (size[group].max(0) / size[group].min(0) - 1).max() <= ALIKE:
+            out[group] = size[group].min(0)  # fits wherever one of them does
+        else:
+            out[group] = size[group[int(size[group].prod(1).argmin())]]
     return out
 
 
+def unequal_pairs(graph: SceneGraph) -> set[tuple[int, int]]:
+    """Pairs (i, j), i < j, of objects that a relation of the graph tells to differ in size."""
+    place = {node.name: number for number, node in enumerate(graph.nodes)}
+    words = vocabulary()
+    told = (relation for relation in graph.relations if words.predicate(relation.predicate).measures == "size")
+    return {tuple(sorted((place[r.subject], place[r.object]))) for r in told}  # type: ignore[misc]
+
+
 def shared_assets(
-    names: Sequence[str],
-    categories: Sequence[str],
-    styles: Mapping[str, str],
-    size: np.ndarray,
-    occupancy: np.ndarray | None = None,
+    names: Sequence[str], categories: Sequence[str], styles: Mapping[str, str], size: np.ndarray
 ) -> dict[str, str]:
     """Object name -> name of the object whose asset it uses (itself if nothing agrees).
 
-    Objects agree when they have one category and one style group, their sizes are equal (`equal_sizes`), and
-    their shapes overlap by at least `AGREEMENT`.
+    Objects agree when they have one category and one style group, and their sizes are equal (`equal_sizes`): what is
+    told alike is alike, whatever the model draws for each of them.
 
     Arguments:
         names, categories: n words each.
         styles: object name -> style, see `style_groups`.
         size: (n, 3) float, metres.
-        occupancy: (n, d, d, d) bool, inside of each shape in its own box; None: all shapes are alike (boxes).
     """
     owners: list[int] = []
     out: dict[str, str] = {}
     for i, name in enumerate(names):
         for j in owners:
-            same = categories[i] == categories[j] and styles[name] == styles[names[j]]
-            if same and styles[name] != ROOM_STYLE and _agree(i, j, size, occupancy):
+            same = categories[i] == categories[j] and styles[name] == styles[names[j]] != ROOM_STYLE
+            if same and np.abs(size[i] / size[j] - 1).max() <= EQUAL:
                 out[name] = names[j]
                 break
         else:
@@ -138,12 +147,3 @@ def asset_names(owners: Mapping[str, str], categories: Mapping[str, str]) -> dic
             named[owner] = free_name(categories[owner], taken)
             taken.add(named[owner])
     return {name: named.get(owner, owner) for name, owner in owners.items()}
-
-
-def _agree(i: int, j: int, size: np.ndarray, occupancy: np.ndarray | None) -> bool:
-    if np.abs(size[i] / size[j] - 1).max() > EQUAL:
-        return False
-    if occupancy is None:
-        return True
-    either = np.logical_or(occupancy[i], occupancy[j]).sum()
-    return bool(either) and np.logical_and(occupancy[i], occupancy[j]).sum() / either >= AGREEMENT

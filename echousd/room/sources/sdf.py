@@ -43,7 +43,7 @@ class SignedDistances:
             except ValueError as error:
                 raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
 
-        return per_asset(request, make, lambda row: grids[row] < 0)
+        return per_asset(request, make)
 
 
 def within_budget(grid: np.ndarray, size: np.ndarray, category: str, faces: int) -> Geometry:

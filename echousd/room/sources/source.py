@@ -90,21 +90,17 @@ class ShapeSource(Protocol):
         ...
 
 
-def per_asset(
-    request: ShapeRequest, make: Callable[[int], Geometry], occupancy: Callable[[int], np.ndarray] | None = None
-) -> Shapes:
+def per_asset(request: ShapeRequest, make: Callable[[int], Geometry]) -> Shapes:
     """Geometry for the first object of each group that can share an asset (`shared_assets`).
 
     Arguments:
         make: number of an object in the graph -> its geometry.
-        occupancy: number of an object -> (d, d, d) bool, inside of its shape; None: all shapes are alike.
     """
     rows, names = request.rows, request.graph.names
     chosen = [names[i] for i in rows]
     categories = [request.graph.nodes[i].category for i in rows]
     size = np.asarray(request.boxes.size, float)[rows]
-    inside = None if occupancy is None or not rows else np.stack([occupancy(i) for i in rows])
-    owners = shared_assets(chosen, categories, request.styles, size, inside)
+    owners = shared_assets(chosen, categories, request.styles, size)
     geometry: dict[str, Geometry] = {}
     with request.timer.stage("meshes", len(rows)) as tell:
         for done, (i, name) in enumerate(zip(rows, chosen, strict=True), 1):

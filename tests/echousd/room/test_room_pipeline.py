@@ -26,12 +26,9 @@ def test_style_groups_join_relations_and_names():
     assert style_groups(graph) == {"chair_0": "room", "chair_1": "set_chair_1", "chair_2": "set_chair_1"}
 
 
-def test_assets_are_shared_by_equal_shapes_of_one_style_only():
+def test_assets_are_shared_by_pieces_of_one_style_only():
     names, kind = ["a", "b", "c"], ["stool"] * 3
     size, style = np.ones((3, 3)), dict.fromkeys("abc", "ash")
-    shape = np.zeros((3, 8, 8, 8), bool)
-    shape[:2, :4], shape[2, 4:] = True, True
-    assert shared_assets(names, kind, style, size, shape) == {"a": "a", "b": "a", "c": "c"}
     assert shared_assets(names, kind, style, size) == {"a": "a", "b": "a", "c": "a"}
     assert shared_assets(names, ["stool", "chair", "stool"], style, size) == {"a": "a", "b": "b", "c": "a"}
     assert shared_assets(names, kind, dict.fromkeys("abc", "room"), size) == {"a": "a", "b": "b", "c": "c"}
@@ -44,12 +41,17 @@ def test_shared_assets_are_named_for_what_they_are():
     assert names == {"stool": "stool", "a": "stool_2", "b": "stool_2", "c": "stool_3", "d": "stool_3", "e": "e"}
 
 
-def test_nearly_equal_sizes_of_a_set_become_equal():
+def test_sizes_of_what_is_told_alike_become_equal():
     size = np.array([[1.0, 1, 1], [1.1, 1, 1], [2.0, 1, 1]])
-    args = ["a", "b", "c"], ["stool"] * 3, dict.fromkeys("abc", "ash")
-    out = equal_sizes(*args, size, np.ones(3, bool))
-    np.testing.assert_allclose(out, [[1, 1, 1], [1, 1, 1], [2, 1, 1]])
+    args, free = (["a", "b", "c"], ["stool"] * 3, dict.fromkeys("abc", "ash")), np.ones(3, bool)
+    np.testing.assert_allclose(equal_sizes(*args, size, free), [[1, 1, 1]] * 3)
+    # ... unless the graph tells that one is bigger, or its size is given
+    np.testing.assert_allclose(equal_sizes(*args, size, free, {(0, 2), (1, 2)}), [[1, 1, 1], [1, 1, 1], [2, 1, 1]])
+    np.testing.assert_allclose(equal_sizes(*args, size, np.array([True, True, False])), [[2, 1, 1]] * 3)
     np.testing.assert_allclose(equal_sizes(*args, size, np.zeros(3, bool)), size)
+    np.testing.assert_allclose(equal_sizes(*args[:2], dict.fromkeys("abc", "room"), size, free), size)
+    tall = np.array([[1.0, 0.4, 1], [0.4, 2, 1]])
+    np.testing.assert_allclose(equal_sizes(["a", "b"], ["stool"] * 2, args[2], tall, free[:2]), [tall[0]] * 2)
 
 
 def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
