@@ -1,6 +1,41 @@
-"""The one thing pyproject.toml cannot say: three source folders make up the two packages."""
+"""What pyproject.toml cannot say: three source folders make up the two packages.
+
+And how an editable install finds them.
+"""
+
+import base64
+import hashlib
+import zipfile
+from pathlib import Path
 
 from setuptools import find_packages, setup
+from setuptools.command.editable_wheel import editable_wheel
+
+# The finder of an editable install is asked last. Beside the clone, a folder called echousd without a package in it
+# would be found before, as an empty namespace: ours is asked first.
+FIRST = "; import sys; sys.meta_path.sort(key=lambda finder: getattr(finder, '__module__', '') != '{module}')"
+
+
+class Editable(editable_wheel):
+    """An editable install that a clone's own folder cannot shadow."""
+
+    def run(self) -> None:
+        """Make the wheel, then have its finder go first."""
+        super().run()
+        for path in Path(self.dist_dir).glob("*editable*.whl"):
+            with zipfile.ZipFile(path) as wheel:
+                files = {entry.filename: wheel.read(entry) for entry in wheel.infolist()}
+            for name in [name for name in files if name.endswith(".pth") and b"finder.install()" in files[name]]:
+                line = files[name].decode().strip()
+                files[name] = (line + FIRST.format(module=line.split()[1].rstrip(";"))).encode()
+                record = next(other for other in files if other.endswith(".dist-info/RECORD"))
+                digest = base64.urlsafe_b64encode(hashlib.sha256(files[name]).digest()).rstrip(b"=").decode()
+                rows = [row for row in files[record].decode().splitlines() if not row.startswith(f"{name},")]
+                files[record] = "\n".join([*rows, f"{name},sha256={digest},{len(files[name])}", ""]).encode()
+            with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as wheel:
+                for name, content in files.items():
+                    wheel.writestr(name, content)
+
 
 setup(
     packages=[
@@ -9,4 +44,5 @@ setup(
         "echousd.schemas",
     ],
     package_dir={"echomodel": "model/echomodel", "echousd.schemas": "schemas"},
+    cmdclass={"editable_wheel": Editable},
 )

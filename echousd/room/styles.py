@@ -79,7 +79,8 @@ def equal_sizes(
     apart = set(unequal)
     left = [i for i in range(len(names)) if styles[names[i]] != ROOM_STYLE]
     while left:
-        first, group = left[0], []
+        first = left[0]
+        group: list[int] = []
         for i in left:
             told = categories[i] == categories[first] and styles[names[i]] == styles[names[first]]
             if told and not any((j, i) in apart for j in group):

@@ -53,7 +53,7 @@ class IndependentShapes:
                 raise ValueError(f"shape of {node.name!r}: {error}; try another seed or shapes 'boxes'") from None
             return solid_geometry(mesh, node.category, ORIGIN)
 
-        return per_asset(request, make, lambda row: grids[row] < 0)
+        return per_asset(request, make, alike=False)
 
 
 SOURCE = IndependentShapes()

@@ -1,0 +1,46 @@
+"""How the package is installed: no folder of its name hides it, and its types are told."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from setuptools.dist import Distribution
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_a_clone_called_echousd_does_not_hide_the_package(tmp_path):
+    """As in the folder that holds the clone, which is called after its repository."""
+    (tmp_path / "echousd" / "model").mkdir(parents=True)
+    (tmp_path / "echomodel").mkdir()
+    code = "import echousd, echomodel.vocabulary, echousd.schemas; print(echousd.generate.__name__, echousd.__file__)"
+    variables = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=variables, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[0] == "generate"
+    assert str(tmp_path) not in done.stdout
+
+
+@pytest.fixture
+def wheel(monkeypatch):
+    """The package and file names that a wheel holds."""
+    told: dict = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr("setuptools.setup", told.update)
+    runpy.run_path(str(ROOT / "setup.py"))
+    made = Distribution(told)
+    made.parse_config_files()
+    build = made.get_command_obj("build_py")
+    build.ensure_finalized()
+    return {f"{package}/{name}" for package, _, _, names in build.data_files for name in names}
+
+
+@pytest.mark.parametrize("package", ["echousd", "echomodel"])
+def test_types_are_told_in_every_package(wheel, package):
+    assert f"{package}/py.typed" in wheel
+    assert (ROOT / {"echousd": ".", "echomodel": "model"}[package] / package / "py.typed").is_file()
