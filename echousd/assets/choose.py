@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,14 @@ from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import Library, read_library
 
+if TYPE_CHECKING:
+    from echomodel.text import TextEncoder
+
 STRETCH = 1.15  # largest factor by which a model may be made longer or shorter along an axis
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
 AGAIN, BEYOND, UNSURE, UNLIKE = 0.6, 3.0, 0.5, 0.25
+TEXT = 3.0  # of the distance of a model's words from the wanted ones, as a cosine
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,7 @@ class AssetWishes:
         licences: which are allowed (`echousd.assets.licences.allowed`), empty = all.
         text: words that the models shall be like, "" = none.
         collect: take models along with all that they need, instead of referring to where they lie.
+        encoder: of texts, None = CLIP (extra `text`), whose weights must be there.
     """
 
     library: Library | None = None
@@ -40,6 +46,7 @@ class AssetWishes:
     licences: tuple[str, ...] = ()
     text: str = ""
     collect: bool = False
+    encoder: TextEncoder | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.stretch) and 1 <= self.stretch <= 4):
@@ -57,6 +64,22 @@ class AssetWishes:
                 found[category] = Shelf(tuple(kept))
         return found
 
+    @cached_property
+    def unlikeness(self) -> dict[str, float]:
+        """Id of a model -> cost of its words against `text`; raises TextEncoderError where texts cannot be compared."""
+        records = [record for shelf in self.shelves.values() for record in shelf.records] if self.text else []
+        if not records:
+            return {}
+        import torch
+
+        from echomodel.text import ClipTextEncoder
+
+        said = [" ".join((r.name, r.category.replace("_", " "), *r.tags, *r.materials)) for r in records]
+        vectors = (self.encoder or ClipTextEncoder())([self.text, *said])
+        vectors = torch.nn.functional.normalize(torch.as_tensor(vectors), dim=1)
+        away = TEXT * (1.0 - vectors[1:] @ vectors[0])
+        return dict(zip((record.id for record in records), away.tolist(), strict=True))
+
 
 def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishes:
     """What is asked, from an index's file or as it is; raises ValueError for a file that is no index."""
@@ -66,13 +89,15 @@ def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishe
 
 
 def asked_of(
-    assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None, collect: bool = False
+    assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None, collect: bool = False, text: str = ""
 ) -> AssetWishes:
     """What the options of a command ask for; raises ValueError for an option that is not allowed."""
     words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
     if licences is not None and not words:
         raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
-    return AssetWishes(None if assets is None else read_library(assets), stretch, words, collect=collect)
+    wishes = AssetWishes(None if assets is None else read_library(assets), stretch, words, text, collect)
+    _ = wishes.unlikeness  # what is absent is told before any long work
+    return wishes
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +201,7 @@ def _best(
         for number in np.argsort(costs, kind="stable")[:64]:
             record = shelf.records[number]
             total = float(costs[number]) + (AGAIN if record.id in used else 0.0) + UNLIKE * _unlike(record, company)
-            total += (nearness or {}).get(record.id, 0.0)
+            total += (nearness or {}).get(record.id, 0.0) + wishes.unlikeness.get(record.id, 0.0)
             ranked.append((total, record.id, record))
     if not ranked:
         return None

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -88,11 +88,16 @@ def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str
 
 
 def read_library(file: str | os.PathLike[str]) -> Library:
-    """The library whose index is `file`; raises ValueError for a file that is missing or no index."""
+    """The library whose index is `file`, kept while that does not change; raises ValueError for any other file."""
     file = Path(file)
     if file.is_dir() or not file.exists():
         found = "is a folder" if file.is_dir() else "no such file"
         raise ValueError(f"{file}: {found}, allowed: an index, made by `echousd assets index FOLDER -o {file.name}`")
+    return _read(file, file.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _read(file: Path, changed: int) -> Library:
     pa = arrow()
     try:
         table = pa.parquet.read_table(file)

@@ -20,7 +20,7 @@ class BatchOptions(BaseModel):
     Arguments:
         relations: relations an object that are told of a room drawn from the room generator (`sample`).
         preview: draw a picture of every room (needs the extra `render`).
-        weights: weights file or folder, "" for those that ship.
+        weights: weights file or folder, "" for those that ship. assets: index of a library, "" for none.
         palette: harmony of the room, "" = the seed chooses.
         openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
@@ -31,6 +31,7 @@ class BatchOptions(BaseModel):
     shapes: str | None = None
     preset: str | None = None
     weights: str = ""
+    assets: str = ""
     repair: bool = True
     layouts: Annotated[int, Field(ge=1, le=1000)] = 1
     drafts: Annotated[int, Field(ge=1, le=64)] | None = None

@@ -114,7 +114,8 @@ def generated(job: Job) -> Any:
     drawn = Drawn(drafts, elsewhere=True) if drafts else None
     asked = job.options
     return generate(
-        _checked(job), seed=job.seed, shapes=asked.shapes, model=asked.weights or None, preset=asked.preset,
+        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.assets or None, model=asked.weights or None,
+        preset=asked.preset,
         repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
         options=asked.look, drawn=drawn,
     )  # fmt: skip

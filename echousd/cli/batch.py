@@ -57,6 +57,7 @@ def run(
     until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.")] = "",
     memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", min=256)] = 4096,
     shapes: Annotated[str | None, typer.Option(help="parts, sdf or boxes; default: the best of the model.")] = None,
+    assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
@@ -84,6 +85,7 @@ def run(
     raw |= {key: value for key, value in (("count", count), ("seed", seed)) if value is not None}
     told: dict[str, Any] = {
         "shapes": shapes,
+        "assets": str(assets.absolute()) if assets else None,
         "weights": str(weights) if weights else None,
         "preview": preview,
         "walls": walls,

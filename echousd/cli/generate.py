@@ -68,6 +68,9 @@ def generate(
     licenses: Annotated[
         str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
     ] = None,
+    text: Annotated[
+        str, typer.Option(help='What models shall be like, "mid-century oak" (extra: text).', show_default=False)
+    ] = "",
     collect: Annotated[
         bool, typer.Option("--collect", help="Take models along with their files instead of referring to them.")
     ] = False,
@@ -137,7 +140,7 @@ def generate(
         finally:
             gc.enable()
         options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
-        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect)
+        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []
 

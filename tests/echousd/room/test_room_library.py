@@ -257,3 +257,19 @@ def test_objects_of_a_set_share_a_model_and_others_do_not_repeat(tmp_path):
     )
     assert choose(wishes, [Asked("bed", "double_bed", "room", (1.8, 1, 2))], 0).missing == ["bed"]
     assert choose(wishes, [Asked("seat", "lounge_chair", "room", (0.8, 0.9, 0.8))], 0).chosen  # kin of an armchair
+
+
+def test_words_say_what_models_shall_be_like(tmp_path):
+    import torch
+
+    def encoder(texts):
+        return torch.tensor([[float("oak" in text), float("steel" in text), 0.1] for text in texts])
+
+    for name in ("armchair_oak", "armchair_steel"):
+        write_obj(tmp_path / "models", name, seat(0.8, 0.9, 0.8))
+    library = read_library(index([tmp_path / "models"], tmp_path / "lib.parquet").file)
+    asked = [Asked("chair", "armchair", "room", (0.8, 0.9, 0.8))]
+    for word in ("oak", "steel"):
+        wishes = AssetWishes(library, text=f"mid-century {word}", encoder=encoder)
+        found = {choose(wishes, asked, seed).chosen["chair"].id for seed in range(6)}
+        assert found == {f"armchair_{word}.obj"}
