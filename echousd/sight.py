@@ -22,6 +22,20 @@ class Furniture:
         front = np.array([(np.sin(self.yaw) * weight).sum(), (np.cos(self.yaw) * weight).sum()])
         return front / max(float(weight.sum()), 1e-9)
 
+    @property
+    def centre(self) -> np.ndarray:
+        """(2,) float, x and z of the middle of all footprints, metres."""
+        weight = self.size[:, [0, 2]].prod(1)
+        return np.asarray(weight @ self.position[:, [0, 2]] / max(float(weight.sum()), 1e-9))
+
+    def crowding(self, eye: np.ndarray, reach: float) -> float:
+        """How much stands right before `eye` (3,): a box nearer than `reach` metres counts 0 (there) to 2 (here)."""
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        x, y, z = (eye - self.position - self.size * (0.0, 0.5, 0.0)).T
+        local = np.stack([cos * x - sin * z, y, sin * x + cos * z], 1)
+        away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
+        return float(2.0 * np.clip(1.0 - away / reach, 0.0, 1.0).sum())
+
     def hidden(self, eye: np.ndarray) -> float:
         """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""
         n = len(self.size)

@@ -9,7 +9,9 @@ from echousd.sight import Furniture
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-WIDE = 18.0  # mm, for a camera inside
+WIDE = 21.0  # mm, for a camera inside: 81 degrees across
+EYES = 0.62  # of the height of the walls: where a camera inside is
+BEFORE = 1.6  # metres: what is nearer to the eye fills the picture
 MARGIN = 1.06
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
@@ -64,9 +66,11 @@ def inside_view(floor: np.ndarray, furniture: Furniture, height: float) -> np.nd
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
     step = middle - floor
-    step = floor + 0.35 * step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
+    step = floor + 0.3 * step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
     seen = [room.contains(shapely.LineString([corner, middle])) for corner in step]
+    eyes = np.insert(step, 1, EYES * height, axis=1)
     reach = np.linalg.norm(floor - middle, axis=1) + (floor - middle) @ furniture.facing
-    reach = reach - [furniture.hidden(np.array([x, 0.72 * height, z])) for x, z in step]
+    reach = reach - [furniture.hidden(eye) + furniture.crowding(eye, BEFORE) for eye in eyes]
     corner = step[int(np.argmax(np.where(seen, reach, -np.inf)))] if any(seen) else middle + 0.1
-    return view_matrix(np.array([corner[0], 0.72 * height, corner[1]]), np.array([middle[0], 0.22 * height, middle[1]]))
+    aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
+    return view_matrix(np.array([corner[0], EYES * height, corner[1]]), np.array([aim[0], 0.3 * height, aim[1]]))

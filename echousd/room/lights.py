@@ -20,7 +20,9 @@ from echousd.views import view_matrix
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
 LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
-ENCLOSED = 0.4  # of sky and panel in a room with walls, which throw back what they get
+# Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
+# seen through the windows alone.
+SHARES = {"open": (1.0, 1.0), "walls": (0.9, 0.12), "ceiling": (1.8, 0.4)}
 BULB = 0.04  # metres, radius
 SUN = 1.4  # irradiance of the sun: a white surface that faces it gains 0.45, about what the sky gives
 ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
@@ -47,8 +49,9 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     UsdGeom.Scope.Define(stage, LIGHTS)
     sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
     sky.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
-    share = ENCLOSED if room.options.walls else 1.0
-    full: Intensities = {sky.GetPath(): (0, 0.5 * share), **_panel(stage, volume, room.height, share)}
+    kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
+    above, panel = SHARES[kind]
+    full: Intensities = {sky.GetPath(): (0, 0.5 * above), **_panel(stage, volume, room.height, panel)}
     if room.options.walls:
         full |= _sun(stage, room)
     if len(room.layouts) < 2:  # bulbs stand where the lamps do
@@ -58,9 +61,9 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
         times.AddVariant(name)
         times.SetVariantSelection(name)
         with times.GetVariantEditContext():
-            for path, (kind, intensity) in full.items():
+            for path, (column, intensity) in full.items():
                 light = UsdLux.LightAPI(stage.OverridePrim(path))
-                light.CreateIntensityAttr(round(intensity * shares[kind], 4))
+                light.CreateIntensityAttr(round(intensity * shares[column], 4))
     times.SetVariantSelection("day")
 
 

@@ -15,9 +15,10 @@ LARGEST = (4.0, 3.0)
 
 
 def rugs(setting: Setting) -> None:
-    """One rug below every sofa group, bed and dining table that has room for it."""
+    """One rug below every sofa group, bed and dining table that has room for it; else below an armchair or a desk."""
     done: list[shapely.Polygon] = []
-    for host in sorted(setting.of("sofa", "bed", "dining_table"), key=lambda o: -float(o.size[0] * o.size[2])):
+    hosts = setting.of("sofa", "bed", "dining_table") or setting.of("armchair", "lounge_chair") or setting.of("desk")
+    for host in sorted(hosts, key=lambda o: -float(o.size[0] * o.size[2])):
         if host.row.name in ("lazy_sofa",):
             continue
         rng = setting.rng(host.name, "rug")
@@ -44,6 +45,10 @@ def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, flo
         wide, long = w + 1.3, min(d * 0.75 + 0.5, 2.4)
         near = {o.name for o in setting.of("seat", "nightstand")}
         return {host.name, *near}, (0.0, d / 2 + 0.45 - long / 2), (wide, long)
+    if host.row.role == "seat":
+        wide, long = w + 0.9, d + 0.8
+        near = {o.name for o in setting.of("seat", "light", "decor", "side_table", "coffee_table", "round_end_table")}
+        return {host.name, *near}, (0.0, 0.25), (wide, long)
     if host.row.role == "sofa":
         front = d / 2
         tables = [o for o in setting.of("coffee_table") if host.footprint.distance(o.footprint) < 1.2]

@@ -81,6 +81,7 @@ class Setting:
         height: of the room, metres. walls: whether there are any to hang things on.
         full: place as much as looks good, not only a little.
         seed: of all choices.
+        placed: the things so far. carriers: those of them that others stand on.
     """
 
     objects: Mapping[str, Standing]
@@ -91,6 +92,7 @@ class Setting:
     full: bool
     seed: int
     placed: list[Thing] = field(default_factory=list)
+    carriers: dict[str, Standing] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)
@@ -150,9 +152,13 @@ def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
     mesh = thing.geometry.mesh
     corners = thing.to_room(mesh.vertices)[mesh.faces]
     y = corners[..., 1]
-    within = (y.max(1) > low) & (y.min(1) < high)
-    points = corners[within].reshape(-1, 3)
-    inside = points[(points[:, 1] > low - 0.02) & (points[:, 1] < high + 0.02)]
-    if len(inside) < 3:  # only long triangles pass through
-        inside = points
+    corners = corners[(y.max(1) > low) & (y.min(1) < high)]
+    points = corners.reshape(-1, 3)
+    found = [points[(points[:, 1] > low) & (points[:, 1] < high)]]
+    start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)
+    for level in (low, high):  # where the sides of long triangles pass through
+        over = (start[:, 1] - level) * (end[:, 1] - level) < 0
+        share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
+        found.append(start[over] + share[:, None] * (end[over] - start[over]))
+    inside = np.concatenate(found)
     return shapely.MultiPoint(inside[:, [0, 2]]).convex_hull if len(inside) else shapely.Polygon()

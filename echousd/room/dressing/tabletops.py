@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.data.dressing import usual_size
-from echomodel.data.dressing.books import books_in
-from echousd.room.dressing.setting import Setting, Standing
+from echomodel.data.dressing import KINDS, usual_size
+from echomodel.data.dressing.books import BOUND, books_in, bound
+from echousd.room.dressing.setting import Setting, Standing, Thing
 from echousd.room.dressing.surfaces import Surface, surfaces
 
 Places = Sequence[tuple[float, float]]
@@ -18,6 +18,7 @@ BACK: Places = ((-0.8, -0.6), (0.8, -0.6), (-0.4, -0.6), (0.4, -0.6), (0.0, -0.6
 FRONT: Places = ((0.5, 0.6), (-0.5, 0.6), (0.0, 0.7), (0.7, 0.2), (-0.7, 0.2), (0.0, 0.0))
 MIDDLE: Places = ((0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.6, 0.3), (-0.6, -0.3))
 CORNERS: Places = ((0.9, -0.8), (-0.9, -0.8), (0.9, 0.8), (-0.9, 0.8), (0.0, -0.8))
+BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 
 # Category -> what is put on its top: kinds of which one is taken, places, and whether only a full room has it.
@@ -106,6 +107,8 @@ def tabletops(setting: Setting) -> None:
 def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
     rng = setting.rng(host.name, "top")
     taken: set[str] = set()
+    if name == "tv_stand" and not setting.of("screen"):
+        _television(setting, host, surface)
     for number, (kinds, places, only_full) in enumerate(TOPS[name]):
         order = [str(k) for k in rng.permutation(kinds)]
         turn = float(rng.uniform(-0.12, 0.12))
@@ -116,6 +119,15 @@ def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
             if surface.put(setting, kind, places, turn=0.0 if straight else turn, word=str(number)):
                 taken.add(kind)
                 break
+
+
+def _television(setting: Setting, host: Standing, surface: Surface) -> None:
+    """A television in the middle of its stand, as wide as looks good on it."""
+    for share in (0.6, 0.5, 0.4):
+        wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
+        size = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2])
+        if surface.put(setting, "television", ((0.0, -0.3), (0.0, 0.0), (0.2, 0.0), (-0.2, 0.0)), size=size, variant=0):
+            return
 
 
 def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
@@ -165,7 +177,10 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
             if tall < 0.14 or size[2] < 0.1:
                 break
             at = [(x, 0.9) for x in (-0.99 * side, 0.99 * side, -0.5 * side, 0.5 * side, 0.0)]
-            if surface.put(setting, "book_row", at, size=size, count=books_in(float(size[0])), word="row"):
+            row = surface.put(setting, "book_row", at, size=size, count=books_in(float(size[0])), word="row")
+            if row:
+                if setting.full:
+                    shelved_books(setting, row, rng)
                 break
     wanted = [str(kind) for kind in rng.permutation(SHELVED)]
     for number in range(2 if setting.full else 1):
@@ -174,3 +189,22 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
             for kind in wanted[number * 4 : number * 4 + 4]:
                 if surface.put(setting, kind, places, word=str(number)):
                     break
+
+
+def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> None:
+    """Put single books in the place of a row that stands already, each a thing of its own."""
+    setting.placed.remove(row)
+    wide, tall, deep = (float(v) for v in row.size)
+    at, front = -wide / 2, deep / 2
+    cos, sin = np.cos(row.yaw), np.sin(row.yaw)
+    fitting = [n for n in range(BOUND) if bound(n)[1] <= tall and bound(n)[2] <= deep]
+    while fitting:
+        number = int(rng.choice(fitting))
+        size = bound(number)
+        if at + size[0] > wide / 2:
+            return
+        x, z = at + size[0] / 2, front - size[2] / 2
+        place = row.position + np.array([cos * x + sin * z, 0.0, cos * z - sin * x])
+        setting.placed.append(Thing("book", size, place, row.yaw, row.on, number))
+        at += size[0] + BETWEEN
+    setting.placed.append(row)

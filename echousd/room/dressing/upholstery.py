@@ -15,12 +15,15 @@ STEP = 0.02  # metres from place to place
 
 
 def cushions(setting: Setting) -> None:
-    """Cushions in the corners of sofas, one on an armchair."""
-    for host in setting.of("sofa", "armchair", "lounge_chair"):
+    """Cushions in the corners of sofas, one on an armchair; in full rooms before the pillows of beds, too."""
+    beds = setting.of("bed") if setting.full else []
+    for host in [*setting.of("sofa", "armchair", "lounge_chair"), *beds]:
         rng = setting.rng(host.name, "cushion")
         size = usual_size("cushion", rng)
         wide = float(host.size[0])
         ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
+        if host in beds:
+            ends = [-0.3, 0.3] if wide > 1.3 else [0.0]
         if setting.full and wide > 1.7:
             ends.append(-0.62)
         variant = int(rng.integers(3))
@@ -39,6 +42,24 @@ def cushions(setting: Setting) -> None:
             thing = Thing("cushion", size, place, yaw, host.name, variant)
             if setting.clear(thing, host=host.name, margin=0.0, floor=False):
                 setting.placed.append(thing)
+
+
+def folded(setting: Setting) -> None:
+    """A folded blanket on the seat of the largest sofa of a full room."""
+    if not setting.full:
+        return
+    for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
+        rng = setting.rng(host.name, "folded")
+        size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(4)), _Seat.of(host)
+        for end in (0.25, -0.3, 0.0) if seat else ():
+            spot = seat.resting(end, size) if seat else None
+            if spot is None:
+                continue
+            spot = spot + np.array([0.0, 0.002, 0.0])
+            thing = Thing("folded_throw", size, host.to_room(spot[None])[0], host.yaw, host.name, variant)
+            if setting.clear(thing, host=host.name, margin=0.0, floor=False):
+                setting.placed.append(thing)
+                break
 
 
 def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:

@@ -87,6 +87,8 @@ def pictures(setting: Setting) -> None:
         wall, along = behind
         rng = setting.rng(host.name, "picture")
         for kind, size in _over(host, setting, rng):
+            if setting.full and kind == "picture" and _group(setting, wall, along, host, rng):
+                break
             thing = _hung(setting, wall, along, kind, size, host.top + OVER, int(rng.integers(1 << 30)), host.name)
             if thing:
                 setting.placed.append(thing)
@@ -103,6 +105,32 @@ def pictures(setting: Setting) -> None:
                                      for t in setting.placed):  # fmt: skip
                     setting.placed.append(thing)
                     break
+
+
+def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.random.Generator) -> bool:
+    """Three equal pictures in a row, or three pairs, over a long piece; all of them or none."""
+    wide = float(host.size[0])
+    if wide < 1.3:
+        return False
+    free = setting.height - 0.25 - host.top - OVER
+    rows = 2 if free > 1.15 and wide > 1.7 and rng.random() < 0.5 else 1
+    w = float(np.clip((0.8 * wide - 0.16) / 3, 0.28, 0.5))
+    h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
+    if h < 0.3:
+        return False
+    size, before = np.array([round(w, 2), h, 0.03]), len(setting.placed)
+    for row in range(rows):
+        for column in (-1, 0, 1):
+            least = max(host.top + OVER, 1.15) + row * (h + 0.08)
+            if rows == 2:
+                least = host.top + OVER + row * (h + 0.08)
+            spot = along + column * (float(size[0]) + 0.08)
+            one = _at(setting, wall, spot, "picture", size, least, int(rng.integers(12)), host.name)
+            if one is None:
+                del setting.placed[before:]
+                return False
+            setting.placed.append(one)
+    return True
 
 
 def _behind(host: Standing, walls: list[Wall]) -> tuple[Wall, float] | None:
@@ -143,18 +171,26 @@ def _hung(
     low = min(low, setting.height - 0.2 - size[1])
     if low < least - 0.1 or low < 0.4:
         return None
+    return _at(setting, wall, along, kind, size, low, variant, on)
+
+
+def _at(
+    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str
+) -> Thing | None:
+    """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way."""
     if along - size[0] / 2 < 0.12 or along + size[0] / 2 > wall.length - 0.12:
         return None
     for opening in (o for o in setting.openings if o.edge == wall.edge):
         beside = SIDE if opening.kind == "window" else 0.15
-        if _meets(opening, along, size[0] / 2 + beside, low, low + size[1]):
+        if meets(opening, along, size[0] / 2 + beside, low, low + size[1]):
             return None
     thing = Thing(kind, size, wall.at(along, size[2] / 2 + 0.002, low), wall.yaw, on, variant)
     before = Thing(kind, size + np.array([0.1, 0.06, 0.3]), wall.at(along, 0.18, low - 0.03), wall.yaw, on)
     return thing if setting.clear(before, margin=0.0, floor=False, host=on) else None
 
 
-def _meets(opening: Opening, along: float, half: float, low: float, high: float) -> bool:
+def meets(opening: Opening, along: float, half: float, low: float, high: float) -> bool:
+    """Whether an opening lies within `half` metres of a place along its wall, between two heights."""
     beside = opening.end < along - half or opening.offset > along + half
     return not beside and opening.sill - 0.1 < high and opening.sill + opening.height + 0.2 > low
 

@@ -14,7 +14,8 @@ from echomodel.data.dressing import KINDS
 from echousd.check import check_room
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
-from echousd.room.dressing.dress import dress, placed, setting_of
+from echousd.room.dressing.dress import RULES, dress, placed, setting_of
+from echousd.room.dressing.setting import reaches
 from echousd.room.dressing.surfaces import surfaces
 from echousd.stage import read_graph
 
@@ -79,6 +80,7 @@ def test_things_stay_in_the_room_and_out_of_each_other(room):
     setting = setting_of(room)
     things = placed(room)
     upright = [t for t in things if not KINDS[t.kind].lies]
+    assert len(things) >= 30
     for number, one in enumerate(upright):
         assert setting.room.buffer(0.02).contains(one.footprint), one
         for other in upright[number + 1 :]:
@@ -89,13 +91,38 @@ def test_things_stay_in_the_room_and_out_of_each_other(room):
 
 
 def test_nothing_stands_over_an_edge_or_in_the_air(room):
-    objects = setting_of(room).objects
+    setting = setting_of(room)
+    for rule in RULES:
+        rule(setting)
+    objects = {**setting.objects, **setting.carriers}
     standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and t.kind != "cushion"]
     assert standing
     for thing in standing:
         host = objects[thing.on]
         assert host.footprint.contains(thing.footprint), thing
         assert thing.position[1] == pytest.approx(host.top, abs=1e-6)  # boxes have one level
+
+
+@pytest.mark.parametrize(("name", "least"), [("living_room", 40), ("bedroom", 25)])
+def test_full_rooms_are_full_and_clean(name, least, tmp_path):
+    room = echousd.generate(f"samples/{name}.usda", seed=1, options=RoomOptions(walls=True, dress="full"))
+    things = placed(room)
+    assert len(things) >= least
+    assert len({thing.kind for thing in things}) >= 15
+    assert len(dress(room).geometry) < 50  # single books share their assets
+    setting = setting_of(room)
+    upright = [t for t in things if not KINDS[t.kind].lies and t.kind not in ("cushion", "folded_throw")]
+    for number, one in enumerate(upright):
+        assert setting.room.buffer(0.02).contains(one.footprint), one
+        low, high = one.position[1] + 2e-3, one.position[1] + one.size[1]
+        for other in upright[number + 1 :]:
+            over = min(high, other.position[1] + other.size[1]) - max(low, other.position[1])
+            assert over <= 0 or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
+        for host in setting.objects.values():
+            if one.on != host.name and one.kind not in ("curtain",):
+                within = host.top > low and host.position[1] < high
+                assert not within or reaches(host, low, high).intersection(one.footprint).area < 1e-4, (one, host.name)
+    assert check_room(room.save(tmp_path / name, preview=False)).ok
 
 
 def test_doors_stay_free(room):

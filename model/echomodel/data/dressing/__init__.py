@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.dressing import books, household, textiles, vessels
+from echomodel.data.dressing import books, floorware, household, hung, textiles, vessels
 from echomodel.data.furniture.solids import Solid
 
 Program = Callable[[np.ndarray, np.random.Generator], list[Solid]]
@@ -47,7 +47,9 @@ KINDS: dict[str, Kind] = {
         Kind("curtain", "curtain", textiles.curtain, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True),
         Kind("cushion", "cushion", textiles.cushion, (0.38, 0.36, 0.13), (0.46, 0.42, 0.16), faces=400),
         Kind("throw", "blanket", textiles.throw, (1.0, 0.2, 0.4), (2.0, 0.3, 0.7), True, True),
+        Kind("throw", "blanket", textiles.folded_throw, (0.34, 0.05, 0.3), (0.42, 0.07, 0.36), faces=400),
         Kind("books", "book", books.book_row, (0.16, 0.19, 0.14), (0.5, 0.27, 0.2), faces=1600),
+        Kind("book", "book", books.book, (0.018, 0.19, 0.13), (0.038, 0.25, 0.16)),
         Kind("books", "book", books.book_stack, (0.2, 0.06, 0.15), (0.28, 0.12, 0.2)),
         Kind("magazine", "book", books.magazine, (0.21, 0.008, 0.28), (0.23, 0.01, 0.3)),
         Kind("notebook", "book", books.notebook, (0.15, 0.018, 0.21), (0.17, 0.022, 0.23)),
@@ -64,11 +66,21 @@ KINDS: dict[str, Kind] = {
         Kind("picture", "painting", household.picture, (0.3, 0.4, 0.03), (1.2, 0.9, 0.03), True),
         Kind("mirror", "mirror", household.mirror, (0.5, 0.7, 0.03), (0.7, 1.1, 0.03), True),
         Kind("mirror", "mirror", household.round_mirror, (0.5, 0.5, 0.03), (0.8, 0.8, 0.03), True),
+        Kind("clock", "clock", hung.wall_clock, (0.26, 0.26, 0.04), (0.36, 0.36, 0.04), True),
+        Kind("wall_shelf", "shelf", hung.wall_shelf, (0.7, 0.12, 0.2), (1.1, 0.12, 0.22), True),
+        Kind("coats", "apparel", hung.coats, (0.5, 0.95, 0.17), (0.64, 1.05, 0.19), True),
+        Kind("mirror", "mirror", hung.tall_mirror, (0.44, 1.4, 0.03), (0.55, 1.6, 0.03), True),
         Kind("photo", "painting", household.photo, (0.13, 0.18, 0.09), (0.18, 0.24, 0.1)),
         Kind("clock", "clock", household.clock, (0.1, 0.1, 0.05), (0.13, 0.13, 0.05)),
         Kind("laptop", "computer", household.laptop, (0.32, 0.22, 0.28), (0.36, 0.24, 0.3)),
         Kind("pens", "pot", household.pens, (0.08, 0.17, 0.08), (0.09, 0.19, 0.09)),
         Kind("remote", "box", household.remote, (0.045, 0.018, 0.17), (0.05, 0.02, 0.2)),
+        Kind("television", "television", household.television, (0.6, 0.39, 0.18), (0.95, 0.58, 0.22)),
+        Kind("slippers", "apparel", floorware.slippers, (0.22, 0.07, 0.26), (0.24, 0.08, 0.28)),
+        Kind("floor_plant", "plant", floorware.floor_plant, (0.42, 0.85, 0.42), (0.58, 1.35, 0.58), faces=2600),
+        Kind("floor_vase", "vase", floorware.floor_vase, (0.24, 0.8, 0.24), (0.32, 1.1, 0.32)),
+        Kind("pouf", "ottoman", floorware.pouf, (0.42, 0.34, 0.42), (0.52, 0.42, 0.52)),
+        Kind("cable", "pipe", floorware.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
         Kind("shoes", "apparel", household.shoes, (0.24, 0.1, 0.27), (0.27, 0.12, 0.31)),
     )
 }

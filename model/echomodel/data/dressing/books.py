@@ -1,4 +1,4 @@
-"""Books: rows, stacks, magazines, a notebook."""
+"""Books: single ones, rows, stacks, magazines, a notebook."""
 
 from __future__ import annotations
 
@@ -26,6 +26,21 @@ def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
     if not parts:
         parts += _upright(-w / 2, w, h, d, d, COVERS[0])
     return parts
+
+
+BOUND = 12  # kinds of single books, so that a wall of them shares few assets
+THICK, TALL, DEEP = (0.018, 0.024, 0.03, 0.038), (0.19, 0.22, 0.25), (0.13, 0.145, 0.16)
+
+
+def bound(number: int) -> np.ndarray:
+    """(3,) float, metres: extents of single book `number`, 0 to `BOUND` - 1."""
+    return np.array([THICK[number % 4], TALL[number % 3], DEEP[(number // 4) % 3]])
+
+
+def book(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One book upright, its spine to the front."""
+    w, h, d = size
+    return _upright(-w / 2, w, h, d, d, str(rng.choice(COVERS)))
 
 
 def books_in(width: float) -> int:

@@ -110,6 +110,21 @@ def laptop(size: Size, rng: np.random.Generator) -> list[Solid]:
     return parts
 
 
+def television(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A flat television on two feet."""
+    w, h, d = size
+    foot, thick = 0.06, 0.03
+    parts: list[Solid] = [
+        box((-w / 2, foot, -thick / 2), (w / 2, h, thick / 2), "soil", 0.006),
+        box((-w / 2 + 0.012, foot + 0.02, 0), (w / 2 - 0.012, h - 0.012, thick / 2 + 0.001), "screen"),
+    ]
+    for x in (-0.32 * w, 0.32 * w):
+        for z in (-d / 2, d / 2):
+            leg = np.array([[x, foot + 0.02, 0], [x, 0.006, z * 0.97]])
+            parts.append(Tube(points=leg, radius=0.006, material="metal"))
+    return parts
+
+
 def pens(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A pot with pens."""
     w, h, d = size

@@ -71,3 +71,15 @@ def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
         return out
 
     return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]
+
+
+def folded_throw(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A blanket folded twice: soft layers, each a little shorter than the one below."""
+    w, h, d = size
+    thick = h / 3
+    parts: list[Solid] = []
+    for layer in range(3):
+        share = 1.0 - 0.025 * layer
+        low, high = (-w / 2 * share, thick * layer, -d / 2), (w / 2 * share, thick * (layer + 1), d / 2 * share)
+        parts.append(box(low, high, "blanket", thick * 0.45))
+    return parts

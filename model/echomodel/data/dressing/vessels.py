@@ -9,7 +9,7 @@ from echomodel.data.furniture.carpentry import Size, box
 from echomodel.data.furniture.solids import Ball, Solid, Tube, rotation
 
 
-def _vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:
+def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:
     """A vessel whose outer side is `outer` (k, 2): radius and height from the foot to the rim."""
     top = outer[-1, 1]
     inner = outer[outer[:, 1] > inside * top][::-1] - (wall, 0.0)
@@ -33,14 +33,14 @@ SHAPES = (
 
 def vase(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A vase alone."""
-    return [_vessel(_outline(SHAPES[int(rng.integers(len(SHAPES)))], size), 0.006, "ceramic", 0.05)]
+    return [vessel(_outline(SHAPES[int(rng.integers(len(SHAPES)))], size), 0.006, "ceramic", 0.05)]
 
 
 def flowers(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A vase with branches."""
     w, h, d = size
     body = np.array([w * 0.5, h * 0.42, d * 0.5])
-    parts: list[Solid] = [_vessel(_outline(SHAPES[int(rng.integers(2))], body), 0.006, "ceramic", 0.05)]
+    parts: list[Solid] = [vessel(_outline(SHAPES[int(rng.integers(2))], body), 0.006, "ceramic", 0.05)]
     count = int(rng.integers(5, 8))
     for number in range(count):
         yaw = 2 * np.pi * (number + rng.uniform(-0.2, 0.2)) / count
@@ -62,7 +62,7 @@ def small_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
     """Leaves on arching stems in a pot."""
     w, h, d = size
     pot_h, pot_r = h * 0.36, min(w, d) * 0.27
-    pot = _vessel(_outline([0.78, 0.9, 1.0], np.array([2 * pot_r, pot_h, 2 * pot_r])), 0.006, "ceramic", 0.8)
+    pot = vessel(_outline([0.78, 0.9, 1.0], np.array([2 * pot_r, pot_h, 2 * pot_r])), 0.006, "ceramic", 0.8)
     parts: list[Solid] = [pot, Lathe(profile=np.array([[pot_r * 0.9, pot_h * 0.7], [pot_r * 0.9, pot_h * 0.9]]),
                                      material="soil")]  # fmt: skip
     count = int(rng.integers(10, 15))
@@ -83,7 +83,7 @@ def bowl(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A wide bowl, often with fruit in it."""
     w, h, d = size
     rim = h if rng.random() < 0.35 else h * 0.78
-    parts: list[Solid] = [_vessel(_outline([0.42, 0.62, 0.84, 0.95, 1.0], np.array([w, rim, d])), 0.006, "ceramic")]
+    parts: list[Solid] = [vessel(_outline([0.42, 0.62, 0.84, 0.95, 1.0], np.array([w, rim, d])), 0.006, "ceramic")]
     if rim < h:
         radius = min(w, d) * 0.15
         for number in range(5):
@@ -116,7 +116,7 @@ def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     radius = d / 2
     centre = -(w - d) / 2
-    body = _vessel(_outline([0.86, 0.95, 1.0, 1.0], np.array([d, h, d])), 0.004, "ceramic")
+    body = vessel(_outline([0.86, 0.95, 1.0, 1.0], np.array([d, h, d])), 0.004, "ceramic")
     turn = np.linspace(-np.pi / 2, np.pi / 2, 7)
     loop = np.stack([radius * 0.95 + (w - d) * np.cos(turn), h * (0.52 + 0.3 * np.sin(turn)), 0 * turn], 1)
     coffee = Lathe(profile=np.array([[radius * 0.92, h * 0.5], [radius * 0.92, h * 0.78]]), material="soil")
@@ -135,7 +135,7 @@ def plate(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 def glass(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A drinking glass."""
-    return [_vessel(_outline([0.82, 0.9, 1.0], size), 0.003, "glass", 0.08)]
+    return [vessel(_outline([0.82, 0.9, 1.0], size), 0.003, "glass", 0.08)]
 
 
 def tray(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -154,7 +154,7 @@ def tray(size: Size, rng: np.random.Generator) -> list[Solid]:
 def basket(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A woven basket with a blanket in it."""
     w, h, d = size
-    parts: list[Solid] = [_vessel(_outline([0.8, 0.95, 1.0, 0.97], np.array([w, h * 0.9, d])), 0.012, "wicker")]
+    parts: list[Solid] = [vessel(_outline([0.8, 0.95, 1.0, 0.97], np.array([w, h * 0.9, d])), 0.012, "wicker")]
     for x, z, tall in ((-0.1, 0.06, 1.0), (0.12, -0.05, 0.94)):
         half = np.array([w * 0.24, h * 0.22, d * 0.26])
         centre = np.array([x * w, h * tall - half[1], z * d])
