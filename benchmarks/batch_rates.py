@@ -1,6 +1,6 @@
 """Rooms a second of a batch, against single warm `generate` calls and against the network's own time.
 
-    OMP_NUM_THREADS=1 python benchmarks/batch_rates.py [--rooms 16] [--shapes boxes] [--preview]
+    OMP_NUM_THREADS=1 python benchmarks/batch_rates.py [--rooms 32] [--shapes boxes] [--preview]
 
 Wanted: per room at least 2.5 times the single calls on boxes and 1.5 times with shapes (two workers, two cores), and at
 least 1.7 times from one worker to two. CPU seconds a room are printed beside: a busy machine does not change those.
@@ -40,6 +40,16 @@ def one_by_one(request: BatchRequest, folder: Path) -> tuple[float, float]:
     for job in jobs[1:]:
         work.room(job)
     return (time.perf_counter() - wall) / (len(jobs) - 1), (cpu() - used) / (len(jobs) - 1)
+
+
+def network(request: BatchRequest) -> float:
+    """CPU seconds a room of the network alone, for the first drafts as they are packed."""
+    plan = make_plan(request, "")
+    packs = [[work.Job(e.id, "", e.seed, plan.options[0], draw=e.draw) for e in pack] for pack in plan.packs()]
+    used = time.process_time()
+    for jobs in packs:
+        work.layouts(jobs)
+    return (time.process_time() - used) / len(plan.entries)
 
 
 def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, float]:
@@ -83,6 +93,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         single = one_by_one(request, Path(scratch) / "single")
         print(f"single     {single[0]:6.2f} s a room, CPU {single[1]:6.2f} s", flush=True)
+        print(f"network    CPU {network(request):6.2f} s a room, first drafts", flush=True)
         for workers in (1, 2):
             many = together(request, Path(scratch) / f"many_{workers}", workers)
             print(
