@@ -38,6 +38,7 @@ def edit(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
     ] = False,
+    undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back, byte for byte; alone.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
@@ -66,6 +67,11 @@ def edit(
     )  # fmt: skip
     options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces, "assets": assets}
     options["drafts"] = drafts
+    if undo:
+        if wishes != Wishes() or dry_run or output is not None:
+            raise ValueError("--undo takes the last edit back and does nothing else; leave the other options out")
+        _undo(room, wait)
+        return
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
@@ -95,6 +101,19 @@ def update(
     options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
     nothing = f"{layer}: changes nothing about the room"
     _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait)
+
+
+def _undo(room: Path, wait: bool) -> None:
+    """Take the last edit of a room back and say what it was."""
+    from echousd.room.history import undo
+    from echousd.room.save import write_preview, write_sheet
+
+    steps = undo(room, wait=wait)
+    write_preview(room)
+    write_sheet(room)
+    for step in steps:
+        say(f"undone   {step}")
+    say(f"room     {room}")
 
 
 def _change(

@@ -19,6 +19,17 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=255)
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
 
 
+class Step(BaseModel):
+    """One edit that can be taken back: what it said, the archive with what it replaced, and the files that it added."""
+
+    model_config = ConfigDict(strict=True)
+
+    number: Annotated[int, Field(ge=1)]
+    steps: list[str]
+    restores: Annotated[str, Field(max_length=4096)]
+    adds: list[str]
+
+
 class Manifest(BaseModel):
     """The fields that are read back; others are kept as they are. `echousd.room.save.manifest_of` writes them."""
 
@@ -40,6 +51,7 @@ class Manifest(BaseModel):
     dress: Literal["none", "some", "full"] = "none"
     palette: str = ""
     meshes: dict[str, dict[str, Any]] = {}
+    history: list[Step] = []
     store: Annotated[str, Field(max_length=4096)] = ""
     stored: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]] = {}
 
@@ -91,6 +103,9 @@ def read_manifest(path: Path, raw: dict[str, Any]) -> dict[str, Any]:
         raise ValueError(f"{path}: {where} is {first['input']!r:.100}, allowed: {_allowed(first)}") from None
     for name in manifest.files:
         inside(path.parent, name, f"{path}: files")
+    for step in manifest.history:
+        for name in (step.restores, *step.adds):
+            inside(path.parent, name, f"{path}: history")
     return manifest.model_dump()
 
 

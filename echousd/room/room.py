@@ -150,6 +150,7 @@ class RoomData:
         outcomes: what became of each layout, in their order.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
+        edited: it comes from a room that was there before; saved over that one it can be taken back.
         carried: asset name -> its files (path -> bytes), which are written again as they are.
     """
 
@@ -166,6 +167,7 @@ class RoomData:
     options: RoomOptions = RoomOptions()
     timings: Mapping[str, float] = field(default_factory=dict)
     carried: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
+    edited: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from pxr import Sdf, Usd
 
 import echousd
 from echousd.flattening import flat_layer
+from echousd.graph import SceneGraph
 from echousd.naming import as_identifier
 from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
@@ -22,6 +23,7 @@ from echousd.room import folder as folders
 from echousd.room import ownership, paintings
 from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
+from echousd.room.history import remembered
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
 from echousd.room.room import LayoutOutcome, RoomData
@@ -88,7 +90,20 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     gone = [path for path in recorded if path not in owned]
     needed = ownership.referenced(folder, recorded, gone, replaced)
     owned |= {path: recorded[path] for path in needed}
-    told = manifest_of(room, owned) | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
+    history: list[dict[str, Any]] = []
+    if room.edited and old:
+        steps = SceneGraph.from_json(json.dumps(old["graph"])).diff(room.graph).lines() if "graph" in old else []
+        history, archive = remembered(folder, old, files, steps)
+        files |= archive
+        kept_steps = {entry["restores"] for entry in history}
+        owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}
+        owned |= {path: folders.digest(content) for path, content in archive.items()}
+    gone = [path for path in gone if path not in owned]
+    told = (
+        manifest_of(room, owned)
+        | {"history": history}
+        | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
+    )
     files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.

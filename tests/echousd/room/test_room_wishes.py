@@ -1,6 +1,7 @@
 """Wishes about a finished room: where things stand, how they are turned, what is locked; and those of a layer."""
 
 import hashlib
+import json
 import math
 
 import numpy as np
@@ -117,3 +118,46 @@ def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
     done = echousd_command("update", root)
     assert done.code == 2
     assert "the room's own root layer; name the stronger layer" in done.err
+
+
+def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
+    states = [files(root.parent)]
+    assert echousd_command("edit", root, "--undo").err == f"error: {root}: no edit to take back\n"
+    for words in (("--add", "chair:nightstand"), ("--remove", "wardrobe", "--move", "chair:1.2,1.1")):
+        done = echousd_command("edit", root, "--shapes", "boxes", *words)
+        assert done.code in (0, 1), done.err
+        states.append(files(root.parent))
+    history = json.loads(root.with_suffix(".json").read_text())["history"]
+    assert [entry["number"] for entry in history] == [1, 2]
+    assert "+ object chair (nightstand)" in history[0]["steps"]
+    done = echousd_command("edit", root, "--undo")
+    assert done.code == 0, done.err
+    assert "undone   - object wardrobe (wardrobe)" in done.out
+    assert told(root.parent) == without_pictures(states[1])
+    read_room(root)
+    assert echousd_command("edit", root, "--undo").code == 0
+    assert told(root.parent) == without_pictures(states[0])
+    assert not (root.parent / "history").exists()
+
+
+def without_pictures(found):
+    return {name: value for name, value in found.items() if not name.endswith(".png") or "bedroom" not in name}
+
+
+def told(folder):
+    return without_pictures(files(folder))
+
+
+def test_an_edit_is_not_taken_back_over_somebody_elses_work(root, echousd_command):
+    assert echousd_command("edit", root, "--shapes", "boxes", "--add", "chair:nightstand").code in (0, 1)
+    layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / "materials.usda"))
+    layer.comment = "mine"
+    layer.Save()
+    before = files(root.parent)
+    done = echousd_command("edit", root, "--undo")
+    assert done.code == 2
+    assert "materials.usda: was changed since" in done.err
+    assert files(root.parent) == before
+    done = echousd_command("edit", root, "--undo", "--lock", "bed")
+    assert done.code == 2
+    assert "--undo takes the last edit back and does nothing else" in done.err

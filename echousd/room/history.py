@@ -1,0 +1,99 @@
+"""What a room was before each edit: the files that the edit replaced, archived, and the step back (no pxr here)."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from echousd.room import folder as folders
+from echousd.room import ownership
+from echousd.room.lock import locked
+from echousd.room.manifest import find_manifest, read_manifest
+
+FOLDER = "history"
+LONGEST = 50  # steps that are kept
+LARGEST = 2**30  # bytes of one state that are read back
+WHEN = (1980, 1, 1, 0, 0, 0)  # of every file in an archive: equal states are equal bytes
+
+
+def remembered(
+    folder: Path, old: Mapping[str, Any], files: Mapping[str, bytes], steps: Sequence[str]
+) -> tuple[list[dict[str, Any]], dict[str, bytes]]:
+    """The history of a room after an edit, and the archive of what the edit replaces: path -> bytes.
+
+    Arguments:
+        folder: the room's, as it is before the edit.
+        old: its manifest. files: what the edit writes, without the manifest. steps: what the edit says.
+    """
+    manifest = f"{old['name']}.json"
+    before = {path: ownership.read(folder, path) for path in old["files"] if not path.startswith(f"{FOLDER}/")}
+    ours = {p: c for p, c in before.items() if c is not None and folders.digest(c) == old["files"][p]}
+    replaced = {path: content for path, content in ours.items() if files.get(path) != content}
+    told = ownership.read(folder, manifest)
+    if told is None or not (replaced or steps):
+        return list(old["history"]), {}
+    number = 1 + max((entry["number"] for entry in old["history"]), default=0)
+    where = f"{FOLDER}/{number}.zip"
+    added = sorted(path for path in files if path not in old["files"])
+    entry = {"number": number, "steps": list(steps), "restores": where, "adds": added}
+    return [*old["history"], entry][-LONGEST:], {where: _archive({**replaced, manifest: told})}
+
+
+def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
+    """Put a room back to what it was before its last edit, byte for byte, and say which steps were taken back.
+
+    Arguments:
+        root: the room's root layer. wait: for another process that writes the folder.
+
+    Raises ValueError where there is no edit to take back, a file of the room was changed by somebody since, or the
+    archive is damaged; nothing is changed then.
+    """
+    folder = root.parent
+    with locked(folder, wait=wait):
+        manifest = folders.claim(folder, force=False, root=root.stem)
+        if not manifest.get("history"):
+            raise ValueError(f"{root}: no edit to take back")
+        last = manifest["history"][-1]
+        files = _read_archive(folder, last["restores"])
+        name = f"{manifest['name']}.json"
+        if name not in files:
+            raise ValueError(f"{folder / last['restores']}: holds no manifest {name}")
+        earlier = read_manifest(folder / name, json.loads(files[name]))
+        for path in [path for path in (*files, *last["adds"]) if path in manifest["files"]]:
+            content = ownership.read(folder, path)
+            if content is not None and folders.digest(content) != manifest["files"][path]:
+                raise ValueError(f"{folder / path}: was changed since; move it away first, then take the edit back")
+        for path in files:
+            if path != name and path not in earlier["files"]:
+                raise ValueError(f"{folder / last['restores']}: holds {path!r}, which is no file of the room")
+        gone = [path for path in (*last["adds"], last["restores"]) if path in manifest["files"] and path not in files]
+        folders.write_together(folder, files, last=[f"{manifest['name']}.usda", name], remove=gone)
+    assert find_manifest(folder, root.stem) is not None
+    return tuple(last["steps"])
+
+
+def _archive(files: Mapping[str, bytes]) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(files):
+            info = zipfile.ZipInfo(path, WHEN)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, files[path])
+    return out.getvalue()
+
+
+def _read_archive(folder: Path, path: str) -> dict[str, bytes]:
+    content = ownership.read(folder, path)
+    if content is None:
+        raise ValueError(f"{folder / path}: is missing, so that the edit cannot be taken back")
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
+                raise ValueError(f"{folder / path}: holds more than {LARGEST >> 20} MiB")
+            return {entry.filename: archive.read(entry) for entry in archive.infolist()}
+    except (zipfile.BadZipFile, RuntimeError, EOFError, OSError) as error:
+        raise ValueError(f"{folder / path}: is damaged ({error})") from None
