@@ -1,35 +1,45 @@
-"""Unselected rooms from above, on one sheet: what a person would point at, counted by the living rules and by eye.
+"""Unselected rooms from above, on sheets: what a person would point at, counted by the living rules and by eye.
 
     python benchmarks/room_sheets.py --seeds 4 -o sheets
+    python benchmarks/room_sheets.py --set people --seeds 2 -o sheets
 
-The five samples and what `echousd new --room` writes for all five types, each with the same seeds; boxes with their
-front as a dark edge, faults of the rules in red.
+The five samples (`samples`), what `echousd new --room` writes for all five types (`new`), and graphs as people write
+them (`people`, people_graphs.yaml), each with the same seeds; boxes with their front as a dark edge, faults of the
+rules in red.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+import yaml
+from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.openings import segment, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd import generate
-from echousd.graph import load_graph
+from echousd.graph import SceneGraph, load_graph
 from echousd.graph.starting import starting_graph
 from echousd.repair.geometry import corners
 from echousd.repair.living import living_faults
+from echousd.room import Room
 
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
-CELL, TITLE, LINES = 420, 30, 60  # pixels
+SETS = ("samples", "new", "people")
+CELL, TITLE, LINES = 540, 34, 66  # pixels
+ACROSS, DOWN = 3, 2  # rooms on a sheet
+FONT = ImageFont.load_default(13)
 
 
-def cell(room, title: str) -> tuple[Image.Image, list[str]]:  # type: ignore[no-untyped-def]
+def cell(room: Room, title: str) -> tuple[Image.Image, list[str]]:
     """One room from above, and its faults as sentences."""
-    faults = [fault.says for fault in living_faults(room.graph, room.boxes, room.floor)]
+    faults = [f"{fault.rule}: {fault.says}" for fault in living_faults(room.graph, room.boxes, room.floor)]
     picture = Image.new("RGB", (CELL, CELL + TITLE + LINES), "white")
     draw = ImageDraw.Draw(picture)
     low, high = room.floor.min(0), room.floor.max(0)
@@ -42,7 +52,7 @@ def cell(room, title: str) -> tuple[Image.Image, list[str]]:  # type: ignore[no-
     outline = room.floor if room.graph.room.corners is None else np.asarray(room.graph.room.corners)
     for opening in room.graph.room.openings:
         colour = "#4a90d9" if opening.kind == "window" else "#b07030"
-        draw.line(at(segment(outline, opening)), fill=colour, width=7)
+        draw.line(at(segment(outline, opening)), fill=colour, width=9)
         if len(sweep := swing_area(outline, opening)):
             draw.polygon(at(sweep), outline=colour)
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
@@ -53,14 +63,38 @@ def cell(room, title: str) -> tuple[Image.Image, list[str]]:  # type: ignore[no-
         hangs = kind.support == "ceiling"
         draw.polygon(points, fill=None if hangs else kind.colour, outline="#d0a000" if hangs else "#444444")
         if not hangs:
-            draw.line([points[2], points[3]], fill="black", width=4)
+            draw.line([points[2], points[3]], fill="black", width=5)
         middle = np.mean(points, 0)
-        draw.text(tuple(middle - (18, 5)), room.names[i][:14], fill="#a08000" if hangs else "black")
+        draw.text(tuple(middle), room.names[i][:14], fill="#a08000" if hangs else "black", anchor="mm", font=FONT)
     broken = sum(v.state == "broken" for v in room.verdicts)
-    draw.text((8, 6), f"{title}  {high[0] - low[0]:.1f} x {high[1] - low[1]:.1f} m, broken {broken}", fill="black")
+    said = f"{title}  {high[0] - low[0]:.1f} x {high[1] - low[1]:.1f} m, broken {broken}"
+    draw.text((8, 6), said, fill="black", font=FONT)
     for number, text in enumerate(faults[:4]):
-        draw.text((8, CELL + TITLE + 13 * number), text[:70], fill="red")
+        draw.text((8, CELL + TITLE + 16 * number), text[:80], fill="red", font=FONT)
     return picture, faults
+
+
+def graphs_of(sets: list[str]) -> Iterator[tuple[str, SceneGraph]]:
+    """Name and graph of every room of some of `SETS`."""
+    here = Path(__file__).parent
+    if "samples" in sets:
+        for path in sorted(here.parent.glob("samples/*.yaml")):
+            yield path.stem, load_graph(path)
+    if "new" in sets:
+        for word in TYPES:
+            yield f"new_{word}", starting_graph(word)
+    if "people" in sets:
+        for name, entry in yaml.safe_load((here / "people_graphs.yaml").read_text("utf-8")).items():
+            yield name, SceneGraph.from_yaml(yaml.safe_dump(entry, sort_keys=False))
+
+
+def save_sheets(cells: list[Image.Image], folder: Path) -> None:
+    """The pictures in their order on as many sheets as they need."""
+    for first in range(0, len(cells), ACROSS * DOWN):
+        sheet = Image.new("RGB", (ACROSS * CELL, DOWN * cells[0].height), "white")
+        for number, picture in enumerate(cells[first : first + ACROSS * DOWN]):
+            sheet.paste(picture, ((number % ACROSS) * CELL, (number // ACROSS) * picture.height))
+        sheet.save(folder / f"sheet_{first // (ACROSS * DOWN):02d}.png")
 
 
 def main() -> None:
@@ -68,38 +102,36 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--only", nargs="*", default=None, help="names of samples or new_TYPE")
+    parser.add_argument("--set", nargs="*", default=list(SETS), choices=SETS)
+    parser.add_argument("--only", nargs="*", default=None, help="names of samples, new_TYPE or rooms of people")
     parser.add_argument("-o", "--output", type=Path, default=Path("sheets"))
     options = parser.parse_args()
-    graphs = {f"new_{word}": starting_graph(word) for word in TYPES}
-    for path in sorted(Path(__file__).parents[1].glob("samples/*.yaml")):
-        graphs[path.stem] = load_graph(path)
+    warnings.simplefilter("ignore")
     options.output.mkdir(parents=True, exist_ok=True)
-    rooms = clean = faults = objects = broken = 0
-    seconds = 0.0
-    for name, graph in graphs.items():
+    cells, took = [], []
+    clean = faults = objects = broken = collisions = 0
+    by_rule: Counter[str] = Counter()
+    for name, graph in graphs_of(options.set):
         if options.only and name not in options.only:
             continue
-        cells = []
         for seed in range(options.first, options.first + options.seeds):
             started = time.perf_counter()
             room = generate(graph, seed=seed, shapes="boxes")
-            seconds += room.timings["layout"] + room.timings["repair"]
+            took.append(room.timings["layout"] + room.timings["repair"])
             picture, found = cell(room, f"{name} seed {seed}  {time.perf_counter() - started:.1f} s")
             cells.append(picture)
-            rooms, clean, faults = rooms + 1, clean + (not found), faults + len(found)
-            objects += len(room.names)
+            clean, faults, objects = clean + (not found), faults + len(found), objects + len(room.names)
             broken += sum(v.state == "broken" for v in room.verdicts)
+            collisions += len(room.faults) - sum(v.state == "broken" for v in room.verdicts)
+            by_rule.update(sentence.partition(":")[0] for sentence in found)
             for sentence in found:
                 print(f"{name} {seed}: {sentence}")
-        across = min(4, len(cells))
-        down = -(-len(cells) // across)
-        sheet = Image.new("RGB", (across * CELL, down * cells[0].height), "white")
-        for number, picture in enumerate(cells):
-            sheet.paste(picture, ((number % across) * CELL, (number // across) * picture.height))
-        sheet.save(options.output / f"{name}.png")
-    print(f"{rooms} rooms, {clean} without a fault, {faults} faults at {objects} objects, {broken} relations broken,")
-    print(f"layout and repair {seconds / rooms:.2f} s a room")
+    save_sheets(cells, options.output)
+    print(
+        f"{len(cells)} rooms, {clean} without a fault, {faults} faults at {objects} objects, {broken} relations broken,"
+    )
+    print(f"{collisions} other faults; {', '.join(f'{rule} {count}' for rule, count in by_rule.most_common())}")
+    print(f"layout and repair {np.mean(took):.2f} s a room, {np.quantile(took, 0.95):.2f} s in 95 of 100")
 
 
 if __name__ == "__main__":

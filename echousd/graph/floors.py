@@ -16,40 +16,64 @@ CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
+def with_plan(graph: SceneGraph, seed: int) -> SceneGraph:
+    """The graph with the floor, the door and the windows that such a room would have, where it states none.
+
+    The layout is drawn for what comes back: doors then swing free and windows give light.
+    """
+    return with_placed_openings(with_floor(graph, seed), _fixed(graph), seed)
+
+
 def with_floor(graph: SceneGraph, seed: int) -> SceneGraph:
     """The graph with the floor that such a room would have, where it states none and fixes no object's place.
 
     The same seed and graph give the same floor. More objects in a row to the left and right than to the front and
-    behind make the room wider than deep.
+    behind make the room wider than deep. Some floors are L-shaped, as real ones are, where no opening counts walls.
     """
-    from echomodel.plans import floor_extents
+    from echomodel.plans import floor_extents, floor_outline, longest_side
 
     if graph.room.extents is not None or any(node.position is not None for node in graph.nodes):
         return graph
     said = [relation.predicate for relation in graph.relations]
     aside = sum(predicate in ("left", "right") for predicate in said)
     ahead = sum(predicate in ("front", "behind") for predicate in said)
+    furniture = [node.category for node in graph.nodes], [node.size for node in graph.nodes]
     extents = floor_extents(
         graph.room.type,
-        [node.category for node in graph.nodes],
-        [node.size for node in graph.nodes],
+        *furniture,
         _generator(seed, "floor"),
         along_x=(1 + ahead) / (2 + ahead + aside),
         openings=graph.room.openings,
     )
-    return graph.replaced(room=graph.room.replaced(size=extents))
+    cut = None
+    if not graph.room.openings:
+        cut = floor_outline(graph.room.type, extents, longest_side(*furniture), _generator(seed, "outline"))
+    if cut is None:
+        return graph.replaced(room=graph.room.replaced(size=extents))
+    return graph.replaced(room=graph.room.replaced(floor_polygon=tuple(map(tuple, cut.tolist()))))
 
 
 def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
-    """The graph with its rectangular floor made large enough for corners (n, 2) of furniture, x and z in metres."""
-    size = graph.room.size
-    if size is None or graph.room.floor_polygon or not len(corners):
+    """The graph with its proposed floor made large enough for corners (n, 2) of furniture, x and z in metres.
+
+    An L-shaped floor that does not hold them becomes the rectangle around it, and its openings are placed anew.
+    """
+    import shapely
+
+    room = graph.room
+    if room.extents is None or not len(corners):
         return graph
+    size = room.extents
+    if room.floor_polygon:
+        outline = shapely.Polygon(room.floor_polygon).buffer(1e-3)
+        if outline.covers(shapely.MultiPoint(corners)):
+            return graph
+        room = room.replaced(floor_polygon=None, size=size, openings=())
     needed = 2 * np.abs(corners).max(0)
-    if (needed <= np.array(size) + 1e-3).all():
-        return graph
-    x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
-    return graph.replaced(room=graph.room.replaced(size=(x, z)))
+    if (needed > np.array(size) + 1e-3).any():
+        x, z = (float(v) for v in np.maximum(size, np.ceil(needed * 10) / 10))
+        room = room.replaced(size=(x, z))
+    return graph if room is graph.room else graph.replaced(room=room)
 
 
 def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
@@ -57,16 +81,26 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
 
     Arguments:
         graph: with a floor; without one it comes back as it is.
-        boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all layouts.
+        boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands already.
         seed: decides between places that are equally good.
     """
-    from echomodel.plans import place_openings
+    from echomodel.openingplaces import place_openings
 
     corners = graph.room.corners
     if graph.room.openings or corners is None:
         return graph
     placed = place_openings(corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes)
     return graph.replaced(room=graph.room.replaced(openings=placed))
+
+
+def _fixed(graph: SceneGraph) -> Arrays:
+    """Size, position and yaw of the objects whose box is stated."""
+    nodes = [node for node in graph.nodes if None not in (node.size, node.position, node.yaw)]
+    return (
+        np.array([node.size for node in nodes], float).reshape(-1, 3),
+        np.array([node.position for node in nodes], float).reshape(-1, 3),
+        np.array([node.yaw for node in nodes], float),
+    )
 
 
 def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:

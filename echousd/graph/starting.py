@@ -65,11 +65,18 @@ def _node(category: str, position: int, count: int) -> Node:
 
 def _related(habit: Habit, nodes: list[Node], anchors: list[Node]) -> list[Relation]:
     """Objects are dealt to anchors in turn where each carries one (a lamp a nightstand), else all to the first."""
-    dealt = not habit.sides and not {"front", "close_by"} & set(habit.predicates)
+    dealt = not habit.sides and not {"front", "close_by", "opposite"} & set(habit.predicates)
     relations = []
     for i, node in enumerate(nodes):
         anchor = anchors[i % len(anchors)] if dealt else anchors[0]
         relations += [Relation(node.name, predicate, anchor.name) for predicate in habit.predicates]
         if habit.sides:
             relations.append(Relation(node.name, habit.sides[i % len(habit.sides)], anchor.name))
+        if i and node.category == nodes[0].category:
+            once = (
+                habit.among
+                if i == 1
+                else tuple(word for word in habit.among if vocabulary().predicate(word).transitive)
+            )
+            relations += [Relation(node.name, predicate, nodes[0].name) for predicate in once]
     return relations

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.openings import Opening
-from echomodel.rules.living.sizes import usual_sizes
+from echomodel.rules.living import plan_of
+from echomodel.rules.living.sizes import laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
 from echousd.repair.problem import Problem, pose, stacked
@@ -227,6 +228,9 @@ def repair_boxes(
         told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
         usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=np.isin(np.arange(n), told))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
+        anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
+        laid = laid_tables(at.problem.categories, at.size, anchor, ~rigid & ~np.isin(np.arange(n), told))
+        at = replace(at, size=laid)
         setting = setting_of(
             at.problem, at.position, at.yaw, at.size, turned,
             openings=openings, outline=floor_polygon, rules=rules, centre=centre,

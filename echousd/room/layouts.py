@@ -13,6 +13,7 @@ from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph
+from echousd.graph.floors import with_placed_openings
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.shell import floor_polygon
@@ -212,6 +213,21 @@ def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
     if not any(node.locked and node.position is None for node in graph.nodes):
         return graph
     return graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
+
+
+def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
+    """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way."""
+    from echousd.repair.living import living_faults
+
+    def faults(graph: SceneGraph) -> int:
+        return sum(len(living_faults(graph, boxes)) for boxes in layouts)
+
+    bare = graph.replaced(room=graph.room.replaced(openings=()))
+    before = faults(graph)
+    if graph.room.openings and before <= faults(bare):
+        return graph
+    moved = with_placed_openings(bare, plan_boxes(layouts), seed)
+    return moved if not graph.room.openings or faults(moved) < before else graph
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

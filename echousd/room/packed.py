@@ -10,7 +10,7 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.randomness import SceneGenerators
 from echousd.graph import SceneGraph
-from echousd.graph.floors import with_floor
+from echousd.graph.floors import with_plan
 from echousd.room.layouts import draft_rounds, sample_boxes
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
@@ -54,11 +54,11 @@ def sample_round(
     starts, counts = zip(*(draft_rounds(most)[number] for most in drafts), strict=True)
     start = starts[0]
     found: dict[int, tuple[Boxes, ...]] = {}
-    with_floors = [with_floor(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
-    together = [i for i, graph in enumerate(with_floors) if isinstance(model, EchoModel) and not _given(graph)]
-    for pack in packs(together, [len(graph.nodes) * n for graph, n in zip(with_floors, counts, strict=True)]):
+    planned = [with_plan(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
+    together = [i for i, graph in enumerate(planned) if isinstance(model, EchoModel) and not _given(graph)]
+    for pack in packs(together, [len(graph.nodes) * n for graph, n in zip(planned, counts, strict=True)]):
         owners = [i for i in pack for _ in range(counts[i])]
-        batches = {i: graph_batch(with_floors[i]) for i in pack}
+        batches = {i: graph_batch(planned[i]) for i in pack}
         generators = {i: seeded(seeds[i], "layout", start) for i in pack}  # one draws all drafts of its scene
         rows = [batches[i].num_nodes for i in owners]
         with one_thread():
@@ -70,10 +70,10 @@ def sample_round(
             )
         fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
         for i, size, position, yaw in zip(owners, *fields, strict=True):
-            graph = with_floors[i]
+            graph = planned[i]
             boxes = rounded_boxes(graph, Boxes(size, position + floor_centre(graph), yaw))
             found[i] = (*found.get(i, ()), boxes)
-    for i, graph in enumerate(with_floors):
+    for i, graph in enumerate(planned):
         if i not in found:
             found[i] = tuple(
                 sample_boxes(

@@ -12,7 +12,7 @@ from echomodel.roomboxes import footprints
 from echousd.assets.choose import AssetWishes, wishes_of
 from echousd.graph import SceneGraph
 from echousd.graph.doors import check_doors
-from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_wider_floor
+from echousd.graph.floors import check_space, with_plan, with_wider_floor
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
@@ -24,6 +24,7 @@ from echousd.room.layouts import (
     most_drafts,
     plan_boxes,
     room_floor,
+    with_free_openings,
     with_sizes,
 )
 from echousd.room.locking import with_locked_places
@@ -131,8 +132,7 @@ def generate(
     check_doors(graph)
     graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
     crowded = check_space(graph)
-    proposed = with_floor(graph, seed)
-    free, graph = proposed is not graph, proposed
+    stated, graph = graph, with_plan(graph, seed)
     drafts = drafts or most_drafts(echo, len(graph.nodes))
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
@@ -167,9 +167,10 @@ def generate(
         )  # fmt: skip
         layouts.append(found)
     plan = plan_boxes(layouts)
-    if free:  # without repair, or with weights that know of no floor, furniture may stand beyond what was proposed
+    if stated.room.extents is None:  # without repair, or with weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
-    graph = with_placed_openings(graph, plan, seed)
+    if not stated.room.openings:
+        graph = with_free_openings(graph, layouts, seed)
     request = ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer, retrieved=models)
     made = mixed_shapes(request, shapes)
     geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 ALIKE = 0.15  # largest relative difference of an extent that may be the same piece of furniture
 EQUAL = 1e-3  # largest relative difference of an extent within one asset
 ROOM_STYLE = "room"
+IN_SETS = ("at", "head", "company")  # how pieces stand that are bought as a set: 98 % of real ones are one model
 
 
 def style_groups(graph: SceneGraph) -> dict[str, str]:
     """Object name -> name of its style; objects that share a `style`, or that a relation unites, are one group.
 
-    A group without a name is called `set_<its first object>`. Objects of no group have the style `room`, so that a room
-    looks of one piece.
+    Pieces that come in sets, the chairs of a table or the nightstands of a bed, are one group with those of their kind
+    that state a style, unless two styles are stated. A group without a name is called `set_<its first object>`.
+    Objects of no group have the style `room`, so that a room looks of one piece.
     """
     place = {node.name: number for number, node in enumerate(graph.nodes)}
     alike: list[tuple[int, int]] = []
@@ -35,8 +37,8 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     for relation in graph.relations:
         if "style" in vocabulary().predicate(relation.predicate).unites:
             alike.append((place[relation.subject], place[relation.object]))
-    links = coo_array((np.ones(len(alike)), np.array(alike, int).reshape(-1, 2).T), shape=(len(place), len(place)))
-    group_of = connected_components(links, directed=False)[1].tolist() if place else []
+    alike += _sets(graph, _joined(alike, len(place)))
+    group_of = _joined(alike, len(place))
     members: dict[int, list[str]] = {}
     for node, number in zip(graph.nodes, group_of, strict=True):
         members.setdefault(number, []).append(node.name)
@@ -55,6 +57,34 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     return {node.name: out[node.name] for node in graph.nodes}
 
 
+def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:
+    """Number of the group of each of `count` objects, given pairs that are alike."""
+    links = coo_array((np.ones(len(alike)), np.array(alike, int).reshape(-1, 2).T), shape=(count, count))
+    return connected_components(links, directed=False)[1].tolist() if count else []
+
+
+def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of objects of one set that no style parts: those without a style join the others of their category."""
+    told = {name for relation in graph.relations for name in (relation.subject, relation.object)
+            if "style" in vocabulary().predicate(relation.predicate).unites}  # fmt: skip
+    kinds: dict[str, list[int]] = {}
+    styled: dict[str, set[int]] = {}
+    for number, node in enumerate(graph.nodes):
+        row = vocabulary().category(node.category)
+        if row.stands not in IN_SETS:
+            continue
+        if node.style or node.name in told:
+            styled.setdefault(row.name, set()).add(group_of[number])
+        kinds.setdefault(row.name, []).append(number)
+    pairs = []
+    for word, numbers in kinds.items():
+        groups = styled.get(word, set())
+        if len(groups) < 2:
+            first = next((k for k in numbers if group_of[k] in groups), numbers[0])
+            pairs += [(k, first) for k in numbers if k != first]
+    return pairs
+
+
 def equal_sizes(
     names: Sequence[str],
     categories: Sequence[str],
@@ -67,6 +97,8 @@ def equal_sizes(
 
     Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and
     those of a set whose size is given that size.
+
+    Chairs of a table and nightstands need not be alike before: they become as large as their middle one.
 
     Arguments:
         names, categories: n words each.

@@ -14,9 +14,11 @@ class Habit:
         anchors: categories to relate to, the preferred ones first.
         predicates: what holds between the object and its anchor.
         sides: predicates of which successive objects at one anchor get one each, in turn.
+        among: what holds between an object and the first of its kind at the anchor, for pieces that come in sets.
     """
 
     categories: tuple[str, ...]
     anchors: tuple[str, ...]
     predicates: tuple[str, ...] = ()
     sides: tuple[str, ...] = ()
+    among: tuple[str, ...] = ()

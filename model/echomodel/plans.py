@@ -1,27 +1,16 @@
-"""Plans that nobody stated: extents of a floor from the room type and its furniture, doors and windows in its walls."""
+"""Floors that nobody stated: area from the furniture with the space that its use takes, extents, and an outline."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
+from dataclasses import dataclass
 
 import numpy as np
 
 from echomodel.data.furniture.sizes import size_statistics
 from echomodel.data.rooms.statistics import quantile, room_type_statistics
-from echomodel.openings import (
-    SWINGS,
-    USUAL,
-    Opening,
-    edge_lengths,
-    free_area,
-    inward_normal,
-    numbered,
-    overlap,
-    signed_area,
-)
-from echomodel.roomboxes import footprints
-from echomodel.vocabulary import vocabulary
+from echomodel.openings import Opening
+from echomodel.vocabulary import Category, vocabulary
 
 # Share of the floor that furniture covers in real rooms: median of each type (300 rooms), the rest like the last.
 COVER = {"bedroom": 0.46, "living_room": 0.29, "dining_room": 0.26, "living_dining_room": 0.32, "study": 0.35}
@@ -30,11 +19,29 @@ ASPECT = {"living_dining_room": 1.55}  # long side over short side, median; othe
 USUAL_ASPECT = 1.3
 WAY = 0.9  # metres beside the longest piece
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
-GRID = 0.1  # metres between the places that are tried for an opening
-CORNER = 0.1  # metres from a corner to a door
-OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
-PIER = 0.3  # metres of wall between a window and a corner or another opening
-SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
+# What use takes beside a piece, metres: people pull chairs out by 0.75 m and walk round beds at 0.5 to 0.6 m.
+BEDSIDE, FOOT, PULL, KNEES, VIEW, HANDS = 0.5, 0.5, 0.75, 0.5, 2.1, 0.1
+DESK_CHAIR = 0.9  # metres before a desk
+# Share of a floor that use can take: the rest are ways and corners; beds are walked round within their own share.
+USED = {"bedroom": 0.78, "study": 0.7}
+USUALLY_USED = 0.66
+SPREAD = 0.12  # of the logarithm of what is more than needed
+DOOR_AREA = 1.0  # square metres
+WALLED = 0.58  # share of the walls that furniture can stand at: the rest are doors, low windows and corners
+# Share of the floors with a corner cut off; real ones have smaller cuts besides, which no furniture notices.
+CUT = {"living_dining_room": 0.35, "living_room": 0.25}
+USUAL_CUT = 0.12
+LEAST_CUT_AREA = 14.0  # square metres of a floor that can spare a corner
+ARM = 2.4  # metres that each arm of a cut floor is wide at least
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A piece on the floor: its row, width and depth in metres."""
+
+    kind: Category
+    width: float
+    depth: float
 
 
 def footprint(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> float:
@@ -45,18 +52,60 @@ def footprint(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]
         sizes: (x, y, z) extents in metres, or None.
         least: take the 5th percentile of the class instead of the median.
     """
+    pieces = _pieces(categories, sizes, least=least)
+    return sum(p.width * p.depth * (TUCKED if p.kind.role == "seat" else 1.0) for p in pieces)
+
+
+def used_area(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
+    """Square metres that furniture takes with the space before fronts, around tables and beds, and before screens.
+
+    Arguments:
+        categories, sizes: as `footprint`.
+    """
+    pieces = _pieces(categories, sizes)
+    chairs = sum(p.kind.stands == "at" for p in pieces)
+    desks = [p for p in pieces if p.kind.role == "board" and p.kind.access]
+    tables = [p for p in pieces if _dines(p.kind)]
+    screen = any(p.kind.stands == "opposite" or p.kind.role == "screen" for p in pieces)
+    served = max((p for p in pieces if p.kind.role == "sofa" and p.kind.wall), key=lambda p: p.width, default=None)
+    at_table = max(chairs - len(desks), 0) / max(len(tables), 1)
     area = 0.0
-    for category, size in zip(categories, sizes, strict=True):
-        row = vocabulary().category(category)
-        if row.support != "floor":
-            continue
-        if size is not None:
-            x, z = float(size[0]), float(size[2])
+    for piece in pieces:
+        kind, width, depth = piece.kind, piece.width, piece.depth
+        if kind.role == "bed":
+            area += (width + 2 * BEDSIDE) * (depth + FOOT)
+        elif _dines(kind):
+            ends = PULL if at_table > 4 else HANDS
+            area += (width + 2 * ends) * (depth + 2 * (PULL if at_table else HANDS))
+        elif kind.role == "sofa":
+            area += (width + HANDS) * (depth + (VIEW if piece is served and screen else KNEES))
+        elif kind.stands == "head" or kind.stands == "at" or (kind.stands == "before" and served and screen):
+            continue  # within what beds, tables and sofas take
+        elif kind.role == "seat":
+            area += (width + HANDS) * (depth + KNEES)
         else:
-            statistics = size_statistics(row.name)
-            x, _, z = (statistics.low if least else statistics.median).tolist()
-        area += x * z * (TUCKED if row.role == "seat" else 1.0)
+            front = DESK_CHAIR if piece in desks and chairs else kind.access
+            area += (width + HANDS) * (depth + front)
     return area
+
+
+def wall_length(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
+    """Metres of wall that furniture stands at.
+
+    Arguments:
+        categories, sizes: as `footprint`.
+    """
+    pieces = _pieces(categories, sizes)
+    return sum(p.width + HANDS for p in pieces if p.kind.wall or (p.kind.role == "board" and p.kind.access))
+
+
+def longest_side(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
+    """Metres, the longest side of anything that stands on the floor.
+
+    Arguments:
+        categories, sizes: as `footprint`.
+    """
+    return max((max(p.width, p.depth) for p in _pieces(categories, sizes)), default=0.0)
 
 
 def floor_extents(
@@ -70,6 +119,8 @@ def floor_extents(
 ) -> tuple[float, float]:
     """(x, z) extents in metres of a rectangular floor that such a room with this furniture would have.
 
+    As large as such rooms are for what the furniture covers, and never smaller than its use asks for.
+
     Arguments:
         room_type: of the vocabulary.
         categories, sizes: the furniture, see `footprint`.
@@ -81,113 +132,97 @@ def floor_extents(
     covered = footprint(categories, sizes)
     usual = covered / COVER[room_type] * float(np.exp(0.12 * rng.standard_normal()))
     area = float(np.clip(usual, quantile(statistics.area, -0.9), quantile(statistics.area, 1.3)))
-    area = max(area, covered / FULL)
-    longest = [max(s[0], s[2]) if s is not None else _longest(c) for c, s in zip(categories, sizes, strict=True)]
-    least = max(statistics.short[0], WAY + max(longest, default=0.0) / 2)
+    used = (
+        used_area(categories, sizes)
+        / USED.get(room_type, USUALLY_USED)
+        * float(np.exp(SPREAD * abs(rng.standard_normal())))
+    )
+    area = max(area, covered / FULL, used + DOOR_AREA)
+    longest = longest_side(categories, sizes)
+    least = max(statistics.short[0], WAY + longest / 2, _across(categories, sizes))
     aspect = float(np.clip(ASPECT.get(room_type, USUAL_ASPECT) * np.exp(0.14 * rng.standard_normal()), 1.0, 2.2))
     short = max(float(np.sqrt(area / aspect)), least)
-    long = max(area / short, short, max(longest, default=0.0) + 0.1)
-    short, long = round(short, 1), round(long, 1)
+    long = max(area / short, short, longest + 0.1)
+    grown = wall_length(categories, sizes) / WALLED / (2 * (short + long))
+    short, long = (round(side * max(grown, 1.0), 1) for side in (short, long))
     x, z = (long, short) if rng.random() < along_x else (short, long)
     x = max([x, *(o.end for o in openings if o.edge % 2 == 0)])
     z = max([z, *(o.end for o in openings if o.edge % 2 == 1)])
     return x, z
 
 
-def _longest(category: str) -> float:
-    row = vocabulary().category(category)
-    median = size_statistics(row.name).median
-    return float(max(median[0], median[2])) if row.support == "floor" else 0.0
-
-
-def place_openings(
-    polygon: np.ndarray,
-    height: float,
-    rng: np.random.Generator,
-    *,
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
-) -> tuple[Opening, ...]:
-    """A door and one or two windows (two doors in halls), each where least stands in its way.
-
-    Doors like the end of a wall with the hinges at the corner, windows the middle of another wall.
+def floor_outline(
+    room_type: str, extents: tuple[float, float], longest: float, rng: np.random.Generator
+) -> np.ndarray | None:
+    """(6, 2) float, corners (x, z) of an L-shaped floor of the area of a rectangle, metres, or None for the rectangle.
 
     Arguments:
-        polygon: (k, 2) float, corners (x, z) of the floor, metres.
-        height: of the room, metres.
-        rng: decides between places that are equally good.
-        boxes: size (n, 3), position (n, 3) of the bottom centre and yaw (n,) of what stands in the room.
+        room_type: of the vocabulary; halls and large rooms are cut more often.
+        extents: (x, z) of the rectangle, metres. longest: side of the longest piece, which has to fit an arm.
+        rng: of all randomness.
     """
-    area = abs(signed_area(polygon))
-    made: list[Opening] = []
-    for kind, count in (("door", 1 + (area > SECOND_DOOR)), ("window", 1 + (area > SECOND_WINDOW))):
-        for _ in range(count):
-            best = _best(kind, polygon, height, rng, made, boxes)
-            if best is not None:
-                made.append(best)
-    return tuple(made)
+    area = extents[0] * extents[1]
+    wanted = rng.random() < CUT.get(room_type, USUAL_CUT)
+    width, depth = (float(share) for share in rng.uniform(0.25, 0.42, 2))
+    corner = int(rng.integers(4))
+    if not wanted or area < LEAST_CUT_AREA:
+        return None
+    scale = 1 / np.sqrt(1 - width * depth)
+    x, z = (round(float(side * scale), 1) for side in extents)
+    cut_x, cut_z = round(width * x, 1), round(depth * z, 1)
+    if min(x - cut_x, z - cut_z) < ARM or max(x - cut_x, z - cut_z) < longest + WAY / 2:
+        return None
+    sx, sz = ((-1, -1), (1, -1), (1, 1), (-1, 1))[corner]
+    points = [(-x / 2, -z / 2), (x / 2, -z / 2), (x / 2, z / 2), (-x / 2, z / 2)]
+    inner = [
+        (sx * x / 2, sz * (z / 2 - cut_z)), (sx * (x / 2 - cut_x), sz * (z / 2 - cut_z)),
+        (sx * (x / 2 - cut_x), sz * z / 2),
+    ]  # fmt: skip
+    points[corner : corner + 1] = inner if sx == sz else inner[::-1]
+    return np.array(points).round(3)
 
 
-def _best(
-    kind: str,
-    polygon: np.ndarray,
-    height: float,
-    rng: np.random.Generator,
-    made: Sequence[Opening],
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None,
-) -> Opening | None:
-    """The place of least cost among a grid of places on all walls, None where no wall is long enough."""
-    import shapely
-
-    lengths = edge_lengths(polygon)
-    blocks = _blocks(boxes)
-    outline = shapely.Polygon(polygon).buffer(1e-6)
-    best, least = None, np.inf
-    name = numbered(kind, [opening.name for opening in made])
-    usual = USUAL[kind]
-    tall = min(usual["height"], height - usual["sill"] - 0.05)
-    doors = [opening for opening in made if opening.kind == "door"]
-    for edge, length in enumerate(lengths):
-        margin = CORNER if kind == "door" else PIER
-        width = usual["width"] if kind == "door" else float(np.clip(0.4 * length, 0.9, 2.0))
-        if length < width + 2 * margin:
-            continue
-        shared = [opening for opening in made if opening.edge == edge]
-        taste = 0.2 * rng.random() + (0.6 if kind == "window" and any(d.edge == edge for d in doors) else 0.0)
-        if kind == "window" and doors:  # light from the other side than the door
-            facing = inward_normal(polygon, edge) @ inward_normal(polygon, doors[0].edge)
-            taste += 0.3 * (1 + float(facing)) / 2
-        taste += 0.8 * len([o for o in shared if o.kind == kind]) - 0.05 * min(float(length), 6.0)
-        places = np.arange(margin, length - width - margin + 1e-9, GRID)
-        places = np.unique(np.round([*places, length - width - margin, (length - width) / 2], 3))
-        for offset, swing in product(places, SWINGS if kind == "door" else ("in",)):
-            near, far = float(offset), float(length - width - offset)
-            hinge = "left" if (near <= far) == (signed_area(polygon) > 0) else "right"
-            hinge = hinge if kind == "door" else "left"
-            one = Opening(name, kind, edge, near, width, tall, usual["sill"], hinge, swing)
-            if any(overlap(one, other) > -PIER for other in shared):
-                continue
-            cost = taste + (0.25 * min(near, far) if kind == "door" else 0.3 * abs(near - far) / length)
-            cost += OUTWARDS * (swing == "out")
-            free = shapely.Polygon(free_area(polygon, one))
-            cost += 3.0 * float(free.difference(outline).area)  # into the next wall of a niche
-            cost += 12.0 * sum(
-                float(free.intersection(block).area) for block, top in blocks if kind != "window" or top > one.sill
-            )
-            cost += 2.0 * sum(float(free.intersection(shapely.Polygon(free_area(polygon, o))).area) for o in made)
-            if cost < least:
-                best, least = one, cost
-    return best
-
-
-def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> list:
-    """(footprint, top) of every box that begins below a door's height."""
-    import shapely
-
-    if boxes is None:
-        return []
+def _pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], *, least: bool = False) -> list[_Piece]:
+    """What stands on the floor, in its usual size where none is stated."""
     out = []
-    for size, position, plan in zip(*boxes[:2], footprints(*map(np.asarray, boxes)), strict=True):
-        if position[1] >= USUAL["door"]["height"] - 0.05:
+    for category, size in zip(categories, sizes, strict=True):
+        row = vocabulary().category(category)
+        if row.support != "floor":
             continue
-        out.append((shapely.Polygon(plan), float(position[1] + size[1])))
+        if size is None:
+            size = _usual(row, least)
+        out.append(_Piece(row, float(size[0]), float(size[2])))
+    return out
+
+
+def _usual(row: Category, least: bool) -> list[float]:
+    """(3,) metres: the usual size of a class, or the least one."""
+    if row.usual:
+        return [low if least else float(np.sqrt(low * high)) for low, high in row.usual]
+    statistics = size_statistics(row.name)
+    return (statistics.low if least else statistics.median).tolist()
+
+
+def _dines(kind: Category) -> bool:
+    """Whether people sit round such a table."""
+    return kind.role == "board" and not (kind.access or kind.belongs_to or kind.wall)
+
+
+def _across(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) -> float:
+    """Metres that the short side of the room has at least, so that the deepest group fits between two walls."""
+    pieces = _pieces(categories, sizes)
+    chairs = sum(p.kind.stands == "at" for p in pieces)
+    at_wall = [p.depth for p in pieces if p.kind.wall and p.kind.role == "storage" and p.kind.access > 0.35]
+    storage = max(at_wall, default=0.0)
+    out = 0.0
+    for piece in pieces:
+        if piece.kind.role == "bed":
+            out = max(out, piece.depth + FOOT + 0.4 * bool(storage))
+        elif _dines(piece.kind):
+            out = max(out, min(piece.width, piece.depth) + 2 * PULL * (chairs > 1) + storage)
+        elif piece.kind.role == "sofa":
+            screens = [p.depth for p in pieces if p.kind.stands == "opposite"]
+            out = max(out, piece.depth + (VIEW + screens[0] if screens else 2 * KNEES + storage))
+        elif piece.kind.role == "board" and piece.kind.access:
+            out = max(out, piece.depth + DESK_CHAIR + storage)
     return out

@@ -45,6 +45,7 @@ class Category:
         stands: how it stands to them, one of `STANCES`.
         admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
             thing's smaller horizontal side.
+        usual: (low, high) of x, y and z in metres of most such pieces, where the class's statistics mix several things.
         aliases: what people call it.
     """
 
@@ -66,6 +67,7 @@ class Category:
     belongs_to: tuple[str, ...] = ()
     stands: str = ""
     admits: tuple[tuple[str, float], ...] = ()
+    usual: tuple[tuple[float, float], ...] = ()
     aliases: tuple[str, ...] = ()
 
 

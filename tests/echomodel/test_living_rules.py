@@ -64,7 +64,20 @@ DINING = Room({
 })  # fmt: skip
 
 
-@pytest.mark.parametrize("room", [BEDROOM, LIVING, DINING], ids=["bedroom", "living", "dining"])
+SET = Room({
+    "table": {"kind": "dining_table", "size": (1.6, 0.75, 0.9), "at": (0.0, 0.0)},
+    **{f"chair_{x}_{z}": {"kind": "dining_chair", "size": (0.5, 0.9, 0.5), "at": (0.4 * x, 0.6 * z),
+                          "yaw": np.pi * (z > 0)} for x in (-1, 1) for z in (-1, 1)},
+    "lamp": {"kind": "floor_lamp", "size": (0.4, 1.6, 0.4), "at": (2.2, 1.7)},
+})  # fmt: skip
+SOFAS = Room({**LIVING.things, "other": {
+    "kind": "loveseat_sofa", "size": (1.5, 0.85, 0.9), "at": (-1.7, -0.1), "yaw": HALF,
+}})  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "room", [BEDROOM, LIVING, DINING, SET, SOFAS], ids=["bedroom", "living", "dining", "set", "sofas"]
+)
 def test_a_tidy_room_has_no_fault(room):
     assert room.found() == {}
 
@@ -84,6 +97,12 @@ FAULTS = [
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
     (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
     (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
+    (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
+    (BEDROOM.moved("wardrobe", at=(0.0, 0.72), yaw=np.pi), ("bed", "bed_foot_free"), "the foot of bed leaves 0.30 m"),
+    (SET.moved("chair_1_1", at=(1.05, 0.0), yaw=-HALF), ("table", "chairs_even"), "the chairs of table are uneven"),
+    (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
+    (LIVING.moved("armchair", at=(1.9, -0.3), yaw=HALF), ("armchair", "knees_free"), "m before it, then a wall"),
+    (SOFAS.moved("other", yaw=-HALF, at=(-2.0, -0.1)), ("other", "sofas_in_circle"), "turns its back on the group"),
 ]
 
 
@@ -94,6 +113,38 @@ def test_what_a_person_points_at_is_a_fault_with_a_sentence(room, fault, said):
     found = room.found()
     assert fault in found
     assert said in found[fault]
+
+
+def with_one(room, name, **fields):
+    """The room with one thing more."""
+    return Room({**room.things, name: fields})
+
+
+MORE = [
+    (with_one(LIVING, "desk", kind="desk", size=(1.2, 0.75, 0.6), at=(-1.8, -1.5)), ("desk", "groups_apart"),
+     "desk leaves only 0.10 m to sofa, which is no part of its group"),
+    (with_one(SET, "board", kind="sideboard", size=(1.4, 0.9, 0.4), at=(0.0, 1.15), yaw=np.pi),
+     ("chair_1_1", "chair_pulls_out"), "chair_1_1 can be pulled back by only 0.10 m before board"),
+    (with_one(DINING, "plant", kind="plant", size=(0.5, 1.2, 0.5), at=(0.5, -1.3)), ("plant", "lamp_aside"),
+     "m before the front of sideboard"),
+    (with_one(LIVING, "low", kind="side_table", size=(0.5, 0.5, 0.5), at=(0.6, -0.7)), ("low", "at_its_side"),
+     "low stands before sofa, not beside it"),
+    (with_one(LIVING, "table", kind="dining_table", size=(1.4, 0.75, 0.8), at=(0.0, 0.8)), ("stand", "view_free"),
+     "table stands between stand and who watches it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("room", "fault", "said"), MORE, ids=[fault[1] for _, fault, _ in MORE])
+def test_crowded_rooms_are_seen(room, fault, said):
+    found = room.found()
+    assert fault in found
+    assert said in found[fault]
+
+
+def test_desks_stand_in_a_row_and_what_belongs_together_touches():
+    first = {"kind": "desk", "size": (1.2, 0.75, 0.6), "at": (-0.6, -1.68)}
+    assert ("b", "groups_apart") not in Room({"a": first, "b": {**first, "at": (0.62, -1.68)}}).found()
+    assert not any(rule == "groups_apart" for _, rule in SET.found())
 
 
 def test_a_bed_between_two_walls_cannot_be_got_into():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from echomodel.openings import Opening, check_openings, free_area, rectangle, swing_area
-from echomodel.plans import floor_extents, footprint, place_openings
+from echomodel.openingplaces import place_openings
+from echomodel.openings import Opening, check_openings, free_area, rectangle, signed_area, swing_area
+from echomodel.plans import floor_extents, floor_outline, footprint, used_area
 
 BEDROOM = ["double_bed", "nightstand", "nightstand", "wardrobe", "pendant_lamp"]
 LOUNGE = ["multi_seat_sofa", "coffee_table", "tv_stand", "armchair"]
@@ -80,3 +81,25 @@ def test_a_door_swings_out_of_a_room_that_leaves_its_leaf_no_place() -> None:
     boxes = (size, np.array([(0.0, 0.0, 0.0), *corners]), np.zeros(5))
     door = place_openings(floor, 2.6, np.random.default_rng(0), boxes=boxes)[0]
     assert door.swing == "out"
+
+
+def test_use_takes_more_than_furniture_covers_and_floors_hold_it() -> None:
+    table, chairs = ["dining_table"], ["dining_chair"] * 6
+    assert used_area(table, [None]) < used_area(table + chairs, [None] * 7)
+    assert used_area(BEDROOM, [None] * 5) > footprint(BEDROOM, [None] * 5)
+    for kind, words in (("bedroom", BEDROOM), ("living_room", LOUNGE), ("dining_room", table + chairs)):
+        for seed in range(10):
+            made = floor_extents(kind, words, [None] * len(words), np.random.default_rng(seed))
+            assert np.prod(made) > used_area(words, [None] * len(words))
+
+
+def test_some_large_floors_are_cut_and_keep_their_area() -> None:
+    made = [floor_outline("living_dining_room", (8.0, 5.6), 2.4, np.random.default_rng(seed)) for seed in range(60)]
+    cut = [outline for outline in made if outline is not None]
+    assert 8 < len(cut) < 35
+    for outline in cut:
+        assert outline.shape == (6, 2)
+        assert shapely.Polygon(outline).is_valid
+        assert signed_area(outline) == pytest.approx(8.0 * 5.6, rel=0.05)
+        np.testing.assert_allclose(outline.max(0), -outline.min(0))
+    assert all(floor_outline("study", (3.0, 3.0), 1.6, np.random.default_rng(seed)) is None for seed in range(60))

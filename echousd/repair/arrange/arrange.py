@@ -11,14 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from echousd.repair.arrange.costs import least, price
+from echousd.repair.arrange.groups import paid_by, seat_evenly, slide_groups
 from echousd.repair.arrange.places import places
-from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.arrange.setting import Setting, State
 
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
 BLOCK = 16  # poses that are priced together at first
-BAD = 2.5  # a piece that pays more comes earlier in the next round
+BAD = 1.8  # a piece that pays more comes earlier in the next round
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 
 
@@ -80,7 +81,9 @@ def _rank(setting: Setting, i: int) -> float:
     if setting.fixed[i]:
         return -100.0
     kind = setting.kinds[i]
-    rank = FIRST.get(kind.role, 6.0) - 0.3 * min(float(setting.size[i, 0] * setting.size[i, 2]), 3.0)
+    rank = (2.0 if setting.stances[i] == "opposite" else FIRST.get(kind.role, 6.0)) - 0.3 * min(
+        float(setting.size[i, 0] * setting.size[i, 2]), 3.0
+    )
     steps, at = 0, i
     while setting.anchor[at] >= 0 and steps < 4:
         steps, at = steps + 1, int(setting.anchor[at])
@@ -104,9 +107,10 @@ def _built(
             if int(i) not in attended:
                 own[i], _ = _put(setting, state, int(i))
     state.regrets = {}  # what others paid in earlier rounds is no part of what this one costs
+    slide_groups(setting, state, own)
+    seat_evenly(setting, state, own)
     for i in order:
-        here = Poses(state.position[i : i + 1].copy(), state.yaw[i : i + 1].copy(), own[i : i + 1])
-        paid[i] = price(setting, state, int(i), here)[0]
+        paid[i] = paid_by(setting, state, int(i), own)
     return Arranged(state.position, state.yaw, paid)
 
 

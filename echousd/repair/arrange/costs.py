@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.roomboxes import footprints
 from echomodel.rules.sets import APART
 from echomodel.vocabulary import vocabulary
+from echousd.repair.arrange.comfort import uncomfortable
 from echousd.repair.arrange.outlook import missing, unseen
+from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State, Zones
-from echousd.repair.geometry import axes, inside
 from echousd.repair.relations import pair_margins
 
 HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
@@ -21,37 +21,10 @@ UNPLACED = 0.15  # weight of relations to what is not placed yet, whose draft co
 BLOCKED = 3.0  # for a front that cannot be opened
 ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regretted
 CROWDED = 0.7  # for a chair in the way of a front
-MASSIVE = ("sofa", "board", "bed", "storage")
-WAY, NARROW = 0.9, 1.3  # metres between a set table and other groups, and the price of none at all
+SEATED, ENDS = 0.75, 4  # metres from a table to behind its chairs; more chairs than that sit at its ends, too
+FOOT = 0.4  # metres at the foot of a bed
+KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
 SLACK = 0.01  # metres or ratio by which relations are to hold
-
-
-def depths(size: np.ndarray, poses: Poses, others: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(K, m) float: how deep a box (3,) at each pose runs into m other boxes (m, 3), negative = the gap, metres."""
-    if not len(others):
-        return np.full((len(poses), 0), -9.0)
-    u, v = axes(poses.yaw), axes(yaw)
-    away = position[None, :, [0, 2]] - poses.position[:, None, [0, 2]]
-    turn = np.abs(u[:, None] @ v.transpose(0, 2, 1)[None])
-    half, reach = size[[0, 2]] / 2, others[:, [0, 2]] / 2
-    own = np.abs((u[:, None] @ away[..., None])[..., 0]) - half - (turn @ reach[None, :, :, None])[..., 0]
-    other = np.abs((v[None] @ away[..., None])[..., 0]) - reach - (half @ turn)
-    bottom = poses.position[:, 1]
-    over, under = position[:, 1] - (bottom + size[1])[:, None], bottom[:, None] - (position[:, 1] + others[:, 1])
-    rise = np.maximum(over, under)
-    return -np.maximum(np.maximum(own.max(2), other.max(2)), rise)
-
-
-def beyond(setting: Setting, size: np.ndarray, poses: Poses) -> np.ndarray:
-    """(K,) float: how far a box at each pose leaves the floor, metres."""
-    u = axes(poses.yaw)
-    corners = footprints(np.broadcast_to(size, (len(poses), 3)), poses.position, poses.yaw).reshape(-1, 2)
-    out = -inside(setting.floor, corners)[0].reshape(len(poses), 4).min(1)
-    if len(setting.floor.reflex):
-        offset = setting.floor.reflex[None] - poses.position[:, None, [0, 2]]
-        local = np.abs(np.einsum("kad,kmd->kma", u, offset)) - size[[0, 2]] / 2
-        out = np.maximum(out, -local.max(2).min(1))
-    return out
 
 
 def least(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
@@ -73,7 +46,7 @@ def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     others = others[others != i]
     depth = depths(size, poses, setting.size[others], state.position[others], state.yaw[others])
     if setting.standing(i):
-        total += _too_near(setting, i, others, -depth)
+        total += uncomfortable(setting, state, i, poses, others, -depth)
     depth = np.maximum(depth - setting.shared[i, others], 0.0)
     total += (HIT * (depth > GRAZE) + DEEP * depth).sum(1)
     out = np.maximum(beyond(setting, size, poses), 0.0)
@@ -83,20 +56,11 @@ def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     return total + _relations(setting, state, i, poses)
 
 
-def _too_near(setting: Setting, i: int, others: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """(K,): a set table and the furniture of other groups keep a way between them; gap (K, m) float, metres."""
-    rival = [
-        setting.standing(j) and (setting.laid[i] or setting.laid[j])
-        and setting.kinds[j].role in MASSIVE and setting.kinds[i].role in MASSIVE
-        for j in others
-    ]  # fmt: skip
-    return NARROW * (1 - gap[:, rival] / WAY).clip(0.0, 1.0).sum(1)
-
-
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
     doors = setting.doors
     out = (np.maximum(depths(setting.size[i], poses, doors.size, doors.position, doors.yaw), 0) > 0.04) @ doors.price
-    zones = fronts(setting, state, [j for j in others if setting.anchor[i] != j and setting.anchor[j] != i])
+    strangers = [j for j in others if not _at_home(setting, i, j)]
+    zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
     out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
     front = own_front(setting, i)
@@ -105,18 +69,29 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     size, forward = front
     ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
     solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
-    solid = [j for j in solid if setting.anchor[i] != j and setting.anchor[j] != i]
+    solid = [j for j in solid if not _at_home(setting, i, j)]
     depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])
     out = out + BLOCKED * (depth > 0.03).sum(1)
     return out + BLOCKED * (beyond(setting, size, ahead) > 0.05)
 
 
+def _at_home(setting: Setting, i: int, j: int) -> bool:
+    """Whether the fronts of two boxes are open to each other: one attends the other, or they sit in one circle."""
+    if setting.anchor[i] == j or setting.anchor[j] == i:
+        guest = i if setting.anchor[i] == j else j
+        return setting.stances[guest] not in ("near", "opposite")
+    circle = ("company", "with", "beside", "foot")
+    same = setting.group[i] == setting.group[j]
+    return same and (setting.stances[i] in circle or setting.stances[j] in circle)
+
+
 def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
     """Size (3,) of the space before a front and how far before the box's centre its own centre is; None = no front."""
-    depth = 0.75 * setting.kinds[i].access
-    if depth <= 0 or not setting.standing(i) or setting.kinds[i].role == "seat":
+    depth, role = 0.75 * setting.kinds[i].access, setting.kinds[i].role
+    depth = KNEES if role == "sofa" else LEGS if setting.stances[i] == "company" else 0.0 if role == "seat" else depth
+    if depth <= 0 or not setting.standing(i):
         return None
-    size = np.array([0.8 * setting.size[i, 0], min(float(setting.size[i, 1]), 1.8), depth])
+    size = np.array([0.9 * setting.size[i, 0], min(float(setting.size[i, 1]), 1.8), depth])
     return size, float(setting.size[i, 2] / 2 + depth / 2 + 0.005)
 
 
@@ -130,6 +105,8 @@ def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
         if front is not None:
             size, forward = front
             rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
+        if setting.laid[j] and not setting.kinds[j].access:
+            rows += _seats(setting, state, j)
         if setting.kinds[j].role == "bed":
             for side in (-1, 1):
                 lateral = side * (setting.size[j, 0] / 2 + 0.2)
@@ -137,8 +114,32 @@ def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
                 forward = setting.size[j, 2] * 0.15
                 at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
                 rows.append((*size, *at, state.yaw[j], 0.5 * BLOCKED, j))
+            forward = setting.size[j, 2] / 2 + FOOT / 2
+            size = np.array([0.8 * setting.size[j, 0], 1.0, FOOT])
+            rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], 0.5 * BLOCKED, j))
     table = np.array(rows, float).reshape(-1, 9)
     return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], table[:, 8].astype(int))
+
+
+def _seats(setting: Setting, state: State, j: int) -> list[tuple[float, ...]]:
+    """The spaces along the sides of a table at which chairs that are not placed yet are to stand."""
+    chairs = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == j)
+    if not (chairs & ~state.placed).any():
+        return []
+    x, _, z = state.position[j]
+    c, s = np.cos(state.yaw[j]), np.sin(state.yaw[j])
+    width, depth = setting.size[j, [0, 2]]
+    rows = []
+    for across, length, deep in ((0, width, depth), (1, depth, width)):
+        if length < deep and chairs.sum() <= ENDS:
+            continue
+        for side in (-1, 1):
+            away = side * (deep / 2 + SEATED / 2)
+            lateral, forward = (away, 0.0) if across else (0.0, away)
+            size = (SEATED, 1.0, 0.9 * length) if across else (0.9 * length, 1.0, SEATED)
+            at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
+            rows.append((*size, *at, state.yaw[j], 0.6 * BLOCKED, j))
+    return rows
 
 
 def _front(yaw: np.ndarray) -> np.ndarray:

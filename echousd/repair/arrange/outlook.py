@@ -14,7 +14,7 @@ from echousd.repair.geometry import inside
 
 MISSING = 1.6  # for each place that those who attend a piece would not find
 UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
-ELBOW = 0.2  # metres behind a chair, to pull it out
+ELBOW = 0.3  # metres behind a chair, to pull it out
 VIEW = 1.1  # per metre that a television is beside the line of sight
 
 
@@ -30,7 +30,7 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
         offset = np.stack([c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0]], -1)
         points = poses.position[:, None, [0, 2]] + offset
         size = setting.size[members[0]]
-        reach = 0.35 * float(min(size[0], size[2])) + ELBOW * (setting.kinds[members[0]].stands == "at")
+        reach = 0.35 * float(min(size[0], size[2])) + ELBOW * (setting.stances[members[0]] == "at")
         free = _free(setting, state, i, points, reach)
         told = (offset * asked > 0.06) | (asked == 0)
         kept = free & told.all(-1)

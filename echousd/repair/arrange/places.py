@@ -43,6 +43,10 @@ def places(setting: Setting, state: State, i: int) -> Poses:
         rows += along_walls(setting, i, lonely)
         if kind.role == "sofa":
             rows += in_the_open(setting, i, 4.5 + lonely)
+    elif kind.stands == "company" and anchor < 0:  # an armchair by itself looks into the room from its edge
+        rows += nooks(setting, i) + along_walls(setting, i, 0.2) + in_the_open(setting, i, 2.5)
+    elif kind.role == "sofa":
+        rows += along_walls(setting, i, lonely) + in_the_open(setting, i, 1.5 + lonely)
     elif kind.role in ("decor", "light", "storage"):
         rows += along_walls(setting, i, lonely) + corners(setting, i, lonely)
     else:
@@ -109,7 +113,7 @@ def stance(setting: Setting, i: int, anchor: int) -> str:
         return ""
     if kind.stands in ("at", "foot") and to.role == "board":
         return "at_front" if to.access else "around"
-    return kind.stands
+    return setting.stances[i]
 
 
 def at_anchor(setting: Setting, state: State, i: int, anchor: int) -> list[Row]:
@@ -156,6 +160,18 @@ def corners(setting: Setting, i: int, price: float) -> list[Row]:
         inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
         x, z = corner + inward * half
         rows.append((float(x), float(z), setting.walls[k][3], price - 0.1))
+    return rows
+
+
+def nooks(setting: Setting, i: int) -> list[Row]:
+    """In the corners, looking across the room."""
+    width, depth = setting.size[i, [0, 2]].tolist()
+    away = 0.5 * (width + depth) * math.sqrt(0.5) + 0.1  # half the diagonal of the turned footprint's hull
+    rows = []
+    for k, corner in enumerate(setting.floor.polygon):
+        inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
+        x, z = corner + inward * away
+        rows.append((float(x), float(z), math.atan2(inward[0], inward[1]), 0.0))
     return rows
 
 

@@ -16,6 +16,9 @@ from echousd.repair.belonging import shared_fraction
 from echousd.repair.geometry import Floor
 from echousd.repair.problem import ON_FLOOR, Problem, required_order
 
+MASSIVE = ("sofa", "board", "bed", "storage")
+TOGETHER = {"sofa", "board", "bed", "seat"}
+
 
 @dataclass(frozen=True, eq=False)
 class Zones:
@@ -44,6 +47,7 @@ class Setting:
         fixed, turned: (n,) bool, boxes that must not move, must not turn.
         floor: the floor polygon; height: of the ceiling, metres.
         carrier: (n,) int, as `Problem.carrier`. anchor: (n,) int, whom each attends, -1 = nobody.
+        stances: how each stands to that (`Plan.stance`). group: (n,) int, the box that its group is about.
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
     """
 
@@ -60,6 +64,8 @@ class Setting:
     height: float
     carrier: np.ndarray
     anchor: np.ndarray
+    stances: tuple[str, ...]
+    group: np.ndarray
     openings: Sequence[Opening]
     outline: np.ndarray
 
@@ -105,6 +111,32 @@ class Setting:
     def fronts(self) -> np.ndarray:
         """(n,) bool, which of the boxes have a front."""
         return np.array([kind.front for kind in self.kinds], bool)
+
+    @cached_property
+    def wishes(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, n) and (n, n) float: metres wished for between pieces of different groups, and the price of none."""
+        n = len(self.kinds)
+        wish, dear = np.zeros((n, n)), np.zeros((n, n))
+        for i in range(n):
+            for j in range(i):
+                aside = {self.stances[i], self.stances[j]} & {"near", "opposite"}
+                if (self.group[i] != self.group[j] or aside) and self.standing(i) and self.standing(j):
+                    wish[i, j], dear[i, j] = self._wished(i, j)
+                    if self.group[i] == self.group[j]:
+                        wish[i, j] = min(wish[i, j], 0.5)
+        return wish + wish.T, dear + dear.T
+
+    def _wished(self, i: int, j: int) -> tuple[float, float]:
+        one, other = self.kinds[i].role, self.kinds[j].role
+        if one == other == "board" and self.kinds[i].access and self.kinds[j].access:  # two desks stand in a row
+            return 0.0, 0.0
+        if (self.laid[i] or self.laid[j]) and one in MASSIVE and other in MASSIVE:
+            return 0.9, 1.6
+        if {one, other} <= TOGETHER:
+            return 0.6, 1.4
+        if {one, other} == {"seat", "storage"}:
+            return 0.5, 0.9
+        return (0.3, 0.6) if {one, other} & {"light", "decor"} and {one, other} & TOGETHER else (0.0, 0.0)
 
     @cached_property
     def movable(self) -> np.ndarray:
@@ -174,7 +206,8 @@ def setting_of(
     top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
     return Setting(
         problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
-        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), openings, outline,
+        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), plan.stance, plan.group.numpy(),
+        openings, outline,
     )  # fmt: skip
 
 

@@ -59,16 +59,16 @@ def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
     tuck = min(TUCK, 0.3 * float(own[2]))
     for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
         spacing = max(min(length / per_side, 0.85), float(own[0]) + 0.03)
-        more = 0.0 if per_side == wanted else 0.25
+        more = 0.0 if per_side == wanted else 0.25 if count % 2 else 0.9
         for k in range(per_side):
             lateral = (k - (per_side - 1) / 2) * spacing
-            for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.3), (-0.1, 0.4)):
+            for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5), (-0.1, 0.7)):
                 forward = depth / 2 + own[2] / 2 - tucked
                 price = more + push
                 out.append((lateral, -forward, 0.0, price))
                 out.append((lateral, forward, math.pi, price))
-    at_ends = 0.9 if count <= 2 * wanted else 0.1
-    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.3)):
+    at_ends = (0.9 if count <= 2 * wanted else 0.1) + (1.5 if own[0] > depth + 0.1 else 0.0)  # no bench across an end
+    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5)):
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
     return out
@@ -106,6 +106,19 @@ def company(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
                 at = anchor[2] / 2 + forward
                 out.append((lateral, at, math.atan2(-lateral, 0.6 - at), 0.2))
         out.append((side * (anchor[0] / 2 + own[0] / 2 + 0.5), 0.0, -side * 0.5, 0.5))
+    return out
+
+
+def joined(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+    """A second sofa: opposite the first across the coffee table, or at a right angle at one of its ends."""
+    out = []
+    for away, more in ((1.6, 0.0), (1.9, 0.1), (1.35, 0.3)):
+        out.append((0.0, anchor[2] / 2 + own[2] / 2 + away, math.pi, 0.3 + more))
+    for side in (-1.0, 1.0):
+        for gap, more in ((0.25, 0.0), (0.5, 0.1), (0.1, 0.2)):
+            lateral = side * (anchor[0] / 2 + own[2] / 2 + gap)
+            for forward in (0.3, 0.6, 0.0):
+                out.append((lateral, anchor[2] / 2 + forward + own[0] / 2 - 0.3, -side * HALF_PI, more + 0.2 * forward))
     return out
 
 
@@ -148,5 +161,5 @@ def on_top(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
 
 STANDS: dict[str, Slots] = {
     "head": head, "before": before, "around": around, "at_front": at_front, "company": company, "beside": beside,
-    "foot": foot, "on_top": on_top,
+    "foot": foot, "on_top": on_top, "with": joined,
 }  # fmt: skip

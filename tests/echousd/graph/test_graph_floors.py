@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
+from echomodel.openings import swing_area
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-from echousd.graph.floors import check_space, with_floor, with_placed_openings, with_plan_of
+from echousd.graph.floors import (
+    check_space,
+    with_floor,
+    with_placed_openings,
+    with_plan,
+    with_plan_of,
+    with_wider_floor,
+)
 
 GRAPH = SceneGraph(
     "bedroom",
@@ -32,6 +41,32 @@ def test_openings_are_placed_where_none_is_stated() -> None:
     assert {opening.kind for opening in graph.room.openings} == {"door", "window"}
     assert with_placed_openings(graph, NOTHING, 2) is graph
     assert with_placed_openings(GRAPH, NOTHING, 1) is GRAPH
+
+
+def test_a_plan_is_a_floor_and_openings_out_of_the_way_of_what_is_fixed() -> None:
+    made = [with_plan(GRAPH, seed) for seed in range(30)]
+    assert made[4] == with_plan(GRAPH, 4)
+    assert all({opening.kind for opening in graph.room.openings} == {"door", "window"} for graph in made)
+    assert 0 < sum(graph.room.floor_polygon is not None for graph in made) < 15
+    stated = GRAPH.replaced(room=RoomSpec("bedroom", size=(4.0, 3.2)))
+    wardrobe = {"size": (1.6, 2.2, 0.6), "yaw": 0.0}
+    for x, z in ((-1.2, -1.3), (1.2, -1.3)):
+        fixed = stated.update_node("wardrobe", position=(x, 0.0, z), **wardrobe)
+        door = with_plan(fixed, 3).room.openings[0]
+        assert fixed.room.corners is not None
+        swing = shapely.Polygon(swing_area(fixed.room.corners, door))
+        assert swing.intersection(shapely.box(x - 0.8, z - 0.3, x + 0.8, z + 0.3)).area < 0.01
+
+
+def test_floors_that_do_not_hold_their_furniture_grow() -> None:
+    cut = next(graph for graph in (with_plan(GRAPH, seed) for seed in range(60)) if graph.room.floor_polygon)
+    extents = np.array(cut.room.extents)
+    inside = np.array(cut.room.floor_polygon) * 0.9
+    assert with_wider_floor(cut, inside) is cut
+    wider = with_wider_floor(cut, np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * extents / 2 * 1.2).room
+    assert wider.floor_polygon is None
+    assert wider.openings == ()
+    assert (np.array(wider.size) >= extents * 1.2 - 1e-9).all()
 
 
 def test_the_plan_of_an_earlier_graph_stays() -> None:

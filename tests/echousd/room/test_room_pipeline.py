@@ -21,9 +21,18 @@ def chairs(*relations, styles=(None, None, None)):
 
 def test_style_groups_join_relations_and_names():
     graph = chairs(("chair_0", "same_style_as", "chair_1"), styles=(None, "ash", None))
-    assert style_groups(graph) == {"chair_0": "ash", "chair_1": "ash", "chair_2": "room"}
-    graph = chairs(("chair_2", "same_style_as", "chair_1"))
-    assert style_groups(graph) == {"chair_0": "room", "chair_1": "set_chair_1", "chair_2": "set_chair_1"}
+    assert style_groups(graph) == dict.fromkeys(graph.names, "ash")
+    graph = chairs(("chair_2", "same_style_as", "chair_1"), styles=("oak", None, None))
+    assert style_groups(graph) == {"chair_0": "oak", "chair_1": "set_chair_1", "chair_2": "set_chair_1"}
+
+
+def test_chairs_of_a_table_are_one_set_unless_two_styles_are_told():
+    assert style_groups(chairs()) == dict.fromkeys(("chair_0", "chair_1", "chair_2"), "set_chair_0")
+    assert set(style_groups(chairs(styles=(None, "ash", None))).values()) == {"ash"}
+    told = style_groups(chairs(styles=("oak", "ash", None)))
+    assert told == {"chair_0": "oak", "chair_1": "ash", "chair_2": "room"}
+    shelves = SceneGraph(RoomSpec("study"), (Node("a", "bookshelf"), Node("b", "bookshelf")))
+    assert set(style_groups(shelves).values()) == {"room"}
 
 
 def test_assets_are_shared_by_pieces_of_one_style_only():

@@ -15,6 +15,7 @@ SHARE = 0.3  # share of a front's width that may be covered
 BEDSIDE = 0.3  # metres beside a bed
 GRAZE = 0.05  # metres that furniture may reach into a door's way
 TALL = 0.3  # metres over a window's sill: what is higher takes its light
+HEADBOARD = 0.3  # metres: of a bed only the head is so high
 CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 
 
@@ -135,7 +136,8 @@ def _clearance(plan: Plan, who: Tensor, polygon, opening: Opening) -> Tensor:  #
     beside = (at - opening.width / 2).abs() - opening.width / 2 - reach(along)
     out = torch.maximum(beside, deep - reach(inward) - depth)
     if opening.kind == "window":
-        low = opening.sill + TALL - (plan.position[who, 1] + plan.size[who, 1])
+        headboard = HEADBOARD * plan.of("bed")[who].to(plan.size)
+        low = opening.sill + TALL + headboard - (plan.position[who, 1] + plan.size[who, 1])
         return torch.maximum(out + 0.15, low)
     if swings:  # the corner of the square that the leaf does not sweep
         hinge, closed = (plan.numbers(point.tolist()) for point in hinge_point(polygon, opening))

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
-from echomodel.rules.living import access, groups, lamps, sizes, walls
+from echomodel.rules.living import access, company, crowding, groups, lamps, sizes, walls
 from echomodel.rules.living.found import Found
 from echomodel.rules.living.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.rules.living.ways import Ways, ways
@@ -54,7 +54,8 @@ RULES = (
           "{a} lies {x:.2f} m beside the middle of {b}, not before it"),
          REAL + "5th and 95th percentile of the gap; within the sofa's width"),
     Rule("nightstand_at_head", groups.nightstand_at_head,
-         ("{a} stands {x:.2f} m beside {b}", "{a} stands in {b}", "{a} stands {x:.2f} m from the head of {b}"),
+         ("{a} stands {x:.2f} m beside {b}", "{a} stands in {b}", "{a} stands {x:.2f} m from the head of {b}",
+          "{a} is turned by {x:.0f} degrees against {b}"),
          REAL + "95 % within 0.34 m beside and 0.4 m along the bed"),
     Rule("screen_in_view", groups.screen_in_view, ("{a} faces no seat, sofa or bed",),
          REAL + "86 % opposite a sofa, 99 % opposite a bed"),
@@ -67,6 +68,24 @@ RULES = (
          "a person needs 0.3 m to sit down on a bed"),
     Rule("door_free", access.door_free, ("{a} reaches {x:.2f} m into the way of a door",), "the leaf's quarter circle"),
     Rule("window_free", access.window_free, ("{a} covers a window",), "0.35 m before the glass, 0.3 m over the sill"),
+    Rule("groups_apart", crowding.groups_apart, ("{a} leaves only {x:.2f} m to {b}, which is no part of its group",),
+         REAL + "2nd to 3rd percentile of the gap by role, 0.05 to 0.2 m"),
+    Rule("chair_pulls_out", crowding.chair_pulls_out, ("{a} can be pulled back by only {x:.2f} m before {b}",),
+         REAL + "3rd percentile before furniture; 0.08 m at a wall"),
+    Rule("knees_free", crowding.knees_free, ("{a} has {x:.2f} m before it, then {b}",),
+         REAL + "3rd percentile before sofas 0.58 m; armchairs look into the room"),
+    Rule("bed_foot_free", crowding.bed_foot_free, ("the foot of {a} leaves {x:.2f} m to {b}",),
+         REAL + "90 % leave 0.38 m or more"),
+    Rule("lamp_aside", crowding.lamp_aside, ("{a} stands {x:.2f} m before the front of {b}",),
+         REAL + "98 % of lamps and plants leave fronts free"),
+    Rule("chairs_even", company.chairs_even, ("the chairs of {a} are uneven: their middle lies {x:.2f} m off",),
+         "one chair pulled out moves the middle of four by 0.1 m"),
+    Rule("sofas_in_circle", company.sofas_in_circle, ("{a} turns its back on the group of {b} ({x:.0f} degrees)",),
+         "the same as for armchairs"),
+    Rule("at_its_side", company.at_its_side, ("{a} stands before {b}, not beside it",), "what the word means"),
+    Rule("not_alone", company.not_alone, ("{a} stands alone in the room, {x:.2f} m from everything",),
+         REAL + "side tables, lamps and plants stand at something"),
+    Rule("view_free", company.view_free, ("{b} stands between {a} and who watches it",), "a straight line"),
     Rule("scale", sizes.scale, ("{a} is {x:.2f} m wide", "{a} is {x:.2f} m high", "{a} is {x:.2f} m deep"),
          "a fifth over the 95th percentile of the class, half of the 5th", weight=0.3),
 )  # fmt: skip

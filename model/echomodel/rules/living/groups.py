@@ -19,6 +19,7 @@ BEFORE = (0.0, 1.0)  # metres between a sofa and its coffee table, 90 % of real 
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
 HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
+TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as their bed
 VIEW = math.radians(50.0)  # from a screen's own front to who watches it
 FACING = math.radians(100.0)  # from a viewer's front to the screen: beside a chaise people turn their heads
 NEAREST, FARTHEST = 0.9, 7.0  # metres between a screen and its viewer's middle
@@ -76,9 +77,12 @@ def nightstand_at_head(plan: Plan) -> Found:
     beside = lateral.abs() - half_width - plan.size[j, 0] / 2
     back = (forward - half_depth) + plan.size[j, 2] / 2
     rank = _rank_at(j, plan.gap(i, j).detach())
-    margin = torch.stack([BESIDE - beside, beside + IN_BED, HEAD - back.abs()], -1)
+    turn = plan.yaw[i] - plan.yaw[j]
+    off = _angle(turn.sin(), turn.cos())
+    margin = torch.stack([BESIDE - beside, beside + IN_BED, HEAD - back.abs(), TURNED - off], -1)
     keep = rank < 2
-    return _first_of(i[keep], j[keep], margin[keep], torch.stack([beside, beside, back.abs()], -1)[keep])
+    measure = torch.stack([beside, beside, back.abs(), torch.rad2deg(off)], -1)
+    return _first_of(i[keep], j[keep], margin[keep], measure[keep])
 
 
 def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:

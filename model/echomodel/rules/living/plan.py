@@ -54,8 +54,30 @@ class Plan:
         return self._mask([kind.role in roles for kind in self.kinds])
 
     def stands(self, *stances: str) -> Tensor:
-        """(N,) bool, boxes that stand so to what they attend (`Category.stands`)."""
-        return self._mask([kind.stands in stances for kind in self.kinds])
+        """(N,) bool, boxes that stand so to what they attend (`stance`)."""
+        return self._mask([stance in stances for stance in self.stance])
+
+    @cached_property
+    def stance(self) -> tuple[str, ...]:
+        """How each box stands to what it attends: `Category.stands`, and `with` for a sofa that joins a larger one."""
+        joins = self.joins.tolist()
+        return tuple("with" if j >= 0 else kind.stands for kind, j in zip(self.kinds, joins, strict=True))
+
+    @cached_property
+    def joins(self) -> Tensor:
+        """(N,) int64, for sofas that share a coffee table with the largest sofa of their room that sofa, -1 = none."""
+        out = torch.full((len(self),), -1, dtype=torch.int64)
+        sofas = [k for k, kind in enumerate(self.kinds) if kind.role == "sofa" and kind.wall]
+        tables = [k for k, kind in enumerate(self.kinds) if kind.stands == "before"]
+        scene = self.scene.tolist()
+        for room in {scene[k] for k in sofas}:
+            here = [k for k in sofas if scene[k] == room]
+            if len(here) < 2 or sum(scene[k] == room for k in tables) >= len(here):
+                continue  # every sofa has a table of its own
+            largest = max(here, key=lambda k: (round(float(self.size[k, 0]), 2), -k))
+            for k in here:
+                out[k] = largest if k != largest else -1
+        return out
 
     def which(self, asked: Callable[[Category], object]) -> Tensor:
         """(N,) bool, boxes whose row answers a question with yes."""
@@ -129,6 +151,8 @@ class Plan:
         with torch.no_grad():
             centre = (self.position[i] - self.position[j])[:, [0, 2]].norm(dim=1)
             cost[i, j] = (self.gap(i, j) + 0.05 * centre).to(cost)
+        joining = self.joins >= 0
+        cost[:, joining] += torch.where(self.stands("before"), torch.inf, 0.0)[:, None].to(cost)
         for predicate in NEARNESS:
             chosen = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
             for a, b in ((0, 2), (2, 0)):
@@ -136,7 +160,33 @@ class Plan:
         if not len(self):
             return torch.zeros(0, dtype=torch.int64)
         best, found = cost.min(1)
-        return torch.where(torch.isfinite(best), found, -1)
+        return torch.where(joining, self.joins, torch.where(torch.isfinite(best), found, -1))
+
+    @cached_property
+    def group(self) -> Tensor:
+        """(N,) int64, the box that each one's group is about: whom it attends, and whom that one attends in turn."""
+        out = torch.arange(len(self))
+        for _ in range(3):
+            ahead = self.anchor[out]
+            out = torch.where(ahead >= 0, ahead, out)
+        return out
+
+    def kin(self, i: Tensor, j: Tensor) -> Tensor:
+        """(P,) bool: i and j are of one group and may come close; what is only near or opposite it keeps away."""
+        away = self.stands("near", "opposite")
+        return (self.group[i] == self.group[j]) & ~away[i] & ~away[j]
+
+    def apart(self, i: Tensor, j: Tensor) -> Tensor:
+        """(P,): metres between the footprints of i and j along the axis that parts them best, negative = overlap."""
+        gaps = []
+        for a, b in ((i, j), (j, i)):
+            lateral, forward = self.local(a, b)
+            half_width, half_depth = self.reach(a, b)
+            gaps += [
+                lateral.abs() - half_width - self.size[b, 0] / 2,
+                forward.abs() - half_depth - self.size[b, 2] / 2,
+            ]
+        return torch.stack(gaps, -1).amax(-1)
 
     def attended(self, *stances: str) -> tuple[Tensor, Tensor]:
         """Numbers (P,), (P,) of the boxes that stand so to what they attend, and of what that is."""

@@ -14,6 +14,10 @@ from echomodel.rules.living.plan import Plan, kind_of
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
 USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 
+ELBOWS = 0.05  # metres between two chairs
+TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
+LEAST_DEPTH = 0.75  # metres of a table at which people sit opposite each other
+
 
 @cache
 def size_range(category: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -39,9 +43,33 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
             continue
         low, high = (np.array(side) for side in size_range(word))
         if not lenient[number]:
-            table = size_statistics(word)
-            low, high = (table.median * (end / table.median) ** USUAL for end in (table.low, table.high))
+            table, usual = size_statistics(word), kind_of(word).usual
+            ends = zip(*usual, strict=True) if usual else (table.low, table.high)
+            middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
+            low, high = (middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends)
         out[number] = np.clip(size[number], low, high)
+    return out
+
+
+def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(n, 3) float: sizes in which every table is long and deep enough for the chairs around it.
+
+    Arguments:
+        categories: n words. size: (n, 3) float, metres.
+        anchor: (n,) int, whom each attends (`Plan.anchor`). free: (n,) bool, sizes that may change.
+    """
+    out = size.copy()
+    kinds = [kind_of(word) for word in categories]
+    for table in np.unique(anchor[anchor >= 0]).tolist():
+        chairs = [i for i in np.flatnonzero(anchor == table).tolist() if kinds[i].role == "seat"]
+        if not free[table] or kinds[table].role != "board" or kinds[table].access or len(chairs) < 2:
+            continue
+        width = float(np.median([min(size[i, 0], 0.7) for i in chairs]))
+        at_ends = len(chairs) > 4
+        a_side = -(-(len(chairs) - 2 * at_ends) // 2)
+        long = 0 if size[table, 0] >= size[table, 2] else 2
+        out[table, long] = max(size[table, long], a_side * (width + ELBOWS) + 2 * TUCKED * at_ends)
+        out[table, 2 - long] = max(size[table, 2 - long], LEAST_DEPTH)
     return out
 
 

@@ -16,8 +16,10 @@ PASSAGE = 0.75  # metres: a sofa so far from the wall stands in the room on purp
 
 
 def parallel(plan: Plan) -> Found:
-    """Storage, beds, sofas, tables and desks stand parallel to a wall."""
-    who = (plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company")).nonzero()[:, 0]
+    """Storage, beds, sofas, tables and desks stand parallel to a wall; side tables go with their seat."""
+    who = (plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company", "beside")).nonzero()[
+        :, 0
+    ]
     _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
     wall = torch.atan2(-along[..., 1], along[..., 0])
     off = _from_quarter(plan.yaw[who, None] - wall)
@@ -32,9 +34,9 @@ def _from_quarter(angle: Tensor) -> Tensor:
 
 
 def at_wall(plan: Plan) -> Found:
-    """What belongs at a wall has its back to one; a nightstand's place is the head of its bed."""
+    """What belongs at a wall has its back to one, but for nightstands at their bed and sofas that join another."""
     wall = plan.which(lambda kind: kind.wall)
-    beside = plan.stands("head") & (plan.anchor >= 0)
+    beside = (plan.stands("head") & (plan.anchor >= 0)) | plan.stands("with")
     there = (plan.walls[3] > 0).any(1)[plan.scene]
     who = (wall & plan.standing & ~beside & there).nonzero()[:, 0]
     gap = plan.back_gap[who]

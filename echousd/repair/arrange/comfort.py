@@ -1,0 +1,102 @@
+"""What a person wishes beyond what must be: ways between groups, even chairs, room to pull them out, a free view."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echousd.repair.arrange.overlaps import beyond, depths
+from echousd.repair.arrange.setting import Poses, Setting, State
+
+UNEVEN = 1.0  # for chairs of a table whose middle lies half a table off its own
+PULLED, AT_WALL = 1.6, 0.9  # for a chair that cannot be pulled out before furniture, before a wall
+PULL, PULL_WALL = 0.4, 0.25  # metres behind a chair
+HIDDEN = 2.5  # for something high between a screen and its viewer
+HIGH = 0.65  # metres
+ON_SIGHT = np.linspace(0.15, 0.85, 7)[:, None]  # places on the line of sight
+SOLID = ("sofa", "board", "bed", "storage")
+
+
+def uncomfortable(
+    setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray, gap: np.ndarray
+) -> np.ndarray:
+    """(K,) float: what box i pays at each pose for how near it stands to others and what it spoils.
+
+    Arguments:
+        others: (m,) int, boxes that are placed. gap: (K, m) float, metres between box i at each pose and them.
+    """
+    wish, dear = setting.wishes[0][i, others], setting.wishes[1][i, others]
+    near = wish > 0
+    out = (dear[near] * (1 - gap[:, near] / wish[near]).clip(0.0, 1.0)).sum(1)
+    if setting.stances[i] == "at":
+        out = out + _uneven(setting, state, i, poses) + _boxed_in(setting, state, i, poses, others)
+    return out + _hiding(setting, state, i, poses)
+
+
+def _uneven(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): how far the middle of the chairs around a table is off its own, in half sides of the table."""
+    table = int(setting.anchor[i])
+    if table < 0 or not setting.laid[table] or not state.placed[table]:
+        return np.zeros(len(poses))
+    seats = (setting.anchor == table) & state.placed & np.array([kind.role == "seat" for kind in setting.kinds])
+    mates = np.array([j for j in np.flatnonzero(seats) if j != i], int)
+    half = setting.size[table, [0, 2]] / 2 + 0.3
+    own = _local(state.position[table], float(state.yaw[table]), poses.position) / half
+    there = _local(state.position[table], float(state.yaw[table]), state.position[mates]).reshape(-1, 2) / half
+    return UNEVEN * np.abs(own + there.sum(0)).sum(1)
+
+
+def _local(position: np.ndarray, yaw: float, points: np.ndarray) -> np.ndarray:
+    """(K, 2): lateral and forward of points (K, 3) in the frame of a box."""
+    away = points[:, [0, 2]] - position[[0, 2]]
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], -1)
+
+
+def _boxed_in(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
+    """(K,): the price of a chair that cannot be pulled out."""
+    back = -np.stack([np.sin(poses.yaw), np.zeros_like(poses.yaw), np.cos(poses.yaw)], -1)
+
+    def behind(depth: float) -> tuple[np.ndarray, Poses]:
+        size = np.array([0.7 * setting.size[i, 0], 0.8, depth])
+        return size, Poses(poses.position + (setting.size[i, 2] / 2 + depth / 2 + 0.01) * back, poses.yaw, poses.price)
+
+    solid = [j for j in others if setting.standing(j) and setting.kinds[j].role in SOLID and setting.anchor[i] != j]
+    size, space = behind(PULL)
+    deep = depths(size, space, setting.size[solid], state.position[solid], state.yaw[solid])
+    size, space = behind(PULL_WALL)
+    return PULLED * (deep > 0.02).any(1) + AT_WALL * (beyond(setting, size, space) > 0.02)
+
+
+def _hiding(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): the price of standing in the line of sight to a screen, or of a screen that something hides."""
+    out = np.zeros(len(poses))
+    high = setting.size[:, 1] > HIGH
+    screens = [k for k, stance in enumerate(setting.stances) if stance == "opposite" and setting.anchor[k] >= 0]
+    for k in screens:
+        seat = int(setting.anchor[k])
+        if i == k and state.placed[seat]:
+            ends = poses.position[:, None, [0, 2]], state.position[seat, [0, 2]]
+            points = ends[0] + ON_SIGHT * (ends[1] - ends[0])
+            for j in np.flatnonzero(state.placed & high):
+                if j not in (seat, k) and setting.standing(j) and setting.anchor[j] != seat:
+                    inside = _within(points, state.position[j], state.yaw[j], setting.size[j])
+                    out += HIDDEN * inside.any(1)
+        elif i not in (k, seat) and high[i] and state.placed[k] and state.placed[seat] and setting.anchor[i] != seat:
+            if not setting.standing(i):
+                continue
+            start, end = state.position[k, [0, 2]], state.position[seat, [0, 2]]
+            points = (start + ON_SIGHT * (end - start))[None]
+            away = points - poses.position[:, None, [0, 2]]
+            c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
+            lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < setting.size[i, 0] / 2 + 0.05
+            forward = np.abs(s * away[..., 0] + c * away[..., 1]) < setting.size[i, 2] / 2 + 0.05
+            out += HIDDEN * (lateral & forward).any(1)
+    return out
+
+
+def _within(points: np.ndarray, position: np.ndarray, yaw: float, size: np.ndarray) -> np.ndarray:
+    """(K, P) bool: which points (K, P, 2) lie in a footprint that is grown by 5 cm."""
+    away = points - position[[0, 2]]
+    c, s = np.cos(yaw), np.sin(yaw)
+    lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < size[0] / 2 + 0.05
+    return lateral & (np.abs(s * away[..., 0] + c * away[..., 1]) < size[2] / 2 + 0.05)

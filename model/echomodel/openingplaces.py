@@ -1,0 +1,124 @@
+"""Doors and windows that nobody stated: where in the walls of a floor they go, before or after it is furnished."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from echomodel.openings import (
+    SWINGS,
+    USUAL,
+    Opening,
+    edge_lengths,
+    free_area,
+    inward_normal,
+    numbered,
+    overlap,
+    signed_area,
+)
+from echomodel.roomboxes import footprints
+
+GRID = 0.1  # metres between the places that are tried for an opening
+CORNER = 0.1  # metres from a corner to a door
+OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
+PIER = 0.3  # metres of wall between a window and a corner or another opening
+SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
+
+
+def place_openings(
+    polygon: np.ndarray,
+    height: float,
+    rng: np.random.Generator,
+    *,
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+) -> tuple[Opening, ...]:
+    """A door and one or two windows (two doors in halls), each where least stands in its way.
+
+    Doors like the end of a wall with the hinges at the corner, windows the middle of another wall.
+
+    Arguments:
+        polygon: (k, 2) float, corners (x, z) of the floor, metres.
+        height: of the room, metres.
+        rng: decides between places that are equally good.
+        boxes: size (n, 3), position (n, 3) of the bottom centre and yaw (n,) of what stands in the room.
+    """
+    area = abs(signed_area(polygon))
+    made: list[Opening] = []
+    for kind, count in (("door", 1 + (area > SECOND_DOOR)), ("window", 1 + (area > SECOND_WINDOW))):
+        for _ in range(count):
+            best = _best(kind, polygon, height, rng, made, boxes)
+            if best is not None:
+                made.append(best)
+    return tuple(made)
+
+
+def _best(
+    kind: str,
+    polygon: np.ndarray,
+    height: float,
+    rng: np.random.Generator,
+    made: Sequence[Opening],
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None,
+) -> Opening | None:
+    """The place of least cost among a grid of places on all walls, None where no wall is long enough."""
+    import shapely
+
+    lengths = edge_lengths(polygon)
+    name = numbered(kind, [opening.name for opening in made])
+    usual = USUAL[kind]
+    tall = min(usual["height"], height - usual["sill"] - 0.05)
+    doors = [opening for opening in made if opening.kind == "door"]
+    places: list[Opening] = []
+    tastes: list[float] = []
+    for edge, length in enumerate(lengths):
+        margin = CORNER if kind == "door" else PIER
+        width = usual["width"] if kind == "door" else float(np.clip(0.4 * length, 0.9, 2.0))
+        if length < width + 2 * margin:
+            continue
+        shared = [opening for opening in made if opening.edge == edge]
+        taste = 0.2 * rng.random() + (0.6 if kind == "window" and any(d.edge == edge for d in doors) else 0.0)
+        if kind == "window" and doors:  # light from the other side than the door
+            facing = inward_normal(polygon, edge) @ inward_normal(polygon, doors[0].edge)
+            taste += 0.3 * (1 + float(facing)) / 2
+        taste += 0.8 * len([o for o in shared if o.kind == kind]) - 0.05 * min(float(length), 6.0)
+        step = GRID if boxes is not None and len(boxes[0]) else 3 * GRID
+        offsets = np.arange(margin, length - width - margin + 1e-9, step)
+        offsets = np.unique(np.round([*offsets, length - width - margin, (length - width) / 2], 3))
+        for offset, swing in product(offsets, SWINGS if kind == "door" else ("in",)):
+            near, far = float(offset), float(length - width - offset)
+            hinge = "left" if (near <= far) == (signed_area(polygon) > 0) else "right"
+            hinge = hinge if kind == "door" else "left"
+            one = Opening(name, kind, edge, near, width, tall, usual["sill"], hinge, swing)
+            if any(overlap(one, other) > -PIER for other in shared):
+                continue
+            places.append(one)
+            cost = 0.25 * min(near, far) if kind == "door" else 0.3 * abs(near - far) / length
+            tastes.append(taste + cost + OUTWARDS * (swing == "out"))
+    if not places:
+        return None
+    free = np.array([shapely.Polygon(free_area(polygon, one)) for one in places])
+    cost = np.array(tastes)
+    # into the next wall of a niche
+    cost += 3.0 * shapely.area(shapely.difference(free, shapely.Polygon(polygon).buffer(1e-6)))
+    for block, top in _blocks(boxes):
+        if kind != "window" or top > usual["sill"]:
+            cost += 12.0 * shapely.area(shapely.intersection(free, block))
+    for other in made:
+        cost += 2.0 * shapely.area(shapely.intersection(free, shapely.Polygon(free_area(polygon, other))))
+    return places[int(cost.argmin())]
+
+
+def _blocks(boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> list:
+    """(footprint, top) of every box that begins below a door's height."""
+    import shapely
+
+    if boxes is None:
+        return []
+    out = []
+    for size, position, plan in zip(*boxes[:2], footprints(*map(np.asarray, boxes)), strict=True):
+        if position[1] >= USUAL["door"]["height"] - 0.05:
+            continue
+        out.append((shapely.Polygon(plan), float(position[1] + size[1])))
+    return out

@@ -1,0 +1,112 @@
+"""Rules of what belongs together: chairs evenly around a table, sofas in one circle, side tables at their seat."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from echomodel.floors import known, signed_distance
+from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.plan import FAR, Plan
+
+EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
+ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
+AROUND = 0.7  # metres: chairs further from their table are not at it
+CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
+BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
+NEAR = 3.0  # metres: a sofa further away stands for itself
+COVERS = 0.2  # share of a sofa's width that side tables and lamps may stand before
+SIDE = 0.6  # metres: what is further from its seat stands for itself
+ALONE = 0.45  # metres from everything: nothing small stands so in a room
+EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
+VIEW_STEPS = 9
+VIEW_HEIGHT = 0.65  # metres: one looks over what is lower
+
+
+def chairs_even(plan: Plan) -> Found:
+    """The chairs of a table stand evenly around it."""
+    i, j = plan.attended("at")
+    tables = plan.which(lambda kind: kind.role == "board" and not kind.access)
+    keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
+    i, j = i[keep], j[keep]
+    count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, torch.ones(len(j), dtype=plan.size.dtype))
+    lateral, forward = plan.local(i, j)
+    sums = torch.zeros(len(plan), 2, dtype=plan.size.dtype).index_add(0, j, torch.stack([lateral, forward], -1))
+    who = (count > 1).nonzero()[:, 0]
+    n = count[who]
+    shift = (sums[who] / n[:, None]).abs()
+    odd = (n % 2)[:, None] * (ODD * plan.size[who][:, [0, 2]] + 0.3) / n[:, None]
+    margin, axis = (EVEN + odd - shift).min(1)
+    return found(who, margin, measure=shift.gather(1, axis[:, None])[:, 0])
+
+
+def sofas_in_circle(plan: Plan) -> Found:
+    """A second sofa looks into the group of the first."""
+    i, j = plan.attended("with")
+    near = plan.apart(i, j).detach() < NEAR
+    i, j = i[near], j[near]
+    ahead = plan.size[j, 2] / 2 + BEFORE
+    middle = plan.position[j][:, [0, 2]] + torch.stack([plan.yaw[j].sin(), plan.yaw[j].cos()], -1) * ahead[:, None]
+    away = middle - plan.position[i][:, [0, 2]]
+    forward = away[:, 0] * plan.yaw[i].sin() + away[:, 1] * plan.yaw[i].cos()
+    lateral = away[:, 0] * plan.yaw[i].cos() - away[:, 1] * plan.yaw[i].sin()
+    off = torch.atan2((lateral.square() + 1e-12).sqrt(), forward)
+    return found(i, CIRCLE - off, other=j, measure=torch.rad2deg(off))
+
+
+def at_its_side(plan: Plan) -> Found:
+    """Side tables and floor lamps stand beside their sofa or bed, not before it."""
+    i, j = plan.attended("beside")
+    keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
+    i, j = i[keep], j[keep]
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    covered = plan.size[j, 0] / 2 + half_width - lateral.abs()
+    before = forward - half_depth - plan.size[j, 2] / 2
+    margin = torch.maximum(COVERS * plan.size[j, 0] - covered, -0.05 - before)
+    return found(i, margin, other=j, measure=before.clamp_min(0.0))
+
+
+def not_alone(plan: Plan) -> Found:
+    """Plants, lamps and small tables stand at a wall or at something, an armchair without a group at a wall."""
+    loner = plan.which(lambda kind: kind.stands == "company") & (plan.anchor < 0)
+    small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
+    who = small.nonzero()[:, 0]
+    i, j = plan.pairs(small, plan.standing)
+    gap, _ = worst(i, plan.apart(i, j), j, len(plan), FAR)
+    floor = plan.floor[plan.scene[who]]
+    half = plan.size[who][:, [0, 2]].amax(1) / 2
+    wall = signed_distance(plan.position[who][:, None, [0, 2]], floor)[:, 0] - half
+    wall = torch.where(known(floor), wall, 0.0 * wall)
+    away = torch.where(loner[who], wall - (EDGE - ALONE), torch.minimum(gap[who], wall))
+    return found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
+
+
+def view_free(plan: Plan) -> Found:
+    """Nothing high stands between a screen and the sofa or bed that it is watched from."""
+    i, j = plan.attended("opposite")
+    high = plan.standing & (plan.position[:, 1] + plan.size[:, 1] > VIEW_HEIGHT).detach()
+    who, block = plan.pairs(_mask(i, len(plan)), high)
+    watched = plan.anchor[who]
+    keep = (block != watched) & (plan.anchor[block] != watched) & ~plan.which(lambda kind: kind.access == 0.3)[block]
+    who, block, watched = who[keep], block[keep], watched[keep]
+    if not len(who):
+        return found(i, torch.full_like(plan.size[i, 0], FAR), other=j)
+    share = torch.linspace(0.15, 0.85, VIEW_STEPS, dtype=plan.size.dtype)[:, None, None]
+    start, end = plan.position[who][:, [0, 2]], plan.position[watched][:, [0, 2]]
+    points = start + share * (end - start)
+    offset = points - plan.position[block][:, [0, 2]]
+    cos, sin = plan.yaw[block].cos(), plan.yaw[block].sin()
+    lateral = (cos * offset[..., 0] - sin * offset[..., 1]).abs() - plan.size[block, 0] / 2
+    forward = (sin * offset[..., 0] + cos * offset[..., 1]).abs() - plan.size[block, 2] / 2
+    clear = torch.maximum(lateral, forward).amin(0)
+    least, about = worst(who, clear, block, len(plan), FAR)
+    return found(i, least[i], other=about[i])
+
+
+def _mask(who: Tensor, count: int) -> Tensor:
+    out = torch.zeros(count, dtype=torch.bool)
+    out[who] = True
+    return out

@@ -1,0 +1,117 @@
+"""Rules of free space: groups keep apart, chairs can be pulled out, knees have room, beds are walked round."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from echomodel.floors import known, signed_distance
+from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.plan import FAR, Plan
+
+# Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
+APART = {
+    ("sofa", "board"): 0.2, ("sofa", "seat"): 0.12, ("board", "board"): 0.1, ("board", "seat"): 0.05,
+    ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.12,
+    ("bed", "bed"): 0.15,
+}  # fmt: skip
+PULL, PULL_WALL = 0.22, 0.08  # metres behind a chair, before furniture and before a wall
+KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
+FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
+LAMP = 0.35  # metres before a front that lamps and plants keep free
+MET = 0.25  # share of a width from which on something is before it
+EDGE = 0.06  # the same for lamps and plants, which are narrow
+
+
+def groups_apart(plan: Plan) -> Found:
+    """Pieces of different groups leave a gap: a table does not touch a sofa, nor a chair the next bed."""
+    roles = {role for pair in APART for role in pair}
+    massive = plan.of(*roles) & plan.standing
+    i, j = plan.pairs(massive, massive)
+    wanted = torch.zeros(len(plan), len(plan), dtype=plan.size.dtype)
+    for (one, other), gap in APART.items():
+        both = plan.of(one)[:, None] & plan.of(other)[None]
+        wanted[both | both.T] = gap
+    other = ~plan.kin(i, j)
+    smaller = plan.size[i].detach().prod(1) < plan.size[j].detach().prod(1)
+    ordered = smaller | ((plan.size[i].detach().prod(1) == plan.size[j].detach().prod(1)) & (i > j))
+    keep = other & ordered & (wanted[i, j] > 0) & ~_side_by_side(plan, i, j)
+    i, j = i[keep], j[keep]
+    gap = plan.apart(i, j)
+    least, about = worst(i, gap - wanted[i, j], j, len(plan), FAR)
+    who = i.unique()
+    return found(who, least[who], other=about[who], measure=_gap_to(plan, who, about[who]))
+
+
+def _side_by_side(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
+    """(P,) bool: desks and the like in one row, looking the same way."""
+    lateral, _ = plan.local(i, j)
+    half_width, _ = plan.reach(i, j)
+    row = lateral.abs() - half_width - plan.size[j, 0] / 2 > -0.05
+    return (row & ((plan.yaw[i] - plan.yaw[j]).cos() > 0.97) & plan.of("board")[i] & plan.of("board")[j]).detach()
+
+
+def _gap_to(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
+    return plan.apart(i, j).clamp_min(0.0)
+
+
+def chair_pulls_out(plan: Plan) -> Found:
+    """A chair can be moved back from its table or desk."""
+    i, j = plan.attended("at")
+    near = plan.apart(i, j).detach() < 0.5
+    who = i[near & ~plan.which(lambda kind: kind.solid)[i]]
+    block = plan.of("board", "bed", "storage", "sofa") & plan.standing
+    return _clear(plan, who, block, PULL, PULL_WALL, behind=True)
+
+
+def knees_free(plan: Plan) -> Found:
+    """Who sits on a sofa or in an armchair has room for the knees, and does not look at a wall."""
+    seats = (plan.of("sofa") | plan.stands("company")) & plan.standing
+    return _clear(plan, seats.nonzero()[:, 0], plan.standing & ~plan.movable, KNEES, KNEES_WALL)
+
+
+def bed_foot_free(plan: Plan) -> Found:
+    """One passes between the foot of a bed and what stands opposite."""
+    beds = (plan.of("bed") & plan.standing).nonzero()[:, 0]
+    return _clear(plan, beds, plan.standing & plan.of("storage", "board", "sofa", "seat", "bed"), FOOT, -FAR)
+
+
+def lamp_aside(plan: Plan) -> Found:
+    """Lamps and plants do not stand before shelves, cupboards and drawers."""
+    fronts = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0)
+    i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts)
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    clear = forward - half_depth - plan.size[j, 2] / 2
+    covered = torch.minimum(2 * half_width, plan.size[j, 0] / 2 + half_width - lateral.abs())
+    margin = torch.maximum(torch.maximum(clear - LAMP, EDGE * plan.size[j, 0] - covered), -forward)
+    least, about = worst(i, margin, j, len(plan), FAR)
+    who = i.unique()
+    return found(who, least[who], other=about[who], measure=least[who] + LAMP)
+
+
+def _clear(plan: Plan, who: Tensor, block: Tensor, needed: float, needed_wall: float, *, behind: bool = False) -> Found:
+    """How much more than is needed is free before (or behind) some boxes, to other groups' pieces and to walls."""
+    sign = -1.0 if behind else 1.0
+    mask = torch.zeros(len(plan), dtype=torch.bool)
+    mask[who] = True
+    i, j = plan.pairs(mask, block)
+    other = ~plan.kin(i, j)
+    i, j = i[other], j[other]
+    lateral, forward = plan.local(j, i)
+    half_width, half_depth = plan.reach(j, i)
+    clear = sign * forward - half_depth - plan.size[i, 2] / 2
+    covered = torch.minimum(plan.size[i, 0], plan.size[i, 0] / 2 + half_width - lateral.abs())
+    beyond = plan.size[i, 2] / 4 - sign * forward  # beside it, or on its other side
+    margin = torch.maximum(torch.maximum(clear - needed, MET * plan.size[i, 0] - covered), beyond)
+    least, about = worst(i, margin, j, len(plan), FAR)
+    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1) * sign
+    points = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + max(needed_wall, 0.0))[:, None]
+    floor = plan.floor[plan.scene[who]]
+    wall = signed_distance(points[:, None], floor)[:, 0]
+    wall = torch.where(known(floor) & (needed_wall > 0), wall, torch.full_like(wall, FAR))
+    by_wall = wall < least[who]
+    return found(
+        who, torch.minimum(least[who], wall), other=torch.where(by_wall, -1, about[who]),
+        measure=torch.where(by_wall, wall + needed_wall, least[who] + needed).clamp_min(0.0),
+    )  # fmt: skip
