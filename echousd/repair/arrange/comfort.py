@@ -77,7 +77,7 @@ def _hiding(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
         if i == k and state.placed[seat]:
             ends = poses.position[:, None, [0, 2]], state.position[seat, [0, 2]]
             points = ends[0] + ON_SIGHT * (ends[1] - ends[0])
-            for j in np.flatnonzero(state.placed & high):
+            for j in np.flatnonzero(state.placed & high).tolist():
                 if j not in (seat, k) and setting.standing(j) and setting.anchor[j] != seat:
                     inside = _within(points, state.position[j], state.yaw[j], setting.size[j])
                     out += HIDDEN * inside.any(1)

@@ -29,9 +29,9 @@ def groups_apart(plan: Plan) -> Found:
     massive = plan.of(*roles) & plan.standing
     i, j = plan.pairs(massive, massive)
     wanted = torch.zeros(len(plan), len(plan), dtype=plan.size.dtype)
-    for (one, other), gap in APART.items():
-        both = plan.of(one)[:, None] & plan.of(other)[None]
-        wanted[both | both.T] = gap
+    for (one, another), metres in APART.items():
+        both = plan.of(one)[:, None] & plan.of(another)[None]
+        wanted[both | both.T] = metres
     other = ~plan.kin(i, j)
     smaller = plan.size[i].detach().prod(1) < plan.size[j].detach().prod(1)
     ordered = smaller | ((plan.size[i].detach().prod(1) == plan.size[j].detach().prod(1)) & (i > j))
