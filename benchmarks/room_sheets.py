@@ -22,11 +22,11 @@ import yaml
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.openings import segment, swing_area
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd import generate
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.starting import starting_graph
-from echousd.repair.geometry import corners
 from echousd.repair.living import living_faults
 from echousd.room import Room
 
@@ -56,7 +56,7 @@ def cell(room: Room, title: str) -> tuple[Image.Image, list[str]]:
         if len(sweep := swing_area(outline, opening)):
             draw.polygon(at(sweep), outline=colour)
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
-    plan = corners(size, position, yaw)
+    plan = footprints(size, position, yaw)
     for i in np.argsort(position[:, 1] + 0.01 * size[:, 1]):
         kind = vocabulary().category(room.graph.nodes[i].category)
         points = at(plan[i])

@@ -73,10 +73,6 @@ def _related(habit: Habit, nodes: list[Node], anchors: list[Node]) -> list[Relat
         if habit.sides:
             relations.append(Relation(node.name, habit.sides[i % len(habit.sides)], anchor.name))
         if i and node.category == nodes[0].category:
-            once = (
-                habit.among
-                if i == 1
-                else tuple(word for word in habit.among if vocabulary().predicate(word).transitive)
-            )
-            relations += [Relation(node.name, predicate, nodes[0].name) for predicate in once]
+            among = [word for word in habit.among if i == 1 or vocabulary().predicate(word).transitive]
+            relations += [Relation(node.name, predicate, nodes[0].name) for predicate in among]
     return relations

@@ -253,7 +253,7 @@ class Vocabulary:
             _known(f"room type {room.name}", "like", (room.like,), {"", *(other.name for other in self.room_types)})
         for habit in self.habits:
             _known("habits", "category", (*habit.categories, *habit.anchors), categories)
-            _known("habits", "predicate", (*habit.predicates, *habit.sides), predicates)
+            _known("habits", "predicate", (*habit.predicates, *habit.sides, *habit.among), predicates)
 
     def _find(self, kind: str, word: str) -> int:
         index = self._index[kind]
