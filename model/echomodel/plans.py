@@ -23,7 +23,7 @@ TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its t
 BEDSIDE, FOOT, PULL, KNEES, VIEW, HANDS = 0.5, 0.5, 0.75, 0.5, 2.1, 0.1
 DESK_CHAIR = 0.9  # metres before a desk
 # Share of a floor that use can take: the rest are ways and corners; beds are walked round within their own share.
-USED = {"bedroom": 0.78, "study": 0.7}
+USED = {"bedroom": 0.78, "study": 0.62, "living_dining_room": 0.58}
 USUALLY_USED = 0.66
 SPREAD = 0.12  # of the logarithm of what is more than needed
 DOOR_AREA = 1.0  # square metres
