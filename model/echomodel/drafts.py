@@ -37,7 +37,7 @@ class _Candidate:
     placed: int
 
 
-def drafted(graph: GraphBatch, generator: Randomness, *, rules: str, draws: int = 16) -> tuple[Boxes, Tensor]:
+def drafted(graph: GraphBatch, generator: Randomness, *, rules: str, draws: int = 8) -> tuple[Boxes, Tensor]:
     """Arrange the furniture of S scenes by the groups of the room generator, on their floors.
 
     Arrangements are drawn, mirrored where they still fit the floor, and equal pieces dealt to their nodes in a few
