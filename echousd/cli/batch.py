@@ -56,7 +56,9 @@ def run(
     timeout: Annotated[float | None, typer.Option(help="Seconds a room may take.", min=0.1)] = None,
     until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.")] = "",
     memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", min=256)] = 4096,
-    shapes: Annotated[str | None, typer.Option(help="parts, sdf or boxes; default: the best of the model.")] = None,
+    shapes: Annotated[
+        str | None, typer.Option(help="parts, sdf, library, boxes; default: the best of the model.")
+    ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
