@@ -13,7 +13,8 @@ from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
 SHELL = ("floor", "wall", "ceiling", "door", "window")
-HUNG = ("picture", "mirror", "curtain")  # goes with the wall that it hangs on
+SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
+HUNG = ("picture", "mirror", "curtain", "wall_shelf", "wall_clock", "coats")  # goes with the wall that it hangs on
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +109,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
             continue
+        if mesh.category == "window" and not by_class and all(p.opacity < SEEN_THROUGH for p, _ in mesh.paints):
+            continue  # panes
         if mesh.category == "wall":
             walls.setdefault(mesh.component, len(walls))
         count = len(mesh.triangles)

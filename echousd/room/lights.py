@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
+from echomodel.boxes import Boxes
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.room.cameras import Volume
@@ -54,8 +55,7 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     full: Intensities = {sky.GetPath(): (0, 0.5 * above), **_panel(stage, volume, room.height, panel)}
     if room.options.walls:
         full |= _sun(stage, room)
-    if len(room.layouts) < 2:  # bulbs stand where the lamps do
-        full |= _lamps(stage, room)
+    full |= _lamps(stage, room)
     times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
     for name, shares in TIMES.items():
         times.AddVariant(name)
@@ -104,19 +104,37 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
 
 
 def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
-    """A bulb for every lamp: below what hangs, over the shade of what stands."""
+    """A bulb for every lamp: below what hangs, over the shade of what stands; in every layout where its lamp is."""
     full: Intensities = {}
-    for number, node in enumerate(room.graph.nodes):
+    for node in room.graph.nodes:
         row = vocabulary().category(node.category)
         if row.role != "light":
             continue
-        x, y, z = (float(v) for v in room.boxes.position[number])
-        top = y + float(room.boxes.size[number][1])
         bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
         bulb.CreateRadiusAttr(BULB)
         bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
         bulb.CreateEnableColorTemperatureAttr(True)
         bulb.CreateColorTemperatureAttr(2900.0)
-        bulb.AddTranslateOp().Set(Gf.Vec3d(x, (y - 0.06) if row.support == "ceiling" else top + 0.06, z))
+        bulb.AddTranslateOp()
         full[bulb.GetPath()] = (3, LUMENS[row.support] / (np.pi * NITS))
+    if len(room.layouts) < 2:
+        _hang_bulbs(stage, room, room.boxes)
+        return full
+    layouts = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
+    for number, boxes in enumerate(room.layouts):
+        layouts.AddVariant(f"layout_{number}")
+        layouts.SetVariantSelection(f"layout_{number}")
+        with layouts.GetVariantEditContext():
+            _hang_bulbs(stage, room, boxes)
+    layouts.ClearVariantSelection()  # the layer of the layout says which one is seen
     return full
+
+
+def _hang_bulbs(stage: Usd.Stage, room: RoomData, boxes: Boxes) -> None:
+    for number, node in enumerate(room.graph.nodes):
+        row = vocabulary().category(node.category)
+        if row.role == "light":
+            x, y, z = (float(v) for v in boxes.position[number])
+            height = y - 0.06 if row.support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
+            over = stage.OverridePrim(f"{LIGHTS}/lamp_{node.name}")
+            over.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(x, height, z))

@@ -10,7 +10,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
-from echomodel.data.dressing import KINDS
+from echomodel.data.dressing import KINDS, SMALL
 from echousd.check import check_room
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
@@ -123,6 +123,12 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
                 within = host.top > low and host.position[1] < high
                 assert not within or reaches(host, low, high).intersection(one.footprint).area < 1e-4, (one, host.name)
     assert check_room(room.save(tmp_path / name, preview=False)).ok
+
+
+def test_kinds_of_one_category_agree():
+    for kind in KINDS.values():
+        same = SMALL[kind.name]
+        assert (kind.ade20k, kind.fixed, kind.lies) == (same.ade20k, same.fixed, same.lies), kind
 
 
 def test_doors_stay_free(room):

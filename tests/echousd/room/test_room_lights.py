@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import StandIn, small_graph
 
 import echousd
+from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echousd.graph import RoomSpec
 from echousd.room.room import RoomOptions
@@ -63,3 +66,18 @@ def test_lamps_shine_where_they_are(stage) -> None:
     candela = light.GetIntensityAttr().Get() * 30 / 4
     stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "day")
     assert candela == pytest.approx(1500 / (4 * np.pi), rel=1e-3)  # 1,500 lumens all round
+
+
+def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
+    room = echousd.generate(small_graph(), model=StandIn(), repair=False, shapes="boxes")
+    moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
+    stage = Usd.Stage.Open(str(replace(room, layouts=(room.boxes, moved)).save(tmp_path / "two", preview=False)))
+    layouts = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert layouts.GetVariantSelection() == "layout_0"
+    places = []
+    for name in ("layout_0", "layout_1"):
+        layouts.SetVariantSelection(name)
+        bulb = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Lights/lamp_pendant"))
+        places.append(np.array(bulb.ComputeLocalToWorldTransform(0).ExtractTranslation()))
+        assert intensity(stage, "lamp_pendant") > 0
+    assert places[1] - places[0] == pytest.approx(0.1, abs=1e-6)
