@@ -19,7 +19,7 @@ from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
 from echomodel.schedule import alpha_sigma, sampling_levels
 
-FEWEST = 2  # steps from a draft
+FEWEST = 4  # steps from a draft
 Predict = Callable[[Tensor, Tensor], Tensor]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
 
