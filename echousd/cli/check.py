@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.output import plain_json, safe
+from echousd.cli.output import safe, say, say_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,7 +26,10 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    room: Annotated[Path, typer.Argument(help="Room to check (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    room: Annotated[
+        list[Path],
+        typer.Argument(help="Rooms (.usda, .usdc, .usd, .usdz), their folders, folders of these.", show_default=False),
+    ],
     json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
     rules: Annotated[str, typer.Option("--rules", help="Rules of the relations: strict or sgfront.")] = "strict",
     layout: Annotated[int | None, typer.Option(help="Only this layout; default: all.", min=0)] = None,
@@ -35,7 +38,32 @@ def check(
         bool, typer.Option("--settle", help="Simulate two seconds as well: everything must rest (extra: sim).")
     ] = False,
 ) -> None:
-    """Check a room: relations, collisions, placement, living rules in all its layouts, and its USD."""
+    """Check rooms: relations, collisions, placement, living rules in all their layouts, and their USD.
+
+    Of several rooms each gets a line, with --json an entry of one list.
+    """
+    from echousd.room.found import rooms_at
+
+    found = [path for place in room for path in rooms_at(place)]
+    reports = [_one(path, json, rules, layout, strict, settle, alone=len(found) == 1) for path in found]
+    if json:
+        say_json(
+            reports[0][1]
+            if len(found) == 1
+            else [{"room": str(p), **told} for p, (_, told) in zip(found, reports, strict=True)],
+            indent=2,
+        )
+    elif len(found) > 1:
+        good = sum(ok for ok, _ in reports)
+        say(f"{good} of {len(found)} rooms are good")
+    if not all(ok for ok, _ in reports):
+        raise typer.Exit(1)
+
+
+def _one(
+    room: Path, json: bool, rules: str, layout: int | None, strict: bool, settle: bool, *, alone: bool
+) -> tuple[bool, dict[str, Any]]:
+    """Check one room and show what was found, in a line unless it is alone: whether it is good, and the report."""
     from echousd.check import check_room
 
     report = check_room(room, rules=rules, layout=layout)
@@ -45,19 +73,21 @@ def check(
 
         settled = settle_layouts(room, layout=layout)
     rests = all(found.ok for found in settled)
-    if json:
-        import json as text
-
-        told = report.to_json()
-        if settle:
-            told["settle"] = [found.to_json() for found in settled]
-            told["ok"] = told["ok"] and rests
-        typer.echo(text.dumps(plain_json(told), indent=2, allow_nan=False))
-    else:
+    told = report.to_json()
+    if settle:
+        told["settle"] = [found.to_json() for found in settled]
+        told["ok"] = told["ok"] and rests
+    good = report.ok and rests and not (strict and report.living)
+    if not json and alone:
         _show(report, strict)
         _show_settled(settled)
-    if not report.ok or not rests or (strict and report.living):
-        raise typer.Exit(1)
+    elif not json:
+        seen = [f"{len(report.errors)} USD errors"] * bool(report.errors)
+        for each in report.layouts:
+            counts = {"broken": each.broken, "colliding": each.collisions, "misplaced": each.placement}
+            seen += [f"{each.name} {len(what)} {word}".strip() for word, what in counts.items() if what]
+        say(f"{'ok' if good else 'no'}  {room}  {', '.join(seen)}".rstrip())
+    return good, told
 
 
 def _show(report: CheckReport, strict: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,7 @@ from echousd.room.layouts import (
 )
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
+from echousd.room.owned import with_own_boxes, with_own_pieces
 from echousd.room.progress import StageTimer
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
@@ -64,6 +66,8 @@ def generate(
     progress: StageListener | None = None,
     drawn: Drawn | None = None,
     assets: AssetWishes | str | Path | None = None,
+    boxes: Boxes | None = None,
+    meshes: Mapping[str, str | Path] | None = None,
 ) -> Room:
     """Make a room from a scene graph.
 
@@ -77,8 +81,8 @@ def generate(
         shapes: where geometry comes from, a name of `echousd.room.sources`: `parts`, furniture built from the model's
             descriptions, `sdf`, the model's shape branch, plain `boxes`, or `library`, models of `assets`; None =
             `parts` where the model can. An object of the graph may say otherwise (`source`, `asset`).
-        model: a loaded model, a weights file (one of `echousd convert`, too), or None for the weights that ship with
-            the package.
+        model: a loaded model, a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`), a weights
+            file (one of `echousd convert`, too), or None for the weights that ship with the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.
         repair: move and size the sampled boxes as little as possible until the graph is kept.
         samples: number of layouts of the same furniture.
@@ -93,6 +97,10 @@ def generate(
         progress: called with (stage, done, total).
         drawn: drafts of the first layout that were sampled already (`echousd.room.packed`).
         assets: index of a library (`echousd assets index`), or what is asked of one.
+        boxes: layout of your own, n boxes in the order of the graph's nodes, metres and radians in the room's frame;
+            every object stands where its box is.
+        meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
+            working folder.
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -122,6 +130,7 @@ def generate(
     else:
         graph, homeless = with_locked_places(graph, earlier)
     graph = anchored(graph, beside)
+    graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
     with timer.stage("load"):
         echo = load_model(model, preset)

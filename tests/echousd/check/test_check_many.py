@@ -1,0 +1,58 @@
+"""`check` on several rooms, folders and patterns."""
+
+import json
+
+import pytest
+import torch
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+
+
+@pytest.fixture
+def rooms(tmp_path):
+    for name in ("a", "b"):
+        room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+        room.save(tmp_path / name, preview=False)
+    return tmp_path
+
+
+def test_a_folder_and_a_pattern_of_rooms(rooms, echousd_command):
+    done = echousd_command("check", rooms)
+    assert [line.split()[:2] for line in done.out.splitlines()[:2]] == [
+        ["ok" if done.code == 0 else line.split()[0], str(rooms / name / f"{name}.usda")]
+        for name, line in zip("ab", done.out.splitlines(), strict=False)
+    ]
+    assert done.out.splitlines()[-1].endswith("of 2 rooms are good")
+    found = json.loads(echousd_command("check", rooms / "*" / "*.usda", "--json").out)
+    assert [entry["room"] for entry in found] == [str(rooms / n / f"{n}.usda") for n in "ab"]
+    assert "ok" in json.loads(echousd_command("check", rooms / "a", "--json").out)
+
+
+def test_a_folder_without_rooms(tmp_path, echousd_command):
+    done = echousd_command("check", tmp_path)
+    assert (done.code, done.err) == (2, f"error: {tmp_path}: no room in this folder\n")
+    assert "matches nothing" in echousd_command("check", tmp_path / "*.usda").err
+
+
+def test_a_layout_of_ones_own():
+    graph = small_graph()
+    drawn = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes").boxes
+    moved = Boxes(drawn.size, drawn.position + torch.tensor([0.05, 0.0, 0.0]), drawn.yaw)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", boxes=moved)
+    torch.testing.assert_close(room.boxes.position[:, [0, 2]], moved.position[:, [0, 2]], atol=2e-3, rtol=0)
+    torch.testing.assert_close(room.boxes.size, moved.size, atol=2e-3, rtol=0)
+    with pytest.raises(ValueError, match="boxes: 1 for a graph of"):
+        echousd.generate(graph, model=StandIn(), boxes=Boxes(drawn.size[:1], drawn.position[:1], drawn.yaw[:1]))
+
+
+def test_a_piece_of_ones_own(tmp_path):
+    import trimesh
+
+    file = tmp_path / "bed.obj"
+    trimesh.creation.box((1.6, 0.6, 2.0)).export(file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", meshes={"bed": file})
+    assert room.geometry["bed"].origin.source == "own"
+    with pytest.raises(ValueError, match=r"meshes: object 'bed': .*gone.glb: no such file"):
+        echousd.generate(small_graph(), model=StandIn(), meshes={"bed": tmp_path / "gone.glb"})
