@@ -73,7 +73,7 @@ def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
 
 
 def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any]) -> Sdf.Layer:
-    """`<name>_geo`: a mesh for every part and, as guides, the colliders.
+    """`<name>_geo`: a mesh for every part and, as guides, the colliders; what the furniture was made from.
 
     Arguments:
         name: of the asset.
@@ -82,7 +82,9 @@ def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, 
         data: customLayerData.
     """
     stage = new_stage(name, ".usdc", data)
-    UsdGeom.Xform.Define(stage, f"/{name}")
+    root = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
+    if geometry.description:
+        root.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
     for body in sorted({part.body for part in geometry.parts if part.body}):
         UsdGeom.Xform.Define(stage, f"/{name}/{piece_name(name, body)}")
     for path, form in forms.items():
@@ -130,8 +132,6 @@ def component_layer(
     model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
-    if geometry.description:
-        prim.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
     if geometry.joints:
         write_joints(stage, name, geometry)
     if geometry.coarse:

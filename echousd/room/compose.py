@@ -18,7 +18,7 @@ from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
 from echousd.room.originals import attribution, component
-from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, payload_file, piece_path
+from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, layer_file, payload_file, piece_path
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
@@ -28,7 +28,7 @@ from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
 
-LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry")  # strongest first
+LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     table, bindings = room_looks(room, made, built, slots, harmony)
     files |= materials.texture_files(table, harmony)
     layers = {
-        "geometry": geometry_layer(room, built),
+        "geometry": geometry_layer(room),
+        "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell")),
         "graph": graph_layer(room),
         "layout": layout_layer(room),
         "physics": physics_layer(room, built),
@@ -79,7 +80,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     for name, layer in layers.items():
         if shelf is not None:
             shelf.redirect(layer)
-        files[f"layers/{name}.usda"] = layer_bytes(layer, ".usda")
+        path = layer_file(name)
+        files[path] = layer_bytes(layer, path[-5:])
     files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
     return files
 
@@ -95,8 +97,8 @@ def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     }
 
 
-def geometry_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
-    """`layers/geometry.usda`: every object references its asset; the shell's meshes."""
+def geometry_layer(room: RoomData) -> Sdf.Layer:
+    """`layers/geometry.usda`: every object references its asset."""
     stage = _room_stage(room, "geometry")
     root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
     Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
@@ -105,7 +107,6 @@ def geometry_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.
     for node in room.graph.nodes:
         prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
         _label(prim, "ade20k", ade20k(node.category))
-    structure.write_shell(stage, built)
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
 
 
@@ -254,7 +255,7 @@ def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
 
 
 def _add_sublayers(layer: Sdf.Layer, names: Sequence[str]) -> None:
-    layer.subLayerPaths = [f"./layers/{name}.usda" for name in names]
+    layer.subLayerPaths = [f"./{layer_file(name)}" for name in names]
 
 
 def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:

@@ -7,6 +7,11 @@ SHELL = "/Room/Shell"
 DESCRIPTION = "echo:description"  # attribute of an asset's root: what the furniture branch said of it
 
 
+def layer_file(name: str) -> str:
+    """Path of one of the room's layers in its folder; the shell's meshes are no text."""
+    return f"layers/{name}.{'usdc' if name == 'shell' else 'usda'}"
+
+
 def piece_name(asset: str, piece: str) -> str:
     """Name of the prim of a part or collider; unique in the room, because some importers keep only names."""
     return f"{asset}_{piece}"

@@ -26,6 +26,7 @@ from echousd.room.geometry import Geometry
 from echousd.room.history import remembered
 from echousd.room.lock import locked
 from echousd.room.manifest import MANIFEST_KEY
+from echousd.room.paths import layer_file
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
 from echousd.room.stored import Shelf, shelf_of
@@ -107,7 +108,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
-    last = [f"layers/{name}.usda" for name in reversed(LAYERS)] + [paintings.UNFIT, root, manifest]
+    last = [layer_file(name) for name in reversed(LAYERS)] + [paintings.UNFIT, root, manifest]
     changed = folders.write_together(folder, files, last=last, remove=stale)
     for path, name in kept.items():
         if name:

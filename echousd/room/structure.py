@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Usd, UsdGeom, UsdSemantics
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 from echousd.room import assets
 from echousd.room.finishes.harmonies import linear
@@ -59,6 +60,15 @@ def shell_prims(room: RoomData) -> list[ShellPrim]:
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]
+
+
+def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any]) -> Sdf.Layer:
+    """`layers/shell.usdc`: floor, walls and what is in them, as meshes; `data`: customLayerData."""
+    stage = assets.new_stage("Room", ".usdc", data)
+    for path in ("/Room", SHELL):
+        UsdGeom.Xform.Define(stage, path)
+    write_shell(stage, built)
+    return stage.GetRootLayer()
 
 
 def write_shell(stage: Usd.Stage, prims: Sequence[ShellPrim]) -> None:

@@ -30,6 +30,7 @@ def stage(root):
 def test_files_are_those_of_the_design(root):
     found = {str(path.relative_to(root.parent)) for path in root.parent.rglob("*") if path.is_file()}
     layers = {f"layers/{name}.usda" for name in ("materials", "physics", "layout", "graph", "geometry")}
+    layers.add("layers/shell.usdc")
     names = set(OBJECTS) - {"nightstand_left", "nightstand_right"} | {"nightstand"}
     assets = {f"assets/{n}/{n}{end}" for n in names for end in (".usda", "_geo.usdc")}
     images = {path for path in found if path.startswith("textures/") and path.endswith(".jpg")}
@@ -104,7 +105,7 @@ def test_layout_layer_holds_transforms_alone(root):
 def test_every_path_in_the_room_is_relative(root):
     layers, _, unresolved = UsdUtils.ComputeAllDependencies(str(root))
     assert unresolved == []
-    assert len(layers) == 6 + 2 * 5
+    assert len(layers) == 7 + 2 * 5
     for path in root.parent.rglob("*.usda"):
         assert "@/" not in path.read_text()
         assert str(root.parent) not in path.read_text()

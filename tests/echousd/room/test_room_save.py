@@ -103,7 +103,7 @@ def test_what_an_artist_adds_to_the_root_layer_stays(tmp_path):
     make(seed=2).save(folder, preview=False)
     layer = Sdf.Layer.OpenAsAnonymous(str(root))
     assert layer.subLayerPaths[0] == "./mine.usda"
-    assert len(layer.subLayerPaths) == 6
+    assert len(layer.subLayerPaths) == 7
     assert layer.GetPrimAtPath("/Room/Toy")
     assert layer.customLayerData["seed"] == 2
 

@@ -6,7 +6,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.room.finishes.slots import metres_of
 from echousd.room.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
 from echousd.room.meshing import box_mesh
-from echousd.room.surface import creased_normals, surface
+from echousd.room.surface import creased_normals, surface, unshared
 from echousd.room.taxonomy import ade20k
 
 
@@ -100,3 +100,18 @@ def test_bed_has_linen_above_wood_and_a_headboard():
 def test_palettes_are_steady():
     assert palette_for("room 7") == palette_for("room 7")
     assert len({palette_for(f"style {i}") for i in range(60)}) == len(PALETTES)
+
+
+def test_boards_that_meet_share_no_point_and_stay_closed():
+    boards = [trimesh.creation.box((1, 1, 1)) for _ in range(3)]
+    boards[1].apply_translation((1, 0, 0))
+    boards[2].apply_translation((0, 0, 1))
+    mesh = trimesh.util.concatenate(boards)
+    form = surface(mesh, {"wood": np.arange(len(mesh.faces))})
+    assert len(np.unique(form.points, axis=0)) == len(form.points) == 24
+    np.testing.assert_allclose(form.points, mesh.vertices, atol=2e-5)
+    assert (form.extent[0] >= mesh.bounds[0] - 1e-7).all()
+    assert (form.extent[1] <= mesh.bounds[1] + 1e-7).all()
+    assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
+    alone = boards[0].vertices.astype(np.float32)
+    assert unshared(alone, boards[0].faces) is alone
