@@ -164,3 +164,10 @@ def test_completion_of_words_of_the_vocabulary():
         "COMP_CWORD": "4",
     }
     assert started(environment=environment).stdout.split() == ["living_room", "living_dining_room"]
+
+
+@pytest.mark.parametrize("words", [("--help",), ("graph", "samples/bedroom.yaml"), ("graph", "gone.yaml")])
+def test_no_colour_where_none_is_wanted(words):
+    """NO_COLOR counts on a terminal, too (https://no-color.org)."""
+    plain = started(*words, environment={"FORCE_COLOR": "1", "TERM": "xterm-256color", "NO_COLOR": "1"})
+    assert not re.search(r"\x1b\[[0-9;]*3[0-7]m", plain.stdout + plain.stderr)
