@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from PIL import Image
     from pxr import Usd
 
-VIEWS = ("top", "perspective", "eye")
+EVERY = "every-camera"
+VIEWS = ("top", "perspective", "eye", EVERY)
 EYE = 1.55  # metres above the floor
 COLORS = ("materials", "class")
 FINE, QUICK = 3, 2  # squared: rays per pixel
@@ -59,18 +60,19 @@ def render_file(
 def render_stage(
     stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
 ) -> Image.Image:
-    """A square picture of everything visible on a stage.
+    """A square picture of everything visible on a stage; with `every-camera` as many beside one another.
 
     Arguments:
         stage: any stage; its up axis and units are taken care of.
         view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner), or
-            `eye` (from a corner inside, at the height of a standing person's eyes).
+            `eye` (from a corner inside, at the height of a standing person's eyes), or `every-camera` (through every
+            camera of the stage, in the order of their paths).
         size: pixels on each side, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.
         rays: along each side of a pixel.
 
     Raises:
-        ValueError: unknown view, colours or size, nothing to see, or Embree missing.
+        ValueError: unknown view, colours or size, nothing to see, no camera for `every-camera`, or Embree missing.
     """
     from PIL import Image
 
@@ -84,11 +86,41 @@ def render_stage(
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     with reading(stage):
         scenery = read_scenery(stage, by_class=colors == "class")
-    camera = {"top": top_view, "perspective": corner_view, "eye": eye_view}[view](scenery)
-    if view == "perspective":
-        scenery = scenery.without_near_walls(camera.matrix[:3, 3])
-    pixels = trace(scenery, camera, size, rays=rays)
+    if view == EVERY:
+        pictures = [trace(scenery, camera, size, rays=rays) for camera in stage_views(stage)]
+        pixels = np.concatenate(pictures, axis=1)
+    else:
+        camera = {"top": top_view, "perspective": corner_view, "eye": eye_view}[view](scenery)
+        if view == "perspective":
+            scenery = scenery.without_near_walls(camera.matrix[:3, 3])
+        pixels = trace(scenery, camera, size, rays=rays)
     return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
+
+
+def stage_views(stage: Usd.Stage) -> list[View]:
+    """What every camera of a stage sees, in a y-up world in metres; raises ValueError where there is none."""
+    from pxr import UsdGeom
+
+    from echousd.stage.units import metres_per_unit, up_axis
+
+    unit, turn = metres_per_unit(stage), np.eye(4)
+    if up_axis(stage) == "Z":
+        turn[1:3, 1:3] = ((0, 1), (-1, 0))
+    views: list[View] = []
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdGeom.Camera):
+            continue
+        camera = UsdGeom.Camera(prim).GetCamera(0)
+        matrix = turn @ np.array(camera.transform).T
+        matrix[:3, 3] *= unit
+        matrix[:3, :3] /= np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+        flat = camera.projection == camera.Orthographic
+        wide = camera.horizontalAperture
+        half = wide / 2 * camera.APERTURE_UNIT * unit if flat else wide / 2 / max(camera.focalLength, 1e-6)
+        views.append(View(matrix, float(half), flat))
+    if not views:
+        raise ValueError(f"{stage.GetRootLayer().identifier}: no camera, which view every-camera needs")
+    return views
 
 
 def top_view(scenery: Scenery) -> View:

@@ -105,6 +105,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     images: dict[tuple, tuple[int, np.ndarray]] = {}
     boxes = []
     hung: list[int] = []
+    words: list[str] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
@@ -137,17 +138,32 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
                     images[key] = (len(images), linear * np.array(paint.tint, np.float32))
                 part["texture"][faces] = images[key][0]
         parts.append(part)
+        words.append(mesh.category)
         if mesh.category not in (*SHELL, *HUNG, "rug"):
             boxes.append(_box(mesh))
         if mesh.category in HUNG:
             hung.append(len(parts) - 1)
-    _hang(parts, hung, len(walls))
+    _hang(parts, [*hung, *_on_shelves(parts, words)], len(walls))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     sizes = np.array(boxes).reshape(-1, 7)
     furniture = Furniture(sizes[:, :3], sizes[:, 3:6], sizes[:, 6])
     return Scenery(images=tuple(image for _, image in images.values()), furniture=furniture, **joined)
+
+
+def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[int]:
+    """Numbers of the parts that stand on shelves that hang on a wall."""
+    corners = [part["triangles"].reshape(-1, 3) for part in parts]
+    bounds = [(points.min(0), points.max(0)) for points in corners]
+    out = []
+    for low, high in (bounds[n] for n, word in enumerate(words) if word == "wall_shelf"):
+        for number, (least, most) in enumerate(bounds):
+            middle = (least + most) / 2
+            inside = (middle[[0, 2]] > low[[0, 2]]).all() and (middle[[0, 2]] < high[[0, 2]]).all()
+            if inside and abs(least[1] - high[1]) < 0.03:
+                out.append(number)
+    return out
 
 
 def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> None:

@@ -18,13 +18,13 @@ def register(app: typer.Typer) -> None:
 def render(
     room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Picture to write (.png).", show_default=False)],
-    view: Annotated[str, typer.Option(help="top, perspective or eye.")] = "perspective",
+    view: Annotated[str, typer.Option(help="top, perspective, eye or every-camera.")] = "perspective",
     size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
 ) -> None:
-    """Draw a room from above or from a corner."""
+    """Draw a room from above, from a corner, from inside, or through each of its cameras."""
     import io
 
     from PIL.PngImagePlugin import PngInfo

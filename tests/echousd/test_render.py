@@ -173,3 +173,26 @@ def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
     assert abs(inside[0]) < 2.0
     assert abs(inside[2]) < 1.7
     assert 0.5 < inside[1] < 2.8
+
+
+@pytest.mark.parametrize(("up", "unit"), [("Y", 1.0), ("Z", 0.01)])
+def test_every_camera_draws_what_it_sees(up, unit):
+    stage = cube_stage(up, unit)
+    for name, across in (("a_at_it", 1.0), ("b_away", 40.0)):  # metres along x; each looks straight down, 2 m wide
+        camera = UsdGeom.Camera.Define(stage, f"/{name}")
+        camera.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+        camera.CreateHorizontalApertureAttr(20.0 / unit)
+        place = (across / unit, 5 / unit, 0) if up == "Y" else (across / unit, 0, 5 / unit)
+        camera.AddTranslateOp().Set(Gf.Vec3d(*place))
+        camera.AddRotateXOp().Set(-90.0 if up == "Y" else 0.0)
+    picture = pixels(render_stage(stage, view="every-camera", size=32, rays=1))
+    assert picture.shape == (32, 64, 3)
+    assert np.ptp(picture[:, 32:], axis=(0, 1)).max() < 0.02  # background alone
+    seen = np.abs(picture[:, :32] - picture[0, 40]).max(-1) > 1e-3  # grey in the sun on grey
+    assert 0.2 < seen.mean() < 0.3  # a quarter of the picture
+    assert seen[12:20, 12:20].all()
+
+
+def test_every_camera_needs_one():
+    with pytest.raises(ValueError, match="no camera, which view every-camera needs"):
+        render_stage(cube_stage(), view="every-camera", size=32)

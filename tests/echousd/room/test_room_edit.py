@@ -5,12 +5,13 @@ import warnings
 import numpy as np
 import pytest
 import torch
-from pxr import Usd
+from pxr import Sdf, Usd
 from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.protocols import GraphEdit
 from echousd.graph import Relation
+from echousd.room import RoomOptions
 from echousd.room.edit import edit, touched
 from echousd.room.layouts import repeated
 from echousd.room.reading import read_room
@@ -67,6 +68,28 @@ def test_new_object_leaves_all_others_alone(root):
     stage.Reload()
     assert stage.GetCompositionErrors() == []
     assert echousd.read_graph(stage) == graph.replaced(room=old.graph.room)
+
+
+def test_an_edit_leaves_small_things_alone(tmp_path):
+    options = RoomOptions(walls=True, dress="full")
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", options=options)
+    root = room.save(tmp_path / "bedroom", preview=False)
+
+    def things() -> dict[str, str]:
+        layer = Sdf.Layer.OpenAsAnonymous(str(root.parent / "layers/dressing.usda"))
+        return {prim.name: prim.GetAsText() for prim in layer.GetPrimAtPath("/Room/Dressing").nameChildren}
+
+    before, small = hashes(root.parent), things()
+    assert len(small) > 20
+    edit(root, small_graph(), model=StandIn()).save(root.parent, preview=False)
+    assert hashes(root.parent) == before
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edit(root, graph, model=StandIn(), seed=9).save(root.parent, preview=False)
+    after = hashes(root.parent)
+    kept = [path for path in before if path.startswith("assets/small_")]
+    assert kept
+    assert all(after.get(path) == before[path] for path in kept)
+    assert {name: text for name, text in things().items() if name in small} == small
 
 
 def test_all_layouts_of_a_room_are_kept(tmp_path):
