@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import hashlib
+import math
 import os
 import random
 import shutil
@@ -78,6 +79,12 @@ def wait_for(child: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
+def processor_time(child: int) -> float:
+    """Seconds that a process has computed; infinite once it has ended."""
+    fields = Path(f"/proc/{child}/stat").read_text().rpartition(") ")[2].split()
+    return math.inf if fields[0] == "Z" else (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def races(count: int, scratch: Path, told: Counter[str]) -> None:
     """Two processes save different rooms into one folder at the same time; half the folders hold a room already."""
     rooms = [echousd.generate(GRAPH, seed=seed, shapes="boxes") for seed in (1, 2)]
@@ -136,9 +143,9 @@ def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[s
     for command in commands:
         folder = scratch / "undisturbed/room"
         shutil.copytree(old, folder)
-        began = time.perf_counter()
-        assert wait_for(begin(command(folder))) in (0, 1)  # without repair things may collide
-        spent.append(time.perf_counter() - began)
+        _, status, used = os.wait4(begin(command(folder)), 0)
+        assert os.waitstatus_to_exitcode(status) in (0, 1)  # without repair things may collide
+        spent.append(used.ru_utime + used.ru_stime)
         undisturbed.append(bytes_of(folder))
         shutil.rmtree(folder)
     before = bytes_of(old)
@@ -147,8 +154,10 @@ def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[s
         folder = scratch / f"{begin.__name__}{number}" / "room"
         shutil.copytree(old, folder)
         child = begin(command(folder))
-        if number // 2 % 2:  # at any time
-            time.sleep(random.uniform(0, 1.05 * spent[kind]))
+        if number // 2 % 2:  # at any time of its own, however busy the machine is
+            moment = random.uniform(0, spent[kind])
+            while processor_time(child) < moment:
+                time.sleep(0.001)
         else:  # while it is writing
             while not (folder / ".echousd").exists() and os.waitpid(child, os.WNOHANG) == (0, 0):
                 time.sleep(0.0005)

@@ -15,6 +15,7 @@ from echousd.assets.record import AssetRecord
 
 VERSION = 1
 KEY = b"echousd.assets"
+LARGEST = 4 * 2**30  # bytes of an index when it is unpacked
 KINDS = {"str": "string", "float": "float64", "int": "int64", "bool": "bool_", "bytes": "binary"}
 
 
@@ -90,8 +91,8 @@ def write_library(file: Path, records: Iterable[AssetRecord], about: Mapping[str
 def read_library(file: str | os.PathLike[str]) -> Library:
     """The library whose index is `file`, kept while that does not change; raises ValueError for any other file."""
     file = Path(file)
-    if file.is_dir() or not file.exists():
-        found = "is a folder" if file.is_dir() else "no such file"
+    if not file.is_file():
+        found = "is a folder" if file.is_dir() else "not a regular file" if file.exists() else "no such file"
         raise ValueError(f"{file}: {found}, allowed: an index, made by `echousd assets index FOLDER -o {file.name}`")
     return _read(file, file.stat().st_mtime_ns)
 
@@ -100,6 +101,9 @@ def read_library(file: str | os.PathLike[str]) -> Library:
 def _read(file: Path, changed: int) -> Library:
     pa = arrow()
     try:
+        size = _unpacked(pa.parquet.read_metadata(file))
+        if size > LARGEST:
+            raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
         table = pa.parquet.read_table(file)
         about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
     except (pa.ArrowException, OSError, ValueError) as error:
@@ -121,6 +125,12 @@ def _read(file: Path, changed: int) -> Library:
         record = AssetRecord(**fields_of)
         records[record.id] = record
     return Library(file, records)
+
+
+def _unpacked(metadata: Any) -> int:
+    """Bytes of all columns of a Parquet file as they are held in memory, as its own tables say."""
+    groups = (metadata.row_group(number) for number in range(metadata.num_row_groups))
+    return sum(max(group.total_byte_size, 8 * group.num_rows * group.num_columns) for group in groups)
 
 
 def _plain(value: Any) -> Any:

@@ -18,6 +18,7 @@ from echousd.batches.run import BatchProgress, Run
 from echousd.naming import free_name
 from echousd.room.folder import check_writable
 from echousd.room.lock import locked
+from echousd.room.within import inside
 
 if TYPE_CHECKING:
     from echousd.batches.work import Job
@@ -238,13 +239,13 @@ def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     valid = set()
     for entry in (entry for pack in plan.packs(shard) for entry in pack):
         row = rows.get(entry.id)
-        folder = out / entry.path
+        folder = entry.folder(out)
         if row is None or row["state"] != "done":
             continue
         if not fault_of(folder, row, stored):
             valid.add(entry.id)
         elif folder.is_dir() and room_digest(folder) != row["sha256"]:
-            aside = out / STATE / "set_aside"
+            aside = inside(out, f"{STATE}/set_aside", f"{out}: the run")
             aside.mkdir(parents=True, exist_ok=True)
             there = {other.name for other in aside.iterdir()}
             folder.rename(aside / free_name(f"{entry.id}_{int(row['when'])}", there))

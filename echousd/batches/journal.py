@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from echousd.batches.plan import STATE, STORE
+from echousd.batches.rows import is_row
 from echousd.room.journal import STAGING
 from echousd.room.lock import LOCK
+from echousd.room.manifest import find_manifest
+from echousd.room.within import check_links
 from echousd.store import Store
 
 JOURNAL = "journal.jsonl"
@@ -54,6 +57,7 @@ def read_journals(folder: Path) -> dict[str, dict[str, Any]]:
     """Room id -> its last line in the journals of all shards; a room that is done stays done."""
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder / STATE).glob(f"shard_*/{JOURNAL}")):
+        check_links(folder, path, f"{folder}: the run has {path.relative_to(folder)}")
         for row in _rows(path):
             before = found.get(row["room"])
             if before is None or before["when"] <= row["when"]:
@@ -83,8 +87,8 @@ def fault_of(folder: Path, row: dict[str, Any], stored: Collection[str]) -> str:
         return "missing"
     if room_digest(folder) != row["sha256"]:
         return "changed since it was made"
-    manifest = json.loads((folder / row["root"]).with_suffix(".json").read_bytes())
-    missing = set(manifest.get("stored", {}).values()) - set(stored)
+    manifest = find_manifest(folder, Path(row["root"]).stem) or {}
+    missing = set((manifest.get("stored") or {}).values()) - set(stored)
     return f"{len(missing)} of its assets are missing in the store or changed" if missing else ""
 
 
@@ -106,7 +110,7 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
                 row = json.loads(line)
             except ValueError:
                 continue  # torn by a kill or a power cut
-            if isinstance(row, dict) and isinstance(row.get("room"), str) and isinstance(row.get("when"), int | float):
+            if is_row(row):
                 yield row
 
 

@@ -11,16 +11,9 @@ from typing import Any
 from echomodel.files import whole_file
 from echousd.batches.journal import read_journals
 from echousd.batches.plan import Plan
+from echousd.batches.rows import COLUMNS
 
 MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
-
-# column -> what it is where a room has none; the order is that of the manifest
-COLUMNS: dict[str, Any] = {
-    "id": "", "state": "missing", "source": "", "seed": 0, "type": "", "graph": "", "weights": "", "version": "",
-    "shapes": "", "root": "", "bounds": [], "objects": 0, "categories": {}, "relations_asked": 0,
-    "relations_kept": 0, "living_faults": [], "collisions": 0, "check": False, "faces": 0, "bytes": 0,
-    "licences": [], "sha256": "", "seconds": 0.0, "error": "",
-}  # fmt: skip
 
 
 def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
@@ -29,6 +22,8 @@ def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
     for entry in plan.entries:
         found = journals.get(entry.id, {})
         row = {name: found.get(name, default) for name, default in COLUMNS.items()}
+        if found:
+            entry.folder(folder)  # no link on the way leads elsewhere
         root = f"{entry.path}/{found['root']}" if found.get("root") else ""
         given = {"id": entry.id, "source": entry.origin, "seed": entry.seed, "version": plan.head["version"]}
         yield {**row, **given, "root": root}

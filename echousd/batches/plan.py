@@ -13,8 +13,10 @@ from typing import Any
 import echousd
 from echomodel.files import whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
+from echousd.batches.rows import ID
 from echousd.batches.sources import find_graphs
 from echousd.naming import as_identifier
+from echousd.room.within import inside
 
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
@@ -48,6 +50,10 @@ class Entry:
     def path(self) -> str:
         """Folder of the room below that of the run."""
         return f"rooms/{self.number // SHELF:04d}/{self.id}"
+
+    def folder(self, run: Path) -> Path:
+        """Folder of the room; raises ValueError where a link on the way leads out of the run's folder."""
+        return inside(run, self.path, f"{run}: room {self.id}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,15 +135,15 @@ def save_plan(plan: Plan, folder: Path) -> None:
 
 def load_plan(folder: Path) -> Plan:
     """The plan of the run in `folder`; raises ValueError where there is none or it cannot be read."""
-    path = folder / STATE / PLAN
+    path = inside(folder, f"{STATE}/{PLAN}", f"{folder}: the run")
     if not path.is_file():
         raise ValueError(f"{folder}: no run of echousd batch (no {STATE}/{PLAN})")
     try:
         with path.open(encoding="utf-8") as file:
             head = json.loads(next(file))
             sets = tuple(BatchOptions(**raw) for raw in head.pop("sets"))
-            entries = tuple(_entry(json.loads(line)) for line in file)
-        with (folder / STATE / GRAPHS).open(encoding="utf-8") as file:
+            entries = tuple(_entry(json.loads(line), number, len(sets)) for number, line in enumerate(file))
+        with inside(folder, f"{STATE}/{GRAPHS}", f"{folder}: the run").open(encoding="utf-8") as file:
             graphs = {row["graph"]: row["text"] for row in map(json.loads, file)}
         if head["echousd_batch"] != 1 or head["rooms"] != len(entries):
             raise ValueError("it is not whole")
@@ -165,9 +171,18 @@ def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, An
         yield where.removeprefix("request."), json.dumps(old), json.dumps(new)
 
 
-def _entry(raw: dict[str, Any]) -> Entry:
+def _entry(raw: dict[str, Any], number: int, sets: int) -> Entry:
+    """A line of the plan, which anybody may have sent; raises ValueError for one that is not as we write it."""
     draw = raw.pop("draw")
-    return Entry(**raw, draw=tuple(draw) if draw else None)
+    entry = Entry(**raw, draw=tuple(draw) if draw else None)
+    if type(entry.number) is not int or entry.number != number:
+        raise ValueError(f"line {number + 2}: number is {entry.number!r:.40}, allowed: {number}")
+    texts = (entry.id, entry.origin, entry.graph, entry.error)
+    if not all(isinstance(text, str) for text in texts) or not ID.fullmatch(entry.id):
+        raise ValueError(f"line {number + 2}: id is {entry.id!r:.80}, allowed: letters, digits and _")
+    if type(entry.seed) is not int or type(entry.options) is not int or not 0 <= entry.options < sets:
+        raise ValueError(f"line {number + 2}: options is {entry.options!r:.40}, allowed: 0 to {sets - 1}")
+    return entry
 
 
 def _word(name: str) -> str:

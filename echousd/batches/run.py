@@ -242,7 +242,7 @@ class Run:
         options = self.plan.options[entry.options]
         return work.Job(
             entry.id,
-            str(self.folder / entry.path),
+            str(entry.folder(self.folder)),
             entry.seed,
             options,
             text or self.plan.graphs.get(entry.graph, ""),

@@ -35,7 +35,7 @@ def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
     """
     plan, rows, stored = load_plan(folder), read_journals(folder), whole_keys(folder)
     for entry in plan.entries:
-        row, place = rows.get(entry.id), folder / entry.path
+        row, place = rows.get(entry.id), entry.folder(folder)
         if row is None:
             yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
         elif row["state"] != "done":

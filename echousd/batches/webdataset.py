@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from echomodel.files import whole_file
+from echousd.room.within import inside
 
 FOLDER = "webdataset"
 ROOMS = 1000  # in one tar
@@ -24,7 +25,7 @@ def write_webdataset(folder: Path, rows: Iterable[dict[str, Any]], rooms: int = 
     Arguments:
         folder: of the run. rows: of its manifest; rooms that are not done are left out. rooms: in one tar.
     """
-    place = folder / FOLDER
+    place = inside(folder, FOLDER, f"{folder}: the run")
     place.mkdir(exist_ok=True)
     written: list[Path] = []
     done = (row for row in rows if row["state"] == "done")

@@ -13,6 +13,7 @@ from echousd.stage.values import MeshArrays, array, mesh_arrays
 
 UNIT = 0.05  # how far the length of a normal may be from 1
 EXTENT = 1e-3  # how far an extent may be from the points, in shares of their diagonal
+HINT = 0.1  # the same of a component, whose parts open and have levels of detail
 AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
@@ -37,6 +38,10 @@ def mesh_indices(stage: Usd.Stage) -> Iterator[Finding]:
 def normals(stage: Usd.Stage) -> Iterator[Finding]:
     """Normals have length 1, and are as many as their interpolation asks for."""
     for mesh, arrays in _readable(stage):
+        reach = _normals_reach(mesh)
+        if reach:
+            yield Finding(mesh.GetPath(), f"primvars:normals:indices reach {reach}")
+            continue
         found = _normals(mesh)
         if found is None:
             continue
@@ -57,7 +62,8 @@ def normals(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def extents(stage: Usd.Stage) -> Iterator[Finding]:
-    """An extent is the box around the points: clients cull and frame by it."""
+    """An extent is the box around the points, a component's hint that around its meshes: clients cull by them."""
+    yield from _hints(stage)
     for mesh, arrays in _readable(stage):
         try:
             extent = array(mesh.GetExtentAttr(), 3) if mesh.GetExtentAttr().HasAuthoredValue() else None
@@ -69,6 +75,26 @@ def extents(stage: Usd.Stage) -> Iterator[Finding]:
         slack = EXTENT * np.linalg.norm(box[1] - box[0]) + 1e-6
         if extent.shape != (2, 3) or np.abs(extent - box).max() > slack:
             yield Finding(mesh.GetPath(), f"extent is {_shown(extent)}, its points reach {_shown(box)}")
+
+
+def _hints(stage: Usd.Stage) -> Iterator[Finding]:
+    """Components that state another box (`extentsHint`) than that of what they show."""
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_], useExtentsHint=False)
+    for prim in prims(stage):
+        attribute = prim.GetAttribute(UsdGeom.Tokens.extentsHint)
+        if not attribute or not attribute.HasAuthoredValue() or not prim.IsModel() or prim.IsGroup():
+            continue
+        try:
+            hint = array(attribute, 3)[:2]
+            found = cache.ComputeUntransformedBound(prim).ComputeAlignedRange()
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
+        if found.IsEmpty():
+            continue
+        box = np.array([found.GetMin(), found.GetMax()])
+        slack = HINT * np.linalg.norm(box[1] - box[0])
+        if hint.shape != (2, 3) or np.abs(hint - box).max() > slack:
+            yield Finding(prim.GetPath(), f"extentsHint is {_shown(hint)}, its meshes reach {_shown(box)}")
 
 
 def winding(stage: Usd.Stage) -> Iterator[Finding]:
@@ -140,6 +166,20 @@ def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:
     except (StageError, Tf.ErrorException, IndexError):
         pass
     return None
+
+
+def _normals_reach(mesh: UsdGeom.Mesh) -> str:
+    """What is wrong with the indices of a mesh's normals, "" for nothing."""
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+    try:
+        if not primvar or not primvar.IsIndexed():
+            return ""
+        count, index = len(array(primvar.GetAttr(), 3)), array(primvar.GetIndicesAttr(), whole=True)
+    except (StageError, Tf.ErrorException):  # the rules on values report it
+        return ""
+    if not len(index) or (index.min() >= 0 and index.max() < count):
+        return ""
+    return f"from {index.min()} to {index.max()}, allowed: 0 to {count - 1}"
 
 
 def _closed(faces: np.ndarray) -> bool:

@@ -38,6 +38,13 @@ def upright(stage: Usd.Stage) -> Iterator[Finding]:
             if highest < UPRIGHT:
                 angle = np.degrees(np.arccos(np.clip(highest, -1, 1)))
                 yield Finding(prim.GetPath(), f"leans by {angle:.0f} degrees, allowed: upright")
+        for prim in _others(room):
+            try:
+                own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
+            except (StageError, Tf.ErrorException):
+                continue
+            if own[1, 1] < -UPRIGHT and own[1, 2] < UPRIGHT:
+                yield Finding(prim.GetPath(), "stands on its head, allowed: its own +Y (or +Z) upwards")
 
 
 def one_label(stage: Usd.Stage) -> Iterator[Finding]:
@@ -53,6 +60,13 @@ def one_label(stage: Usd.Stage) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
             elif words and isinstance(category, str) and known_category(words[0]) != known_category(category):
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {words[0]!r}, {usd.CATEGORY} {category!r}")
+        for prim in _others(room):
+            try:
+                words = texts(prim.GetAttribute(usd.LABELS))
+            except (StageError, Tf.ErrorException):
+                continue
+            if len(words) > 1:
+                yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
 
 
 def stated_boxes(stage: Usd.Stage) -> Iterator[Finding]:
@@ -96,6 +110,18 @@ def _is_floor(prim: Usd.Prim) -> bool:
         return "floor" in texts(prim.GetAttribute(usd.LABELS))
     except (StageError, Tf.ErrorException):
         return False
+
+
+def _others(room: RoomPrims) -> list[Usd.Prim]:
+    """Components of a room that are no nodes of its graph: walls, floors, small things."""
+    nodes = {prim.GetPath() for prim in room.nodes}
+    found, walk = [], iter(Usd.PrimRange(room.room, Usd.TraverseInstanceProxies()))
+    for prim in walk:
+        if prim.GetPath() in nodes or (prim.IsModel() and not prim.IsGroup()):
+            walk.PruneChildren()
+            if prim.GetPath() not in nodes:
+                found.append(prim)
+    return found
 
 
 def _rooms(stage: Usd.Stage) -> list[RoomPrims]:

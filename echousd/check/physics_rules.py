@@ -9,9 +9,9 @@ from pxr import Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.check.findings import Finding, Rule, is_guide, prims
 from echousd.stage.contents import triangulated
-from echousd.stage.encoding import StageError
+from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import array, matrix
+from echousd.stage.values import array, matrix, texts
 
 OFF = 0.25  # metres between the boxes of geometry and colliders, which are hulls or a few boxes
 
@@ -53,12 +53,14 @@ def dynamic_colliders(stage: Usd.Stage) -> Iterator[Finding]:
 def colliders(stage: Usd.Stage) -> Iterator[Finding]:
     """Every rigid body has colliders, and they fill the same box as its geometry."""
     cache = UsdGeom.XformCache()
+    bodies = False
     for prim in prims(stage):
         if not prim.HasAPI(UsdPhysics.RigidBodyAPI):
             continue
+        bodies = True
         below = [found for found in Usd.PrimRange(prim, Usd.TraverseInstanceProxies()) if found.IsA(UsdGeom.Gprim)]
-        solid = [found for found in below if found.HasAPI(UsdPhysics.CollisionAPI)]
-        if below and not solid and not prim.HasAPI(UsdPhysics.CollisionAPI):
+        solid = [found for found in below if _collides(found)]
+        if below and not solid and not _collides(prim):
             yield Finding(prim.GetPath(), "a rigid body without colliders: it falls through the floor")
             continue
         seen = [found for found in below if not is_guide(found)]
@@ -72,6 +74,33 @@ def colliders(stage: Usd.Stage) -> Iterator[Finding]:
         apart = float(np.abs(boxes[0] - boxes[1]).max()) * metres
         if apart > OFF:
             yield Finding(prim.GetPath(), f"its colliders end {apart:.2g} m from its geometry, allowed: {OFF:g} m")
+    if bodies:
+        yield from _bare_shell(stage)
+
+
+def _bare_shell(stage: Usd.Stage) -> Iterator[Finding]:
+    """Floors that bodies fall through, and walls that they pass."""
+    for prim in prims(stage):
+        try:
+            words = texts(prim.GetAttribute(LABELS))
+        except (StageError, Tf.ErrorException):  # the rules on values report it
+            continue
+        if not {"floor", "wall"} & set(words):
+            continue
+        below = [found for found in Usd.PrimRange(prim, Usd.TraverseInstanceProxies()) if found.IsA(UsdGeom.Gprim)]
+        if below and not any(map(_collides, (prim, *below))):
+            what = "floor without colliders: bodies fall through" if "floor" in words else "wall without colliders"
+            yield Finding(prim.GetPath(), f"a {what}", warning="floor" not in words)
+
+
+def _collides(prim: Usd.Prim) -> bool:
+    """Whether a prim is a collider that is switched on."""
+    if not prim.HasAPI(UsdPhysics.CollisionAPI):
+        return False
+    try:
+        return UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get() is not False
+    except Tf.ErrorException:  # the rules on values report it
+        return True
 
 
 def _bounds(gprims: list[Usd.Prim], cache: UsdGeom.XformCache) -> np.ndarray | None:

@@ -113,21 +113,22 @@ def _check(path: Path, tree: dict[str, Any]) -> None:
         count = entry.get("count")
         if type(count) is not int or not 0 <= count <= MAX_COUNT or "sparse" in entry:
             raise ValueError(f"{path}: an accessor counts {count!r:.40}, allowed: 0 to {MAX_COUNT}, not sparse")
-    used = {
-        entry.get("material")
-        for mesh in _entries(path, tree, "meshes")
-        for entry in mesh.get("primitives", [])
-        if isinstance(entry, dict)
-    }
+    used = set(map(str, _materials(path, tree)))
     if len(used) > 1:
         raise ValueError(f"{path}: {len(used)} materials, allowed: one for the whole object")
+
+
+def _materials(path: Path, tree: dict[str, Any]) -> list[Any]:
+    """What the primitives of all meshes name as their material."""
+    meshes = _entries(path, tree, "meshes")
+    return [entry.get("material") for mesh in meshes for entry in _entries(path, mesh, "primitives")]
 
 
 def _images(path: Path, tree: dict[str, Any], binary: bytes) -> dict[str, bytes]:
     """Images of the only material that is used."""
     found: dict[str, bytes] = {}
     materials = _entries(path, tree, "materials")
-    used = [e.get("material") for m in _entries(path, tree, "meshes") for e in m.get("primitives", [])]
+    used = _materials(path, tree)
     number = used[0] if used else None
     if type(number) is not int or not 0 <= number < len(materials):
         return found

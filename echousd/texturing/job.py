@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import stat
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -105,9 +106,8 @@ def read_job(folder: Path) -> Job:
         raise ValueError(f"{path}: {where}: {first['msg']}, found {first['input']!r:.80}") from None
     for thing in job.objects:
         inside(folder, thing.mesh, f"{path}: objects.{thing.name}.mesh")
-    names = [thing.name for thing in job.objects]
-    twice = next((name for name in names if names.count(name) > 1), "")
-    if twice:
+    twice, count = Counter(thing.name for thing in job.objects).most_common(1)[0]
+    if count > 1:
         raise ValueError(f"{path}: objects: {twice!r} comes twice, allowed: each name once")
     return job
 

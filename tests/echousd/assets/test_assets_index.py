@@ -1,7 +1,10 @@
+import os
+
 import numpy as np
 import pytest
 from small_models import chest, seat, small_library, write_glb, write_obj, write_usd
 
+from echousd.assets import table
 from echousd.assets.index import index
 from echousd.assets.table import read_library
 
@@ -117,7 +120,7 @@ def test_the_transform_of_a_root_prim_counts(tmp_path):
     assert record.front == pytest.approx((1, 0, 0), abs=1e-9)
 
 
-def test_what_is_no_index_is_said(tmp_path):
+def test_what_is_no_index_is_said(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"nowhere: no such file or folder"):
         index([tmp_path / "nowhere"], tmp_path / "lib.parquet")
     (tmp_path / "empty").mkdir()
@@ -128,6 +131,13 @@ def test_what_is_no_index_is_said(tmp_path):
     (tmp_path / "lib.parquet").write_bytes(b"PAR1 no")
     with pytest.raises(ValueError, match=r"lib.parquet: cannot be read as an index"):
         read_library(tmp_path / "lib.parquet")
+    os.mkfifo(tmp_path / "pipe.parquet")
+    with pytest.raises(ValueError, match=r"pipe.parquet: not a regular file, allowed: an index"):
+        read_library(tmp_path / "pipe.parquet")
+    table.write_library(tmp_path / "big.parquet", [])
+    monkeypatch.setattr(table, "LARGEST", -1)
+    with pytest.raises(ValueError, match=r"big.parquet: .* bytes when unpacked, allowed: -1"):
+        read_library(tmp_path / "big.parquet")
 
 
 def test_pyarrow_is_asked_for_by_name(tmp_path, monkeypatch):

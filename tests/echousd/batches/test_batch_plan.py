@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from echousd.batches.journal import Journal, read_journals, room_digest, shard_f
 from echousd.batches.options import parse_sample, read_toml, request_of
 from echousd.batches.plan import difference, load_plan, make_plan, save_plan
 from echousd.batches.sources import find_graphs, sampled_graph
+from echousd.batches.verify import verify
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 
@@ -105,12 +107,16 @@ def test_a_sampled_graph_is_a_function_of_its_numbers():
 def test_a_torn_line_is_no_room(tmp_path):
     place = shard_folder(tmp_path, (0, 1))
     journal = Journal(place)
-    journal.append({"room": "a", "when": 1, "state": "done"})
+    done = {"room": "a", "when": 1, "state": "done", "root": "a.usda", "bounds": [0.0] * 6, "sha256": "12"}
+    journal.append(done)
     journal.close()
     with (place / "journal.jsonl").open("a") as file:
         file.write('{"room": "b", "wh')
     journal = Journal(place)
-    journal.append({"room": "c", "when": 2, "state": "failed"})
+    journal.append({"room": "c", "when": 2, "state": "failed", "error": "no floor"})
+    hostile = {"root": "../../secret.usda"}, {"bounds": [0.0, float("nan"), 0, 0, 0, 0]}, {"sha256": 7}, {"faces": "x"}
+    for wrong in (*hostile, {"when": []}, {"state": 3}, {"categories": {"bed": []}}):
+        journal.append({**done, "when": 3, **wrong})
     journal.close()
     assert {name: row["state"] for name, row in read_journals(tmp_path).items()} == {"a": "done", "c": "failed"}
 
@@ -125,3 +131,35 @@ def test_a_room_s_digest_is_of_its_files(tmp_path):
     (room / "layers" / "a.usda").write_text("b")
     assert room_digest(room) != before
     assert room_digest(tmp_path / "none") == ""
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"id": "../../../outside"}, "line 2: id is '../../../outside', allowed: letters, digits and _"),
+        ({"number": -1}, "line 2: number is -1, allowed: 0"),
+        ({"number": "0"}, "line 2: number is '0', allowed: 0"),
+        ({"options": 9}, "line 2: options is 9, allowed: 0 to 0"),
+    ],
+)
+def test_a_plan_is_read_with_doubt(tmp_path, change, text):
+    save_plan(plan_of(sample={"bedroom": 1}), tmp_path)
+    path = tmp_path / ".batch/plan.jsonl"
+    head, line = path.read_text().splitlines()
+    path.write_text(f"{head}\n{json.dumps({**json.loads(line), **change})}\n")
+    with pytest.raises(ValueError, match=re.escape(text)):
+        load_plan(tmp_path)
+
+
+def test_no_link_leads_out_of_a_run(tmp_path):
+    run, outside = tmp_path / "run", tmp_path / "outside"
+    save_plan(plan_of(sample={"bedroom": 1}), run)
+    outside.mkdir()
+    (run / "rooms").mkdir()
+    (run / "rooms/0000").symlink_to(outside)
+    with pytest.raises(ValueError, match=r"rooms/0000 is a link to .*outside, outside of"):
+        list(verify(run))
+    (run / ".batch").rename(outside / "batch")
+    (run / ".batch").symlink_to(outside / "batch")
+    with pytest.raises(ValueError, match=r"is a link to .*outside/batch, outside of"):
+        load_plan(run)

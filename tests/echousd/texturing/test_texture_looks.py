@@ -166,6 +166,8 @@ def test_jobs_are_read_with_doubt(room):
     refused(room, "pendant has other meshes")
     changed_entry(job, name="ghost")
     refused(room, "ghost is gone; export again")
+    changed_entry(job, name="bed")
+    refused(room, "job.json: objects: 'bed' comes twice, allowed: each name once")
     changed_entry(job, name="a b")
     refused(room, "job.json: objects.*.name")
     (job / "job.json").write_text("[1, 2")
@@ -265,6 +267,8 @@ def glb_with(mesh, change):
         (lambda t: t["bufferViews"][-1].update(byteLength=10**9), "bed.glb"),
         (lambda t: t["materials"][0]["pbrMetallicRoughness"].pop("baseColorTexture"), "has no base colour image"),
         (lambda t: t.update(meshes="none"), "meshes is no list"),
+        (lambda t: t["meshes"].append({"primitives": 5}), "primitives is no list"),
+        (lambda t: t["meshes"].append({"primitives": [{"material": [1]}]}), "2 materials, allowed: one"),
     ],
 )
 def test_glbs_are_read_with_doubt(room, change, text):

@@ -1,0 +1,96 @@
+"""Rules on what is no node of the graph: walls, floors, small things; and hints, switched-off colliders, normals."""
+
+from pathlib import Path
+
+import pytest
+from pxr import Sdf, Usd, Vt
+
+from echousd.check.validity import RULES, safely
+
+GOOD = Path(__file__).parents[1] / "bad/good.usda"
+LABELS = "semantics:labels:category"
+
+
+@pytest.fixture
+def stage():
+    """The good room with a wall, a floor and a vase: boxes that collide."""
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(GOOD.read_text())
+    for group, name, word in (("Shell", "Wall", "wall"), ("Shell", "Floor", "floor"), ("Dressing", "vase", "vase")):
+        above = Sdf.CreatePrimInLayer(layer, f"/Room/{group}")
+        above.specifier, above.typeName, above.kind = Sdf.SpecifierDef, "Xform", "group"
+        path = f"/Room/{group}/{name}"
+        Sdf.CopySpec(layer, "/Room/Objects/nightstand", layer, path)
+        prim = layer.GetPrimAtPath(path)
+        prim.SetInfo("apiSchemas", Sdf.TokenListOp.CreateExplicit(["SemanticsLabelsAPI:category"]))
+        del prim.properties["echo:category"]
+        prim.attributes[LABELS].default = Vt.TokenArray([word])
+        prim.attributes["xformOp:translate"].default = (1.5, 0, 1.2)
+        hint = Sdf.AttributeSpec(prim, "extentsHint", Sdf.ValueTypeNames.Float3Array)
+        hint.default = Vt.Vec3fArray([(-0.25, 0, -0.2), (0.25, 0.6, 0.2)])
+    return Usd.Stage.Open(layer)
+
+
+def found(stage):
+    """(rule, prim, message) of all that our rules find."""
+    return [(rule.name, str(one.path), one.message) for rule in RULES for one in safely(rule, stage)]
+
+
+def author(stage, path, value, kind=None):
+    layer, path = stage.GetRootLayer(), Sdf.Path(path)
+    spec = layer.GetAttributeAtPath(path)
+    (spec or Sdf.AttributeSpec(layer.GetPrimAtPath(path.GetPrimPath()), path.name, kind)).default = value
+
+
+def turn(stage, thing):
+    author(stage, f"{thing}.xformOp:rotateX", 180.0, Sdf.ValueTypeNames.Float)
+    author(stage, f"{thing}.xformOpOrder", Vt.TokenArray(["xformOp:translate", "xformOp:rotateX"]))
+
+
+def test_the_room_is_good(stage):
+    assert found(stage) == []
+
+
+@pytest.mark.parametrize("thing", ["Shell/Wall", "Shell/Floor", "Dressing/vase"])
+def test_what_the_graph_does_not_know_is_judged_too(stage, thing):
+    path = f"/Room/{thing}"
+    turn(stage, path)
+    assert found(stage) == [("echo:Upright", path, "stands on its head, allowed: its own +Y (or +Z) upwards")]
+    author(stage, f"{path}.xformOpOrder", Vt.TokenArray(["xformOp:translate"]))
+    author(stage, f"{path}.{LABELS}", Vt.TokenArray(["rug", "vase"]))
+    assert found(stage) == [("echo:OneLabel", path, f"{LABELS} is rug, vase, allowed: one word")]
+
+
+@pytest.mark.parametrize("thing", ["Objects/bed", "Shell/Wall"])
+def test_hints_are_the_boxes_of_what_is_shown(stage, thing):
+    author(stage, f"/Room/{thing}.extentsHint", Vt.Vec3fArray([(0, 0, 0), (9, 9, 9)]), Sdf.ValueTypeNames.Float3Array)
+    ((rule, path, message),) = found(stage)
+    assert (rule, path) == ("echo:Extents", f"/Room/{thing}")
+    assert message.startswith("extentsHint is (0, 0, 0) to (9, 9, 9), its meshes reach (-")
+
+
+def test_indices_of_normals_name_normals(stage):
+    mesh = "/Room/Dressing/vase/nightstand_mesh"
+    author(stage, f"{mesh}.primvars:normals", Vt.Vec3fArray([(0, 1, 0)]), Sdf.ValueTypeNames.Normal3fArray)
+    stage.GetAttributeAtPath(f"{mesh}.primvars:normals").SetMetadata("interpolation", "faceVarying")
+    author(stage, f"{mesh}.primvars:normals:indices", Vt.IntArray([0] * 23 + [5]), Sdf.ValueTypeNames.IntArray)
+    assert found(stage) == [("echo:Normals", mesh, "primvars:normals:indices reach from 0 to 5, allowed: 0 to 0")]
+
+
+@pytest.mark.parametrize(
+    ("thing", "text"),
+    [
+        ("Objects/nightstand", "a rigid body without colliders: it falls through the floor"),
+        ("Shell/Floor", "a floor without colliders: bodies fall through"),
+        ("Shell/Wall", "a wall without colliders"),
+    ],
+)
+@pytest.mark.parametrize("off", [True, False])
+def test_colliders_are_there_and_switched_on(stage, thing, text, off):
+    path = f"/Room/{thing}/nightstand_collider"
+    if off:
+        author(stage, f"{path}.physics:collisionEnabled", False, Sdf.ValueTypeNames.Bool)
+    else:
+        stage.GetRootLayer().GetPrimAtPath(path).ClearInfo("apiSchemas")
+        author(stage, f"{path}.physics:approximation", None)
+    assert ("echo:Colliders", f"/Room/{thing}", text) in found(stage)
