@@ -8,6 +8,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.openings import Opening
 from echousd.check import check_room
 from echousd.export import export
 from echousd.room.verdicts import RoomWarning
@@ -118,11 +119,16 @@ def test_more_layouts_are_drawn_again_where_the_first_try_fails():
             self.drawn += 1
             return super().sample_layout(graph, **kwargs)
 
+    window = Opening("window", "window", 2, 1.2, 1.6, 1.3, sill=0.9)  # no door where the stand-in's bed stands
+
+    def lit(graph):
+        return graph.replaced(room=graph.room.replaced(openings=(window,)))
+
     model = Counting()
-    room = echousd.generate(small_graph(), model=model, shapes="boxes", samples=3)
+    room = echousd.generate(lit(small_graph()), model=model, shapes="boxes", samples=3)
     assert [found.faults for found in room.outcomes] == [(), (), ()]
     assert model.drawn == 3  # none was drawn twice
     crowded = Counting()
     with pytest.warns(RoomWarning):
-        echousd.generate(together(), model=crowded, shapes="boxes", samples=2)
-    assert crowded.drawn == 1 + 3
+        echousd.generate(lit(together()), model=crowded, shapes="boxes", samples=2)
+    assert crowded.drawn == 3 + 3  # crowding is seen in both
