@@ -44,7 +44,10 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
-    errors = [str(error) for error in stage.GetCompositionErrors()]
+    try:
+        errors = [str(error) for error in stage.GetCompositionErrors()]
+    except UnicodeDecodeError as error:  # USD quotes the damaged layer
+        raise StageError(f"{path}: does not compose: a layer that is no UTF-8 text ({error.reason})") from None
     materials = [text for text in errors if MATERIALS.match(text)]
     if len(materials) < len(errors):
         wrong = next(text for text in errors if text not in materials)

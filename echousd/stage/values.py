@@ -215,3 +215,6 @@ def reading(stage: Usd.Stage) -> Iterator[None]:
 
         layer = stage.GetRootLayer()
         raise StageError(f"{layer.realPath or layer.identifier}: cannot be read ({said(error)})") from None
+    except UnicodeDecodeError as error:
+        layer = stage.GetRootLayer()
+        raise StageError(f"{layer.realPath or layer.identifier}: a text that is no UTF-8 ({error.reason})") from None
