@@ -7,6 +7,7 @@ numbers of a box, in the order of `COLUMNS`: position x, y, z in metres and the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,9 @@ class Rows:
 def axes(yaw: np.ndarray) -> np.ndarray:
     """(n, 2, 2) float: unit vectors in (x, z) of the width axis [:, 0] and of the front [:, 1]."""
     c, s = np.cos(yaw), np.sin(yaw)
-    return np.stack((np.stack((c, -s), -1), np.stack((s, c), -1)), 1)
+    out = np.empty((len(yaw), 2, 2), c.dtype)
+    out[:, 0, 0], out[:, 0, 1], out[:, 1, 0], out[:, 1, 1] = c, -s, s, c
+    return out
 
 
 def spread(gradient: np.ndarray, ends: np.ndarray, n: int) -> np.ndarray:
@@ -140,6 +143,11 @@ class Floor:
     normal: np.ndarray
     reflex: np.ndarray
 
+    @cached_property
+    def edge(self) -> np.ndarray:
+        """(k, 2) float: from each corner to the following one, metres."""
+        return np.roll(self.polygon, -1, 0) - self.polygon
+
 
 def floor_from_polygon(polygon: np.ndarray) -> Floor:
     """The floor with its walls' normals; raises ValueError for fewer than three corners or no area."""
@@ -167,28 +175,43 @@ def inside(floor: Floor, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Returns: distance (m,) float; gradient (m, 2) float, the direction in which it grows.
     """
-    start = floor.polygon
-    edge = np.roll(start, -1, 0) - start
+    depth, away, nearest = _border(floor, points)
+    sign = np.where(_within(floor, points), 1.0, -1.0)
+    gradient = np.where(
+        depth[:, None] > 1e-9,
+        sign[:, None] * away / np.maximum(depth, 1e-9)[:, None],
+        floor.normal[nearest],
+    )
+    return sign * depth, gradient
+
+
+def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
+    """(m,) float: the distance of `inside` alone."""
+    depth, _, _ = _border(floor, points)
+    return np.where(_within(floor, points), depth, -depth)
+
+
+def _border(floor: Floor, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distance (m,) to the border, the way (m, 2) from its nearest point, and the number (m,) of the wall there."""
+    start, edge = floor.polygon, floor.edge
     offset = points[:, None] - start
     t = np.clip((offset * edge).sum(-1) / (edge * edge).sum(-1), 0.0, 1.0)
     away = offset - t[..., None] * edge
     distance = np.linalg.norm(away, axis=-1)
     nearest = distance.argmin(1)
     m = np.arange(len(points))
-    depth = distance[m, nearest]
+    return distance[m, nearest], away[m, nearest], nearest
+
+
+def _within(floor: Floor, points: np.ndarray) -> np.ndarray:
+    """(m,) bool: which points lie in the polygon (even-odd rule)."""
+    start, edge = floor.polygon, floor.edge
     end = start + edge
     above = start[:, 1] > points[:, 1:]
     crosses = above != (end[:, 1] > points[:, 1:])
     with np.errstate(divide="ignore", invalid="ignore"):
         x = start[:, 0] + (points[:, 1:] - start[:, 1]) / edge[:, 1] * edge[:, 0]
-    within = (crosses & (points[:, :1] < x)).sum(1) % 2 == 1
-    sign = np.where(within, 1.0, -1.0)
-    gradient = np.where(
-        depth[:, None] > 1e-9,
-        sign[:, None] * away[m, nearest] / np.maximum(depth, 1e-9)[:, None],
-        floor.normal[nearest],
-    )
-    return sign * depth, gradient
+    return (crosses & (points[:, :1] < x)).sum(1) % 2 == 1
 
 
 def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[Rows, np.ndarray]:

@@ -8,6 +8,7 @@ twelve times as long; any other predicate's gradient is torch's.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +27,9 @@ from echousd.repair.footprints import (
     penetration,
 )
 from echousd.repair.geometry import COLUMNS, spread
+
+if TYPE_CHECKING:
+    from echomodel.rules.sets import RuleSet
 
 
 def relation_margins(
@@ -61,25 +65,43 @@ def pair_margins(
     rules: str,
     centre: np.ndarray,
     fronts: np.ndarray | None = None,
+    slopes: bool = True,
 ) -> Values:
-    """The margins as `relation_margins`, their gradients (e, 2, 6) by the two boxes of each relation alone."""
+    """The margins as `relation_margins`, their gradients (e, 2, 6) by the two boxes of each relation alone.
+
+    Arguments:
+        slopes: False where nobody asks for the gradients, which are then not right.
+    """
     from echomodel.rules import sets
 
     told = sets.rule_set(rules)
-    measured, strict = told.margins, told is sets.STRICT
+    strict = told is sets.STRICT
     ends, predicate = triplets[:, [0, 2]], triplets[:, 1]
     every = pairs_of(size, position - (centre[0], 0.0, centre[1]), yaw, ends, oriented=told.oriented, fronts=fronts)
     value, gradient = np.zeros(len(triplets)), every.zeros()
-    known = [number for number in np.unique(predicate).tolist() if number in measured]
-    rows = {number: vocabulary().predicates[number] for number in known}
+    words = vocabulary().predicates
+    rows = {number: words[number] for number in sorted(set(predicate.tolist())) if _measured(told, words[number])}
     for margin in {CLOSED[row.name]: None for row in rows.values() if row.name in CLOSED}:
         family = [number for number, row in rows.items() if CLOSED.get(row.name) is margin]
-        chosen = np.flatnonzero(np.isin(predicate, family))
-        value[chosen], gradient[chosen] = margin(every.take(chosen), [rows[i] for i in predicate[chosen]], strict)
-    chosen = np.flatnonzero(np.isin(predicate, [number for number, row in rows.items() if row.name not in CLOSED]))
+        chosen = _of(predicate, family)
+        relations = [rows[i] for i in predicate[chosen].tolist()]
+        value[chosen], gradient[chosen] = margin(every.take(chosen), relations, strict)
+    chosen = _of(predicate, [number for number, row in rows.items() if row.name not in CLOSED])
     if len(chosen):
-        value[chosen], gradient[chosen] = _automatic(size, position, yaw, triplets[chosen], rules, centre)
+        value[chosen], gradient[chosen] = _automatic(size, position, yaw, triplets[chosen], rules, centre, slopes)
     return value, gradient
+
+
+def _measured(told: RuleSet, relation: Predicate) -> bool:
+    rule = told.rules.get(relation.name)
+    return rule is not None and rule.margin is not None
+
+
+def _of(predicate: np.ndarray, numbers: Sequence[int]) -> np.ndarray:
+    """Rows of the predicates with these numbers."""
+    asked = np.zeros(len(vocabulary().predicates), bool)
+    asked[list(numbers)] = True
+    return np.flatnonzero(asked[predicate])
 
 
 def _smaller(one: Values, two: Values) -> Values:
@@ -95,7 +117,13 @@ def _where(chosen: np.ndarray, one: Values, two: Values) -> Values:
 
 
 def _automatic(
-    size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray, rules: str, centre: np.ndarray
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    triplets: np.ndarray,
+    rules: str,
+    centre: np.ndarray,
+    slopes: bool,
 ) -> Values:
     """Margins (e,) by `echomodel.rules` and torch's gradients (e, 2, 6) by the two boxes of each relation."""
     import torch
@@ -105,8 +133,12 @@ def _automatic(
 
     ends, row = triplets[:, [0, 2]].ravel(), torch.arange(len(triplets))
     boxes = Boxes(*(torch.from_numpy(np.asarray(values[ends], float)) for values in (size, position, yaw)))
-    free = boxes.size.requires_grad_(), boxes.position.requires_grad_()
     apart = torch.stack([2 * row, torch.from_numpy(triplets[:, 1].astype(np.int64)), 2 * row + 1], 1)
+    if not slopes:
+        with torch.no_grad():
+            margin = margins(boxes, apart, rules=rules, center=torch.from_numpy(np.asarray(centre, float)))
+        return margin.numpy(), np.zeros((len(triplets), 2, COLUMNS))
+    free = boxes.size.requires_grad_(), boxes.position.requires_grad_()
     margin = margins(boxes, apart, rules=rules, center=torch.from_numpy(np.asarray(centre, float)))
     by_size, by_position = torch.autograd.grad(margin.sum(), free, allow_unused=True, materialize_grads=True)
     gradient = torch.cat([by_position, by_size * boxes.size.detach()], 1)

@@ -37,7 +37,7 @@ def _uneven(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     table = int(setting.anchor[i])
     if table < 0 or not setting.laid[table] or not state.placed[table]:
         return np.zeros(len(poses))
-    seats = (setting.anchor == table) & state.placed & np.array([kind.role == "seat" for kind in setting.kinds])
+    seats = (setting.anchor == table) & state.placed & setting.seats
     mates = np.array([j for j in np.flatnonzero(seats) if j != i], int)
     half = setting.size[table, [0, 2]] / 2 + 0.3
     own = _local(state.position[table], float(state.yaw[table]), poses.position) / half

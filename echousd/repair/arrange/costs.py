@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.rules.sets import APART
-from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.comfort import uncomfortable
 from echousd.repair.arrange.outlook import missing, unseen
 from echousd.repair.arrange.overlaps import beyond, depths
@@ -59,7 +58,7 @@ def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
     doors = setting.doors
     out = (np.maximum(depths(setting.size[i], poses, doors.size, doors.position, doors.yaw), 0) > 0.04) @ doors.price
-    strangers = [j for j in others if not _at_home(setting, i, j)]
+    strangers = [j for j in others if not setting.at_home[i, j]]
     zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
     out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
@@ -69,20 +68,10 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     size, forward = front
     ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
     solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
-    solid = [j for j in solid if not _at_home(setting, i, j)]
+    solid = [j for j in solid if not setting.at_home[i, j]]
     depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])
     out = out + BLOCKED * (depth > 0.03).sum(1)
     return out + BLOCKED * (beyond(setting, size, ahead) > 0.05)
-
-
-def _at_home(setting: Setting, i: int, j: int) -> bool:
-    """Whether the fronts of two boxes are open to each other: one attends the other, or they sit in one circle."""
-    if setting.anchor[i] == j or setting.anchor[j] == i:
-        guest = i if setting.anchor[i] == j else j
-        return setting.stances[guest] not in ("near", "opposite")
-    circle = ("company", "with", "beside", "foot")
-    same = setting.group[i] == setting.group[j]
-    return same and (setting.stances[i] in circle or setting.stances[j] in circle)
 
 
 def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
@@ -97,33 +86,43 @@ def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
 
 def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
     """The spaces before the fronts of some boxes and at both sides of beds."""
-    rows = []
+    rows: list[tuple[float, ...]] = []
     for j in boxes:
-        front = own_front(setting, j)
-        x, _, z = state.position[j]
-        c, s = np.cos(state.yaw[j]), np.sin(state.yaw[j])
-        if front is not None:
-            size, forward = front
-            rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
-        if setting.laid[j] and not setting.kinds[j].access:
-            rows += _seats(setting, state, j)
-        if setting.kinds[j].role == "bed":
-            for side in (-1, 1):
-                lateral = side * (setting.size[j, 0] / 2 + 0.2)
-                size = np.array([0.38, 1.0, setting.size[j, 2] * 0.6])
-                forward = setting.size[j, 2] * 0.15
-                at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
-                rows.append((*size, *at, state.yaw[j], 0.5 * BLOCKED, j))
-            forward = setting.size[j, 2] / 2 + FOOT / 2
-            size = np.array([0.8 * setting.size[j, 0], 1.0, FOOT])
-            rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], 0.5 * BLOCKED, j))
+        waits = bool(setting.laid[j]) and bool((setting.seats & (setting.anchor == j) & ~state.placed).any())
+        key = (j, waits, *state.position[j].tolist(), float(state.yaw[j]))
+        if key not in state.zones:
+            state.zones[key] = _zones_of(setting, state, j)
+        rows += state.zones[key]
     table = np.array(rows, float).reshape(-1, 9)
     return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], table[:, 8].astype(int))
 
 
+def _zones_of(setting: Setting, state: State, j: int) -> list[tuple[float, ...]]:
+    rows: list[tuple[float, ...]] = []
+    front = own_front(setting, j)
+    x, _, z = state.position[j]
+    c, s = np.cos(state.yaw[j]), np.sin(state.yaw[j])
+    if front is not None:
+        size, forward = front
+        rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
+    if setting.laid[j] and not setting.kinds[j].access:
+        rows += _seats(setting, state, j)
+    if setting.kinds[j].role == "bed":
+        for side in (-1, 1):
+            lateral = side * (setting.size[j, 0] / 2 + 0.2)
+            size = np.array([0.38, 1.0, setting.size[j, 2] * 0.6])
+            forward = setting.size[j, 2] * 0.15
+            at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
+            rows.append((*size, *at, state.yaw[j], 0.5 * BLOCKED, j))
+        forward = setting.size[j, 2] / 2 + FOOT / 2
+        size = np.array([0.8 * setting.size[j, 0], 1.0, FOOT])
+        rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], 0.5 * BLOCKED, j))
+    return rows
+
+
 def _seats(setting: Setting, state: State, j: int) -> list[tuple[float, ...]]:
     """The spaces along the sides of a table at which chairs that are not placed yet are to stand."""
-    chairs = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == j)
+    chairs = setting.seats & (setting.anchor == j)
     if not (chairs & ~state.placed).any():
         return []
     x, _, z = state.position[j]
@@ -148,14 +147,12 @@ def _front(yaw: np.ndarray) -> np.ndarray:
 
 def _relations(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     """Broken relations between box i and others, those that are not placed at a small weight."""
-    told = setting.triplets[(setting.triplets[:, [0, 2]] == i).any(1)]
+    told, other, sides = setting.told[i]
     count = len(poses)
     if not len(told):
         return np.zeros(count)
-    other = np.where(told[:, 0] == i, told[:, 2], told[:, 0])
     weight = np.where(state.placed[other], 1.0, UNPLACED)
     where = np.where(state.placed[:, None], state.position, setting.draft)
-    sides = np.array([any(vocabulary().predicates[p].step) for p in told[:, 1].tolist()])
     missed = np.zeros((count, len(told)))
     # sides are a matter of the centres alone here: whatever runs into the other pays for that anyway
     asked = setting.order[other[sides], i]
@@ -178,6 +175,7 @@ def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarr
     rows[own] = np.broadcast_to(n + np.arange(count)[:, None, None], rows.shape)[own]
     fronts = np.append(setting.fronts, np.repeat(setting.fronts[i], count))
     margin, _ = pair_margins(
-        size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre, fronts=fronts
-    )
+        size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre, fronts=fronts,
+        slopes=False,
+    )  # fmt: skip
     return np.maximum(SLACK - margin.reshape(count, -1), 0.0)

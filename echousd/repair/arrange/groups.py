@@ -16,9 +16,15 @@ AT_WALL = 0.15  # metres: what stands so near a wall slides along it
 
 
 def paid_by(setting: Setting, state: State, i: int, own: np.ndarray) -> float:
-    """What box i pays where it stands; own: (n,) float, the prices of their poses by themselves."""
-    here = Poses(state.position[i : i + 1].copy(), state.yaw[i : i + 1].copy(), own[i : i + 1])
-    return float(price(setting, state, i, here)[0])
+    """What box i pays where it stands; own: (n,) float, the prices of their poses by themselves.
+
+    Asked again for an equal state it is remembered; `state.regrets` must not change meanwhile.
+    """
+    key = (i, float(own[i]), state.position.tobytes(), state.yaw.tobytes(), state.placed.tobytes())
+    if key not in state.bills:
+        here = Poses(state.position[i : i + 1].copy(), state.yaw[i : i + 1].copy(), own[i : i + 1])
+        state.bills[key] = float(price(setting, state, i, here)[0])
+    return state.bills[key]
 
 
 def seat_evenly(setting: Setting, state: State, own: np.ndarray) -> None:

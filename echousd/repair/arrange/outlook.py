@@ -10,7 +10,7 @@ import numpy as np
 from echousd.repair.arrange.places import slots_at, stance, wrapped
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.slots import Slot
-from echousd.repair.geometry import inside
+from echousd.repair.geometry import depth_inside
 
 MISSING = 1.6  # for each place that those who attend a piece would not find
 UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
@@ -55,7 +55,7 @@ def _waiting(setting: Setting, state: State, i: int) -> list[tuple[list[Slot], n
 
 def _free(setting: Setting, state: State, i: int, points: np.ndarray, reach: float) -> np.ndarray:
     """(K, S) bool: which points (K, S, 2) lie on the floor and in nothing that stands, with `reach` metres to spare."""
-    free = inside(setting.floor, points.reshape(-1, 2))[0].reshape(points.shape[:2]) > reach
+    free = depth_inside(setting.floor, points.reshape(-1, 2)).reshape(points.shape[:2]) > reach
     for j in np.flatnonzero(state.placed).tolist():
         if j == i or not setting.standing(j) or setting.anchor[j] == i:
             continue

@@ -9,7 +9,7 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.slots import STANDS, Slot
-from echousd.repair.geometry import inside
+from echousd.repair.geometry import depth_inside
 from echousd.repair.problem import ON_CEILING
 
 Row = tuple[float, float, float, float]  # x, z, yaw, price
@@ -100,7 +100,7 @@ def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
     stands = stance(setting, i, anchor)
     if stands not in STANDS:
         return []
-    count = int(((setting.anchor == anchor) & [k.role == "seat" for k in setting.kinds]).sum())
+    count = int(((setting.anchor == anchor) & setting.seats).sum())
     return STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
 
 
@@ -184,7 +184,7 @@ def in_the_open(setting: Setting, i: int, price: float) -> list[Row]:
     xs, zs = (np.arange(a + 0.3, b - 0.2, GRID) for a, b in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2)
     points = np.concatenate([setting.draft[i : i + 1, [0, 2]], points])
-    points = points[inside(setting.floor, points)[0] > 0.25 * float(setting.size[i, [0, 2]].min())]
+    points = points[depth_inside(setting.floor, points) > 0.25 * float(setting.size[i, [0, 2]].min())]
     quarter = HALF_PI * np.round((setting.heading[i] - setting.grain) / HALF_PI) + setting.grain
     turns = [(float(quarter), 0.0), (float(quarter + HALF_PI), 0.1)]
     if setting.kinds[i].role in ("seat", "sofa"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +11,14 @@ import numpy as np
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
 from echomodel.rules.living.access import TALL
 from echomodel.rules.living.plan import kind_of
-from echomodel.vocabulary import Category
+from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
-from echousd.repair.geometry import Floor
+from echousd.repair.geometry import Floor, axes
 from echousd.repair.problem import ON_FLOOR, Problem, required_order
 
 MASSIVE = ("sofa", "board", "bed", "storage")
 TOGETHER = {"sofa", "board", "bed", "seat"}
+CIRCLE = ("company", "with", "beside", "foot")  # who stands so sits in one circle with its group
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,36 @@ class Setting:
     def rows(self) -> dict[tuple[str, int, float], list[tuple[float, float, float, float]]]:
         """Poses that only the room and the box decide, kept when they are asked for again."""
         return {}
+
+    @cached_property
+    def seats(self) -> np.ndarray:
+        """(n,) bool, pieces of the role seat."""
+        return np.array([kind.role == "seat" for kind in self.kinds], bool)
+
+    @cached_property
+    def at_home(self) -> np.ndarray:
+        """(n, n) bool: fronts are open to each other, as one attends the other or both sit in one circle."""
+        n = len(self.kinds)
+        circle = np.array([stance in CIRCLE for stance in self.stances], bool)
+        out = (self.group[:, None] == self.group) & (circle[:, None] | circle)
+        for i in range(n):
+            for j in range(i):
+                if self.anchor[i] == j or self.anchor[j] == i:
+                    guest = i if self.anchor[i] == j else j
+                    out[i, j] = self.stances[guest] not in ("near", "opposite")
+                    guest = j if self.anchor[j] == i else i
+                    out[j, i] = self.stances[guest] not in ("near", "opposite")
+        return out
+
+    @cached_property
+    def told(self) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]:
+        """For each box its relations (r, 3) int, their other ends (r,) int and whether they name a side (r,) bool."""
+        sided = np.array([any(predicate.step) for predicate in vocabulary().predicates], bool)
+        out = []
+        for i in range(len(self.kinds)):
+            rows = self.triplets[(self.triplets[:, [0, 2]] == i).any(1)]
+            out.append((rows, np.where(rows[:, 0] == i, rows[:, 2], rows[:, 0]), sided[rows[:, 1]]))
+        return tuple(out)
 
     @cached_property
     def laid(self) -> np.ndarray:
@@ -225,12 +256,15 @@ class State:
     Arguments:
         position: (n, 3) float, yaw: (n,) float, placed: (n,) bool.
         regrets: box -> poses that led to a bad end in earlier rounds: x, z, yaw and what that cost.
+        bills, zones: what was computed for states and poses before (`groups.paid_by`, `costs.fronts`).
     """
 
     position: np.ndarray
     yaw: np.ndarray
     placed: np.ndarray
     regrets: dict[int, list[tuple[float, float, float, float]]]
+    bills: dict[tuple[object, ...], float] = field(default_factory=dict)
+    zones: dict[tuple[object, ...], list[tuple[float, ...]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,6 +277,11 @@ class Poses:
 
     def __len__(self) -> int:
         return len(self.yaw)
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """(K, 2, 2) float: unit vectors of the width axis and of the front, as `geometry.axes`."""
+        return axes(self.yaw)
 
     @classmethod
     def of(cls, rows: Sequence[tuple[float, float, float, float]], height: float) -> Poses:
