@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from echousd.scenery import Scenery, read_scenery
+from echousd.viewpoints import View, corner_view, eye_view, stage_views, top_view
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 EVERY = "every-camera"
 VIEWS = ("top", "perspective", "eye", EVERY)
-EYE = 1.55  # metres above the floor
 COLORS = ("materials", "class")
 FINE, QUICK = 3, 2  # squared: rays per pixel
 SKY_RAYS = 3  # per ray: rays towards the sky
@@ -25,15 +24,6 @@ LARGEST = 4096
 
 class RenderUnavailable(ImportError, ValueError):
     """Embree is not installed; the message says how to get it."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective)."""
-
-    matrix: np.ndarray
-    half: float
-    orthographic: bool
 
 
 def render_file(
@@ -57,6 +47,22 @@ def render_file(
         return render_stage(stage, view=view, size=size, colors=colors, rays=rays)
 
 
+def render_cameras(
+    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None
+) -> dict[str, Image.Image]:
+    """A picture of the room in a file through each of its cameras, by the camera's name; see `render_file`.
+
+    Raises ValueError as `render_file` does, and where the stage holds no camera.
+    """
+    from echousd.stage import open_stage
+    from echousd.stage.layouts import showing_layout
+
+    stage = open_stage(path)
+    with showing_layout(stage, layout):
+        scenery = _scenery(stage, size, colors)
+        return {name: _image(trace(scenery, view, size, rays=rays)) for name, view in stage_views(stage).items()}
+
+
 def render_stage(
     stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
 ) -> Image.Image:
@@ -74,85 +80,34 @@ def render_stage(
     Raises:
         ValueError: unknown view, colours or size, nothing to see, no camera for `every-camera`, or Embree missing.
     """
-    from PIL import Image
-
-    from echousd.stage.values import reading
-
     if view not in VIEWS:
         raise ValueError(f"view is {view!r}, allowed: {', '.join(VIEWS)}")
+    scenery = _scenery(stage, size, colors)
+    if view == EVERY:
+        pictures = [trace(scenery, camera, size, rays=rays) for camera in stage_views(stage).values()]
+        return _image(np.concatenate(pictures, axis=1))
+    camera = {"top": top_view, "perspective": corner_view, "eye": eye_view}[view](scenery)
+    if view == "perspective":
+        scenery = scenery.without_near_walls(camera.matrix[:3, 3])
+    return _image(trace(scenery, camera, size, rays=rays))
+
+
+def _scenery(stage: Usd.Stage, size: int, colors: str) -> Scenery:
+    """What there is to draw; raises ValueError for colours or a size that there is not."""
+    from echousd.stage.values import reading
+
     if colors not in COLORS:
         raise ValueError(f"colors is {colors!r}, allowed: {', '.join(COLORS)}")
     if not 16 <= size <= LARGEST:
         raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
     with reading(stage):
-        scenery = read_scenery(stage, by_class=colors == "class")
-    if view == EVERY:
-        pictures = [trace(scenery, camera, size, rays=rays) for camera in stage_views(stage)]
-        pixels = np.concatenate(pictures, axis=1)
-    else:
-        camera = {"top": top_view, "perspective": corner_view, "eye": eye_view}[view](scenery)
-        if view == "perspective":
-            scenery = scenery.without_near_walls(camera.matrix[:3, 3])
-        pixels = trace(scenery, camera, size, rays=rays)
+        return read_scenery(stage, by_class=colors == "class")
+
+
+def _image(pixels: np.ndarray) -> Image.Image:
+    from PIL import Image
+
     return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))
-
-
-def stage_views(stage: Usd.Stage) -> list[View]:
-    """What every camera of a stage sees, in a y-up world in metres; raises ValueError where there is none."""
-    from pxr import UsdGeom
-
-    from echousd.stage.units import metres_per_unit, up_axis
-
-    unit, turn = metres_per_unit(stage), np.eye(4)
-    if up_axis(stage) == "Z":
-        turn[1:3, 1:3] = ((0, 1), (-1, 0))
-    views: list[View] = []
-    for prim in stage.Traverse():
-        if not prim.IsA(UsdGeom.Camera):
-            continue
-        camera = UsdGeom.Camera(prim).GetCamera(0)
-        matrix = turn @ np.array(camera.transform).T
-        matrix[:3, 3] *= unit
-        matrix[:3, :3] /= np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
-        flat = camera.projection == camera.Orthographic
-        wide = camera.horizontalAperture
-        half = wide / 2 * camera.APERTURE_UNIT * unit if flat else wide / 2 / max(camera.focalLength, 1e-6)
-        views.append(View(matrix, float(half), flat))
-    if not views:
-        raise ValueError(f"{stage.GetRootLayer().identifier}: no camera, which view every-camera needs")
-    return views
-
-
-def top_view(scenery: Scenery) -> View:
-    """Straight down on the whole scene."""
-    lower, upper = scenery.bounds
-    matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = (1, 0, 0), (0, 0, -1), (0, 1, 0)
-    centre = (lower + upper) / 2
-    matrix[:3, 3] = (centre[0], upper[1] + 1.0, centre[2])
-    return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)
-
-
-def eye_view(scenery: Scenery) -> View:
-    """From a corner inside the room, where least is hidden, at the height of a standing person's eyes."""
-    from echousd.views import APERTURE, WIDE, inside_view
-
-    lower, upper = scenery.bounds
-    x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
-    floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
-    matrix = inside_view(floor, scenery.furniture, EYE / 0.72)
-    return View(matrix, APERTURE / 2 / WIDE, False)
-
-
-def corner_view(scenery: Scenery) -> View:
-    """From above a corner, the one where least is hidden, the whole scene in the picture."""
-    from scipy.spatial import ConvexHull
-
-    from echousd.views import APERTURE, FOCAL_LENGTH, perspective_view
-
-    points = scenery.triangles.reshape(-1, 3).astype(float)
-    points = points[ConvexHull(points, qhull_options="QJ").vertices]  # nothing else reaches the picture's border
-    return View(perspective_view(points, scenery.furniture), APERTURE / 2 / FOCAL_LENGTH, False)
 
 
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:

@@ -36,8 +36,9 @@ def adopt(
 
     The stage is not written; the room refers to the pieces in it.
     """
-    from echousd.cli.generate import progress_bar, report, telling_faults
+    from echousd.cli.generate import progress_bar
     from echousd.cli.output import say
+    from echousd.cli.report import report, telling_faults
     from echousd.room.output import check_output, writing
 
     check_output(output, flat=False, force=force)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from echousd.cli.output import one_line, plain_json, say
+from echousd.cli.output import one_line, plain_json, say, say_error
 
 if TYPE_CHECKING:
     from echousd.batches.run import BatchProgress
@@ -189,7 +189,7 @@ def _shown(json: bool) -> Iterator[Callable[[BatchProgress], None]]:
             rest = {"total": progress.total, "seconds": round(progress.seconds, 1), "rate": round(progress.rate, 3)}
             typer.echo(text.dumps({**fields, **rest, "megabytes": round(progress.megabytes)}))
         elif new and progress.error:
-            say(f"failed   {progress.room}: {one_line(progress.error)}", err=True)
+            say_error(f"failed   {progress.room}: {one_line(progress.error)}")
         if live is not None:
             live.update(line(progress))
         elif not json and time.monotonic() - last["when"] > 30:

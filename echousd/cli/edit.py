@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.output import say
+from echousd.cli.output import say, say_json
+from echousd.cli.report import report, say_written, telling_faults
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -53,6 +55,9 @@ def edit(
     ] = True,
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
+    ] = False,
 ) -> None:
     """Change what a room holds; objects that the change does not touch stay byte for byte.
 
@@ -70,12 +75,12 @@ def edit(
     if undo:
         if wishes != Wishes() or dry_run or output is not None:
             raise ValueError("--undo takes the last edit back and does nothing else; leave the other options out")
-        _undo(room, wait)
+        _undo(room, wait, json)
         return
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
         room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
-        dry_run=dry_run, force=force, wait=wait,
+        dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
 
 
@@ -85,6 +90,9 @@ def update(
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
+    ] = False,
 ) -> None:
     """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
 
@@ -94,23 +102,26 @@ def update(
 
     def wanted() -> tuple[Path, SceneGraph]:
         own, graph, moved = artists_wishes(layer)
-        for name in moved:
+        for name in moved if not json else ():
             say(f"locked   {name}, where {layer.name} puts it")
         return own, graph
 
     options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
     nothing = f"{layer}: changes nothing about the room"
-    _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait)
+    _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
 
 
-def _undo(room: Path, wait: bool) -> None:
+def _undo(room: Path, wait: bool, json: bool) -> None:
     """Take the last edit of a room back and say what it was."""
     from echousd.room.history import undo
     from echousd.room.save import write_preview, write_sheet
 
+    started = time.perf_counter()
     steps = undo(room, wait=wait)
-    write_preview(room)
-    write_sheet(room)
+    pictures = [path for path in (write_preview(room), write_sheet(room)) if path]
+    if json:
+        say_written([room, *pictures], started, more={"undone": list(steps)})
+        return
     for step in steps:
         say(f"undone   {step}")
     say(f"room     {room}")
@@ -126,9 +137,10 @@ def _change(
     dry_run: bool,
     force: bool,
     wait: bool,
+    json: bool,
 ) -> None:
     """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen."""
-    from echousd.cli.generate import progress_bar, report, telling_faults
+    from echousd.cli.generate import progress_bar
     from echousd.room.edit import edit as change
     from echousd.room.edit import touched
     from echousd.room.output import check_output, writing
@@ -136,6 +148,7 @@ def _change(
     from echousd.room.reading import read_room
     from echousd.room.written import write_room
 
+    started = time.perf_counter()
     check_output(folder, flat=False, force=force)
     with writing(folder, flat=False, force=force, wait=wait):
         root, graph = wanted()
@@ -145,12 +158,15 @@ def _change(
             raise ValueError(nothing)
         if dry_run:
             fresh, moving = touched(old, graph)
+            if json:
+                say_json({"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}, indent=2)
+                return
             for step in (*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))):
                 say(step)
             return
         with telling_faults(), progress_bar() as listen:
             made = change(root, graph, progress=listen, **options)
             written = write_room(made, folder, StageTimer(listen), force=force)
-    for step in steps:
+    for step in steps if not json else ():
         say(step)
-    report([written])
+    report([written], since=started, json=json, more={"changes": list(steps)})

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from echousd.cli.output import say
+from echousd.cli.report import say_written
 
 
 def register(app: typer.Typer) -> None:
@@ -31,9 +33,14 @@ def export(
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
     from echousd.export import export as write
 
+    started = time.perf_counter()
     path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
-    say(str(path))
+    if json:
+        say_written([path], started)
+    else:
+        say(str(path))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from echousd.cli.output import say
+from echousd.cli.report import report, telling_faults
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
@@ -99,6 +100,7 @@ def generate(
         str | None, typer.Option("--crate-version", help="Older usdc version for older hosts, e.g. 0.8.0.")
     ] = None,
     timings: Annotated[bool, typer.Option("--timings", help="Print how long each stage took.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print what was made, faults and seconds as JSON.")] = False,
     store: Annotated[
         Path | None, typer.Option(help="Folder where many rooms keep their assets and images once.")
     ] = None,
@@ -164,15 +166,17 @@ def generate(
 
         if house:
             root, made = write_rooms(output, house, one, force=force, wait=wait)
-            say(f"house    {root}")
+            if not json:
+                say(f"house    {root}")
         else:
-            made = [one(room, output)]
+            root, made = None, [one(room, output)]
     if timings:
         total = time.perf_counter() - started
         spent |= {"other": total - sum(spent.values()), "total": total}
-        for stage, seconds in spent.items():
+        for stage, seconds in spent.items() if not json else ():
             typer.echo(f"{stage:>10} {seconds:7.2f} s")
-    report(made, restless)
+    more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}} if timings else {}
+    report(made, restless, since=started, json=json, house=root, more=more)
 
 
 def rooms_of(graph: Path) -> Sequence[Place]:
@@ -182,16 +186,6 @@ def rooms_of(graph: Path) -> Sequence[Place]:
     from echousd.room.house import places
 
     return places(graph)
-
-
-@contextmanager
-def telling_faults() -> Iterator[None]:
-    """Leave it to `report` to tell what a finished room does not keep."""
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "the room has faults")
-        yield
 
 
 @contextmanager
@@ -221,29 +215,3 @@ def progress_bar() -> Iterator[StageListener]:
             bar.update(tasks[stage], completed=done, total=total)
 
         yield listen
-
-
-def report(made: Sequence[Written], restless: Sequence[str] = ()) -> None:
-    """Say what was made and what the graphs asked for in vain; exit code 1 for faults and pieces that do not rest."""
-    for each in made:
-        tell_room(each)
-    if restless or any(each.room.faults for each in made):
-        raise typer.Exit(1)
-
-
-def tell_room(written: Written) -> None:
-    """Say what became of a room."""
-    room = written.room
-    say(f"room     {written.root}")
-    if written.preview is not None:
-        say(f"preview  {written.preview}")
-    for number, found in enumerate(room.outcomes):
-        counts, several = found.counts(), len(room.outcomes) > 1
-        kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
-        say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
-        for verdict in found.broken:
-            say(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
-        for hit in found.collisions:
-            say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
-    for note in room.notes:
-        say(f"note     {note}")

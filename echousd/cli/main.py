@@ -15,6 +15,7 @@ import typer
 
 from echousd.cli.numbers import bound_numbers
 from echousd.cli.output import one_line
+from echousd.cli.quiet import add_quiet
 
 app = typer.Typer(
     name="echousd",
@@ -108,6 +109,7 @@ def command() -> Any:
         importlib.import_module(f"echousd.cli.{topic}").register(app)
     root = typer.main.get_command(app)
     bound_numbers(root)
+    add_quiet(root)
     return root
 
 

@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import typer
 
@@ -15,6 +19,7 @@ LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a pr
 LONGEST_LINE = 4000
 MARK = b"echousd"
 HEAD = 2048  # bytes in which a picture of ours says so
+_errors: ContextVar[TextIO | None] = ContextVar("_errors", default=None)
 
 
 def safe(text: str) -> str:
@@ -40,6 +45,21 @@ def one_line(text: str) -> str:
 def say(text: str, *, err: bool = False) -> None:
     """Print a line that may hold names from files."""
     typer.echo(safe(text), err=err)
+
+
+def say_error(text: str) -> None:
+    """Print a line about something that failed to stderr, with `--quiet` as well."""
+    typer.echo(safe(text), file=_errors.get() or sys.stderr)
+
+
+@contextmanager
+def errors_to(stream: TextIO) -> Iterator[None]:
+    """Have `say_error` print to a stream."""
+    before = _errors.set(stream)
+    try:
+        yield
+    finally:
+        _errors.reset(before)
 
 
 def say_json(found: Any, *, indent: int | None = None) -> None:

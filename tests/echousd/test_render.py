@@ -194,5 +194,5 @@ def test_every_camera_draws_what_it_sees(up, unit):
 
 
 def test_every_camera_needs_one():
-    with pytest.raises(ValueError, match="no camera, which view every-camera needs"):
+    with pytest.raises(ValueError, match="no camera, which --cameras and the view every-camera need"):
         render_stage(cube_stage(), view="every-camera", size=32)
