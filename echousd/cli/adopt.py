@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,7 @@ def adopt(
     dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "none",
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print what was made, faults and seconds as JSON.")] = False,
 ) -> None:
     """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
 
@@ -41,6 +43,7 @@ def adopt(
     from echousd.cli.report import report, telling_faults
     from echousd.room.output import check_output, writing
 
+    started = time.perf_counter()
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
         from echousd.room.adopting import adopted
@@ -56,5 +59,6 @@ def adopt(
         )  # fmt: skip
         written = write_room(made, output, StageTimer(listen), force=force)
     kept = sum(node.asset is not None for node in graph.nodes)
-    say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
-    report([written])
+    if not json:
+        say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
+    report([written], since=started, json=json, more={"adopted": kept, "new": len(graph.nodes) - kept})

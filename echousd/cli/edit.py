@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.output import say, say_json
+from echousd.cli.output import say
 from echousd.cli.report import report, say_written, telling_faults
 
 if TYPE_CHECKING:
@@ -159,7 +159,8 @@ def _change(
         if dry_run:
             fresh, moving = touched(old, graph)
             if json:
-                say_json({"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}, indent=2)
+                plan = {"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}
+                say_written([], started, more=plan)
                 return
             for step in (*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))):
                 say(step)

@@ -53,7 +53,7 @@ def test_json_of_a_room_from_generation_to_export(graph, tmp_path, echousd_comma
 
     wish = ("edit", root, "--restyle", "bed:oak", *BOXES, "--json")
     plan = read(echousd_command(*wish, "--dry-run").out)
-    assert set(plan) == {"changes", "new", "moves"}
+    assert (plan["written"], plan["new"], plan["changes"]) == ([], [], ["~ object bed: style none -> oak"])
     edited = read(echousd_command(*wish).out)
     assert edited["changes"] == plan["changes"]
     assert edited["written"][0] == str(root)
