@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -131,7 +132,8 @@ def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[n
 def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """The points (v, 3) float32, where boards meet a few micrometres apart: validators take equal points for a fault.
 
-    What lies at one place and belongs to several connected pieces moves towards the middle of its own.
+    What lies at one place and belongs to several connected pieces moves towards the middle of its own; what belongs to
+    one piece (both ends of a cord around a cushion) moves inwards, against its own faces.
     """
     _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     place = place.reshape(-1)
@@ -146,12 +148,19 @@ def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     np.maximum.at(high, board[used], points[used])
     out = points.astype(float)
     seen: dict[int, list[int]] = {}
+    times: Counter[tuple[int, int]] = Counter()
     for vertex in shared[used[shared]].tolist():
         boards = seen.setdefault(int(place[vertex]), [])
         if board[vertex] not in boards:
             boards.append(board[vertex])
         inwards = (low[board[vertex]] + high[board[vertex]]) / 2 - out[vertex]
         out[vertex] += NUDGE * boards.index(board[vertex]) * np.sign(inwards)
+        again = (int(place[vertex]), int(board[vertex]))
+        if times[again]:
+            one, two, three = np.moveaxis(points[faces[(faces == vertex).any(1)]].astype(float), 1, 0)
+            outwards = np.cross(two - one, three - one).sum(0)
+            out[vertex] -= NUDGE * times[again] * outwards / max(float(np.linalg.norm(outwards)), 1e-20)
+        times[again] += 1
     return out.astype(np.float32)
 
 

@@ -19,6 +19,9 @@ for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren():
     sets = prim.GetVariantSets()
     if "articulation" in sets.GetNames():
         sets.SetSelection("articulation", "articulated")
+for prim in stage.Traverse():
+    if prim.GetTypeName() == "Shader" and prim.GetAttribute("info:id").Get() == "UsdUVTexture":
+        prim.SetActive(False)  # MuJoCo 4.0 reads no JPEG and refuses the room
 stage.Flatten().Export(sys.argv[2])
 model = mujoco.MjSpec.from_file(sys.argv[2]).compile()
 data = mujoco.MjData(model)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from echomodel.data.furniture.solids import Tube
 from echomodel.vocabulary import vocabulary
 from echousd.room.finishes.slots import metres_of
 from echousd.room.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
@@ -115,3 +116,14 @@ def test_boards_that_meet_share_no_point_and_stay_closed():
     assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
     alone = boards[0].vertices.astype(np.float32)
     assert unshared(alone, boards[0].faces) is alone
+
+
+def test_the_ends_of_a_cord_around_a_cushion_share_no_point_and_stay_closed():
+    turn = np.linspace(0, 2 * np.pi, 13)
+    cord = Tube(points=(np.stack([np.cos(turn), 0 * turn, np.sin(turn)], 1) + 0.3)[[*range(12), 0]], radius=0.01)
+    mesh = trimesh.Trimesh(*cord.local_mesh(), process=False)
+    assert len(np.unique(mesh.vertices.astype(np.float32), axis=0)) < len(mesh.vertices)
+    form = surface(mesh, {"fabric": np.arange(len(mesh.faces))})
+    assert len(np.unique(form.points, axis=0)) == len(form.points)
+    np.testing.assert_allclose(form.points, mesh.vertices, atol=1e-5)
+    assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
