@@ -1,5 +1,7 @@
 """A stage of several rooms: a folder for each and a root that composes them, or one of them."""
 
+import json
+
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
@@ -51,10 +53,13 @@ def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
     assert not report.broken
     assert not report.placement
     # again: ours are replaced
-    assert (
-        echousd_command("generate", file, "-o", tmp_path / "out", "--shapes", "boxes", "--no-walls", "--no-repair").code
-        == 0
-    )
+    words = ("-o", tmp_path / "out", "--shapes", "boxes", "--no-walls", "--no-repair", "--json")
+    done = echousd_command("generate", file, *words)
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    layers = [tmp_path / "out" / name for name in ("West/West.usda", "East/East.usda")]
+    assert [room["room"] for room in told["rooms"]] == [str(layer) for layer in layers]
+    assert told["written"][0] == str(tmp_path / "out" / "out.usda")
 
 
 def test_one_of_them(file, tmp_path, echousd_command):
