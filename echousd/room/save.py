@@ -99,7 +99,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
         kept_steps = {entry["restores"] for entry in history}
         owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}
         owned |= {path: folders.digest(content) for path, content in archive.items()}
-    gone = [path for path in gone if path not in owned]
+    gone = [path for path in gone if path not in owned or path in needed]
     told = (
         manifest_of(room, owned)
         | {"history": history}
