@@ -4,7 +4,9 @@ python mujoco_drawers.py ROOM.usda FLAT.usdc
 """
 
 import json
+import os
 import sys
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,6 +16,7 @@ from pxr import Usd
 PULL, SECONDS = 8.0, 2.0  # newtons or newton metres
 
 register_plugins()
+os.chdir(Path(sys.argv[2]).parent)  # where MuJoCo leaves its log of warnings
 stage = Usd.Stage.Open(sys.argv[1])
 for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren():
     sets = prim.GetVariantSets()
