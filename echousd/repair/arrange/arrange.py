@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echousd.repair.arrange.costs import least, price
+from echousd.repair.arrange.costs import least, price, soon_told
 from echousd.repair.arrange.groups import paid_by, seat_evenly, slide_groups
 from echousd.repair.arrange.places import places
 from echousd.repair.arrange.setting import Setting, State
@@ -18,7 +18,8 @@ from echousd.repair.arrange.setting import Setting, State
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
-BLOCK = 16  # poses that are priced together at first
+BLOCK, FEW = 48, 8  # poses that are looked at together, and of these the ones that are priced first
+HAIR = 1e-9  # of rounding in sums of the same costs in another order
 BAD = 1.8  # a piece that pays more comes earlier in the next round
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 
@@ -134,17 +135,25 @@ def _anchors_first(setting: Setting, order: np.ndarray) -> list[int]:
 def _put(setting: Setting, state: State, i: int) -> tuple[float, float]:
     """Put box i at its cheapest pose; what that pose costs by itself, and what it costs among the others.
 
-    Poses are priced in the order of what they cost at the least, until none that is left can be cheaper.
+    Poses are looked at in the order of what they cost at the least, until none that is left can be cheaper; of a block
+    those alone are priced whose parts that are soon told leave that open. Of equal ones the first counts.
     """
     poses = places(setting, state, i)
     bound = least(setting, state, i, poses)
     order = np.argsort(bound, kind="stable")
-    best, at, start, block = np.inf, 0, 0, BLOCK
+    best, rank, start = np.inf, len(order), 0
     while start < len(order) and bound[order[start]] < best:
-        rows = order[start : start + block]
-        cost = price(setting, state, i, poses.take(rows))
-        if cost.min() < best:
-            best, at = float(cost.min()), int(rows[cost.argmin()])
-        start, block = start + block, block * 2
+        rows = order[start : start + BLOCK]
+        block = poses.take(rows)
+        known = soon_told(setting, state, i, block, bound[rows])
+        promising = np.argsort(known.floor, kind="stable")
+        for few in (promising[:FEW], promising[FEW:]):
+            few = np.sort(few[known.floor[few] < best + HAIR])
+            if not len(few):
+                break
+            cost = price(setting, state, i, block.take(few), known.take(few))
+            best, rank = min((best, rank), (float(cost.min()), start + int(few[cost.argmin()])))
+        start += BLOCK
+    at = int(order[rank])
     state.position[i], state.yaw[i], state.placed[i] = poses.position[at], poses.yaw[at], True
     return float(poses.price[at]), best

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from echomodel.rules.sets import APART
@@ -37,22 +39,62 @@ def least(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     return out
 
 
-def price(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
-    """(K,) float: what it costs to put box i at each pose among what is placed."""
-    total = least(setting, state, i, poses) + missing(setting, state, i, poses) + unseen(setting, state, i, poses)
-    size = setting.size[i]
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The part of the cost that is soon told, of box i at K poses.
+
+    Arguments:
+        others: (m,) int, the other boxes that are placed. depth: (K, m) float, as `overlaps.depths` of them.
+        least, hit, left: (K,) float, what the pose itself costs, running into others, and leaving the floor.
+        aside: (K, s) float, metres by which the relations that name a side are missed.
+        floor: (K,) float, what the pose costs at the least.
+    """
+
+    others: np.ndarray
+    depth: np.ndarray
+    least: np.ndarray
+    hit: np.ndarray
+    left: np.ndarray
+    aside: np.ndarray
+    floor: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Known:
+        """The same of the poses of these numbers."""
+        of = (self.depth, self.least, self.hit, self.left, self.aside, self.floor)
+        return Known(self.others, *(values[rows] for values in of))
+
+
+def soon_told(setting: Setting, state: State, i: int, poses: Poses, bound: np.ndarray | None = None) -> Known:
+    """The part of `price` that costs little time; bound: (K,) float, `least` of the poses where it is known."""
+    bound = least(setting, state, i, poses) if bound is None else bound
     others = np.flatnonzero(state.placed)
     others = others[others != i]
+    size = setting.size[i]
     depth = depths(size, poses, setting.size[others], state.position[others], state.yaw[others])
-    if setting.standing(i):
-        total += uncomfortable(setting, state, i, poses, others, -depth)
-    depth = np.maximum(depth - setting.shared[i, others], 0.0)
-    total += (HIT * (depth > GRAZE) + DEEP * depth).sum(1)
+    beyond_shared = np.maximum(depth - setting.shared[i, others], 0.0)
+    hit = (HIT * (beyond_shared > GRAZE) + DEEP * beyond_shared).sum(1)
     out = np.maximum(beyond(setting, size, poses), 0.0)
-    total += HIT * (out > GRAZE) + DEEP * out
+    left = HIT * (out > GRAZE) + DEEP * out
+    aside = _aside(setting, state, i, poses)
+    floor = bound + hit + left
+    if aside.shape[1]:
+        _, other, sides = setting.told[i]
+        weight = np.where(state.placed[other[sides]], 1.0, UNPLACED)
+        floor = floor + ((BROKEN * (aside > SLACK) + FAR * aside) * weight).sum(1)
+    return Known(others, depth, bound, hit, left, aside, floor)
+
+
+def price(setting: Setting, state: State, i: int, poses: Poses, known: Known | None = None) -> np.ndarray:
+    """(K,) float: what it costs to put box i at each pose among what is placed; known: `soon_told` of the poses."""
+    known = known or soon_told(setting, state, i, poses)
+    total = known.least + missing(setting, state, i, poses) + unseen(setting, state, i, poses)
     if setting.standing(i):
-        total += _in_zones(setting, state, i, poses, others)
-    return total + _relations(setting, state, i, poses)
+        total += uncomfortable(setting, state, i, poses, known.others, -known.depth)
+    total += known.hit
+    total += known.left
+    if setting.standing(i):
+        total += _in_zones(setting, state, i, poses, known.others)
+    return total + _relations(setting, state, i, poses, known.aside)
 
 
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
@@ -145,26 +187,38 @@ def _front(yaw: np.ndarray) -> np.ndarray:
     return np.stack([np.sin(yaw), np.zeros_like(yaw), np.cos(yaw)], -1)
 
 
-def _relations(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+def _aside(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K, s): metres by which the relations of box i that name a side are missed.
+
+    Sides are a matter of the centres alone here: whatever runs into the other pays for that anyway.
+    """
+    _, other, sides = setting.told[i]
+    if not sides.any():
+        return np.zeros((len(poses), 0))
+    other = other[sides]
+    where = np.where(state.placed[other, None], state.position[other], setting.draft[other])
+    asked = setting.order[other, i]
+    along = (poses.position[:, None, [0, 2]] - where[:, [0, 2]]) * asked
+    return np.where(asked != 0, APART + SLACK - along, 0.0).max(2).clip(min=0)
+
+
+def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.ndarray) -> np.ndarray:
     """Broken relations between box i and others, those that are not placed at a small weight."""
     told, other, sides = setting.told[i]
     count = len(poses)
     if not len(told):
         return np.zeros(count)
     weight = np.where(state.placed[other], 1.0, UNPLACED)
-    where = np.where(state.placed[:, None], state.position, setting.draft)
     missed = np.zeros((count, len(told)))
-    # sides are a matter of the centres alone here: whatever runs into the other pays for that anyway
-    asked = setting.order[other[sides], i]
-    along = (poses.position[:, None, [0, 2]] - where[other[sides]][:, [0, 2]]) * asked
-    missed[:, sides] = np.where(asked != 0, APART + SLACK - along, 0.0).max(2).clip(min=0)
+    missed[:, sides] = aside
     if (~sides).any():
-        missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides], where)
+        missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides])
     return ((BROKEN * (missed > SLACK) + FAR * missed) * weight).sum(1)
 
 
-def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose and the others at `where`."""
+def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray) -> np.ndarray:
+    """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose, the others placed or drafted."""
+    where = np.where(state.placed[:, None], state.position, setting.draft)
     count, n = len(poses), len(setting.size)
     size = np.concatenate([setting.size, np.broadcast_to(setting.size[i], (count, 3))])
     heading = np.where(state.placed, state.yaw, setting.heading)
