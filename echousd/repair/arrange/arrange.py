@@ -18,7 +18,7 @@ from echousd.repair.arrange.setting import Setting, State
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
-BLOCK, FEW = 48, 8  # poses that are looked at together, and of these the ones that are priced first
+BLOCK, FEW = 64, 24  # poses that are looked at together, and of these the ones that are priced first
 HAIR = 1e-9  # of rounding in sums of the same costs in another order
 BAD = 1.8  # a piece that pays more comes earlier in the next round
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}

@@ -220,16 +220,15 @@ def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarr
     """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose, the others placed or drafted."""
     where = np.where(state.placed[:, None], state.position, setting.draft)
     count, n = len(poses), len(setting.size)
-    size = np.concatenate([setting.size, np.broadcast_to(setting.size[i], (count, 3))])
+    every = np.concatenate([np.arange(n), np.full(count, i)])
     heading = np.where(state.placed, state.yaw, setting.heading)
     position = np.concatenate([where, poses.position])
     yaw = np.concatenate([heading, poses.yaw])
-    rows = np.broadcast_to(told, (count, len(told), 3)).copy()
-    own = np.broadcast_to((told == i) & [True, False, True], rows.shape)
-    rows[own] = np.broadcast_to(n + np.arange(count)[:, None, None], rows.shape)[own]
-    fronts = np.append(setting.fronts, np.repeat(setting.fronts[i], count))
+    rows = np.empty((count, *told.shape), told.dtype)
+    rows[:] = told
+    rows[:, (told == i) & [True, False, True]] = n + np.arange(count)[:, None]
     margin, _ = pair_margins(
-        size, position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre, fronts=fronts,
-        slopes=False,
+        setting.size[every], position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre,
+        fronts=setting.fronts[every], slopes=False,
     )  # fmt: skip
     return np.maximum(SLACK - margin.reshape(count, -1), 0.0)

@@ -22,10 +22,12 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     """(K,): the price of places that those who attend box i, and are not placed, would miss at each pose."""
     out = np.zeros(len(poses))
     for slots, asked, members in _waiting(setting, state, i):
-        best = slots if asked.any() else [slot for slot in slots if slot[3] <= 0.11]
-        if not best:  # all of its places are far-fetched
+        if (members[0], i) not in setting.spots:
+            best = slots if asked.any() else [slot for slot in slots if slot[3] <= 0.11]
+            setting.spots[members[0], i] = np.array(_distinct(best, 0.3)).reshape(-1, 2)
+        local = setting.spots[members[0], i]
+        if not len(local):  # all of its places are far-fetched
             continue
-        local = np.array(_distinct(best, 0.3))
         c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
         offset = np.stack([c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0]], -1)
         points = poses.position[:, None, [0, 2]] + offset

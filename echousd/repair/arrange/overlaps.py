@@ -27,7 +27,7 @@ def depths(size: np.ndarray, poses: Poses, others: np.ndarray, position: np.ndar
 
 def beyond(setting: Setting, size: np.ndarray, poses: Poses) -> np.ndarray:
     """(K,) float: how far a box at each pose leaves the floor, metres."""
-    corners = footprints(np.broadcast_to(size, (len(poses), 3)), poses.position, poses.yaw).reshape(-1, 2)
+    corners = footprints(size[None], poses.position, poses.yaw).reshape(-1, 2)
     out = -depth_inside(setting.floor, corners).reshape(len(poses), 4).min(1)
     if len(setting.floor.reflex):
         offset = setting.floor.reflex[None] - poses.position[:, None, [0, 2]]

@@ -97,11 +97,15 @@ def _as_told(setting: Setting, i: int, poses: Poses) -> Poses:
 
 def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
     """Where box i may stand in the frame of its anchor; empty where its row does not say."""
+    if (i, anchor) in setting.slots:
+        return setting.slots[i, anchor]
     stands = stance(setting, i, anchor)
     if stands not in STANDS:
         return []
     count = int(((setting.anchor == anchor) & setting.seats).sum())
-    return STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
+    found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
+    setting.slots[i, anchor] = found
+    return found
 
 
 def stance(setting: Setting, i: int, anchor: int) -> str:

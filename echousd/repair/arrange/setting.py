@@ -102,6 +102,16 @@ class Setting:
         return {}
 
     @cached_property
+    def slots(self) -> dict[tuple[int, int], list[tuple[float, float, float, float]]]:
+        """Slots of a box at what it attends, kept when they are asked for again (`places.slots_at`)."""
+        return {}
+
+    @cached_property
+    def spots(self) -> dict[tuple[int, int], np.ndarray]:
+        """(S, 2) the distinct places among them, kept when they are asked for again (`outlook.missing`)."""
+        return {}
+
+    @cached_property
     def seats(self) -> np.ndarray:
         """(n,) bool, pieces of the role seat."""
         return np.array([kind.role == "seat" for kind in self.kinds], bool)
