@@ -18,7 +18,7 @@ from echousd.repair.arrange.setting import Setting, State
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
-BLOCK, FEW = 64, 24  # poses that are looked at together, and of these the ones that are priced first
+BLOCK, FEW = 64, 24  # poses that are looked at together at first, and those that are priced before the others
 HAIR = 1e-9  # of rounding in sums of the same costs in another order
 BAD = 1.8  # a piece that pays more comes earlier in the next round
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
@@ -141,9 +141,9 @@ def _put(setting: Setting, state: State, i: int) -> tuple[float, float]:
     poses = places(setting, state, i)
     bound = least(setting, state, i, poses)
     order = np.argsort(bound, kind="stable")
-    best, rank, start = np.inf, len(order), 0
+    best, rank, start, count = np.inf, 0, 0, BLOCK
     while start < len(order) and bound[order[start]] < best:
-        rows = order[start : start + BLOCK]
+        rows = order[start : start + count]
         block = poses.take(rows)
         known = soon_told(setting, state, i, block, bound[rows])
         promising = np.argsort(known.floor, kind="stable")
@@ -151,9 +151,9 @@ def _put(setting: Setting, state: State, i: int) -> tuple[float, float]:
             few = np.sort(few[known.floor[few] < best + HAIR])
             if not len(few):
                 break
-            cost = price(setting, state, i, block.take(few), known.take(few))
+            cost = price(setting, state, i, block.take(few), known.take(few), best + HAIR)
             best, rank = min((best, rank), (float(cost.min()), start + int(few[cost.argmin()])))
-        start += BLOCK
+        start, count = start + count, 4 * count
     at = int(order[rank])
     state.position[i], state.yaw[i], state.placed[i] = poses.position[at], poses.yaw[at], True
     return float(poses.price[at]), best

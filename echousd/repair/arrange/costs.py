@@ -84,8 +84,14 @@ def soon_told(setting: Setting, state: State, i: int, poses: Poses, bound: np.nd
     return Known(others, depth, bound, hit, left, aside, floor)
 
 
-def price(setting: Setting, state: State, i: int, poses: Poses, known: Known | None = None) -> np.ndarray:
-    """(K,) float: what it costs to put box i at each pose among what is placed; known: `soon_told` of the poses."""
+def price(
+    setting: Setting, state: State, i: int, poses: Poses, known: Known | None = None, below: float = np.inf
+) -> np.ndarray:
+    """(K,) float: what it costs to put box i at each pose among what is placed.
+
+    Arguments:
+        known: `soon_told` of the poses. below: costs that are certainly not less may be told as infinite.
+    """
     known = known or soon_told(setting, state, i, poses)
     total = known.least + missing(setting, state, i, poses) + unseen(setting, state, i, poses)
     if setting.standing(i):
@@ -94,7 +100,11 @@ def price(setting: Setting, state: State, i: int, poses: Poses, known: Known | N
     total += known.left
     if setting.standing(i):
         total += _in_zones(setting, state, i, poses, known.others)
-    return total + _relations(setting, state, i, poses, known.aside)
+    cheap = np.flatnonzero(total < below)
+    out = np.full(len(poses), np.inf)
+    if len(cheap):
+        out[cheap] = total[cheap] + _relations(setting, state, i, poses.take(cheap), known.aside[cheap])
+    return out
 
 
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
