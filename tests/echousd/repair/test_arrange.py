@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from echomodel.openings import Opening
 from echomodel.rules.living import faults
 from echomodel.vocabulary import vocabulary
 from echousd.repair import RepairConfig, repair_boxes
+from echousd.repair.arrange.costs import least, price
+from echousd.repair.arrange.places import places
 
 FLOOR = np.array([(-2.2, -1.9), (2.2, -1.9), (2.2, 1.9), (-2.2, 1.9)])
 ID = {p.name: p.id for p in vocabulary().predicates}
@@ -47,6 +51,26 @@ def test_equal_drafts_give_equal_rooms():
     one, two = bedroom(), bedroom()
     assert np.array_equal(one.position, two.position)
     assert np.array_equal(one.yaw, two.yaw)
+
+
+def test_the_pose_taken_is_the_cheapest_of_all(monkeypatch):
+    module = import_module("echousd.repair.arrange.arrange")
+    put, seen = module._put, []
+
+    def checked(setting, state, i):
+        poses = places(setting, state, i)
+        poses = poses.take(np.argsort(least(setting, state, i, poses), kind="stable"))
+        cost = price(setting, state, i, poses)
+        own, best = put(setting, state, i)
+        assert best == pytest.approx(cost.min(), abs=1e-9)
+        assert np.array_equal(state.position[i], poses.position[cost.argmin()])
+        assert state.yaw[i] == poses.yaw[cost.argmin()]
+        seen.append(len(poses))
+        return own, best
+
+    monkeypatch.setattr(module, "_put", checked)
+    bedroom()
+    assert max(seen) > module.BLOCK  # more than are looked at together
 
 
 @pytest.mark.parametrize("edge", range(4))
