@@ -12,6 +12,7 @@ from echomodel.rules.living.found import Found, found
 from echomodel.rules.living.plan import Plan, kind_of
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
+SHORTER = 0.85  # times the least usual side, where the row of a category names usual sizes
 USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 
 ELBOWS = 0.05  # metres between two chairs
@@ -24,8 +25,11 @@ def size_range(category: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Smallest and largest side lengths x, y, z in metres that a person takes for one of the category."""
     from echomodel.data.furniture.sizes import size_statistics
 
-    table = size_statistics(category)
-    return tuple((table.low * SMALLEST).tolist()), tuple((table.high * LARGEST).tolist())
+    table, usual = size_statistics(category), kind_of(category).usual
+    low, high = table.low * SMALLEST, table.high * LARGEST
+    if usual:  # a bed of 1.5 m is longer than half of what few beds have, and yet nobody sleeps in it
+        low = np.maximum(low, np.array([side[0] for side in usual]) * SHORTER)
+    return tuple(low.tolist()), tuple(high.tolist())
 
 
 def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndarray) -> np.ndarray:
