@@ -181,8 +181,10 @@ def test_a_built_package_carries_the_plugin(tmp_path):
     built = tmp_path / "build" / "lib"
     for name in ("schema.usda", "regenerate.py", "resources/plugInfo.json", "resources/generatedSchema.usda"):
         assert (built / "echousd" / "schemas" / name).read_bytes() == (SCHEMAS / name).read_bytes()
-    code = (
-        f"import sys; sys.path.insert(0, {str(built)!r})\nimport echousd.plugin; print(echousd.plugin.plugin_path())\n"
+    code = (  # the finder of an editable install goes before the path
+        f"import sys; sys.path.insert(0, {str(built)!r})\n"
+        "sys.meta_path[:] = [f for f in sys.meta_path if 'editable' not in getattr(f, '__module__', '')]\n"
+        "import echousd.plugin; print(echousd.plugin.plugin_path())\n"
         "print(echousd.plugin.is_active())"
     )
     done = python(code, cwd=tmp_path)

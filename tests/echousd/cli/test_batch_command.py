@@ -69,7 +69,12 @@ def test_ctrl_c_ends_a_run_within_seconds(tmp_path):
     (tmp_path / "run.py").write_text(script)
     words = ["batch", "--sample", "bedroom:40", "--shapes", "boxes", "--workers", "1", "-o", "out"]
     run = subprocess.Popen(
-        [sys.executable, "run.py", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "run.py", *words],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a job in the background ignores it
     )
     until = time.monotonic() + 120
     while not (tmp_path / "out" / ".batch" / "shard_0_of_1" / "journal.jsonl").is_file() and time.monotonic() < until:
