@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
-from echousd.batches.run import BatchProgress, Run
+from echousd.batches.run import Run, RunOptions
 from echousd.naming import free_name
 from echousd.room.folder import check_writable
 from echousd.room.lock import locked
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from echousd.batches.work import Job
     from echousd.graph import SceneGraph
     from echousd.room import Room
-
-MEMORY = 4096  # MiB that a worker may hold
 
 
 @dataclass(frozen=True)
@@ -58,19 +56,9 @@ def batch(
     count: int = 1,
     seed: int = 0,
     variations: Mapping[str, Sequence[Any]] | None = None,
-    workers: int | None = None,
-    shard: tuple[int, int] = (0, 1),
-    resume: bool = False,
-    max_failures: int | None = None,
-    timeout: float | None = None,
-    until: float | None = None,
-    memory: int | None = MEMORY,
-    ray: str = "",
-    executor: Executor | None = None,
-    progress: Callable[[BatchProgress], None] | None = None,
     **options: Any,
 ) -> BatchResult:
-    """Make many rooms in one folder, each whole or not at all; a run that was ended is gone on with (`resume`).
+    """Make many rooms in one folder, each whole or not at all; a run that was ended is gone on with (`resume=True`).
 
     The rooms are the same bytes for any number of workers and shards, whatever died on the way.
 
@@ -80,59 +68,36 @@ def batch(
         sample: room type -> how many graphs are drawn from the room generator.
         count, seed: rooms of each graph, the first with this seed, the next with one more.
         variations: option -> values, whose combinations a graph's rooms take in turn.
-        workers: processes, None = one a core. shard: (i, n), the i-th of n parts of the plan.
-        resume: go on with the run in `out`: rooms that are complete and valid stay.
-        max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
-        memory: MiB a worker; a room that needs more fails.
-        ray: `auto` or the address of a Ray cluster, whose nodes see `out` under the same path; "" = processes here.
-        executor: runs the tasks in place of either.
-        progress: called after every room.
-        options: fields of `echousd.batches.options.BatchOptions`.
+        options: of the rooms, fields of `echousd.batches.options.BatchOptions` (shapes, weights, drafts, dress ...);
+            of the run, fields of `echousd.batches.run.RunOptions`: workers, shard=(i, n), resume, max_failures,
+            timeout, until, memory, ray, executor, progress.
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
     given = [sources] if isinstance(sources, str | Path) else list(sources)
+    how = {field.name: options.pop(field.name) for field in fields(RunOptions) if field.name in options}
     raw = {
         "sources": as_paths(given), "sample": dict(sample or {}), "count": count, "seed": seed,
         "options": options, "variations": {key: list(values) for key, values in (variations or {}).items()},
     }  # fmt: skip
-    return run_batch(
-        request_of(raw, "batch"), Path(out), workers=workers, shard=shard, resume=resume, max_failures=max_failures,
-        timeout=timeout, until=until, memory=memory, ray=ray, executor=executor, progress=progress,
-    )  # fmt: skip
+    return run_batch(request_of(raw, "batch"), Path(out), RunOptions(**how))
 
 
-def run_batch(
-    request: BatchRequest,
-    out: Path,
-    *,
-    workers: int | None = None,
-    shard: tuple[int, int] = (0, 1),
-    resume: bool = False,
-    max_failures: int | None = None,
-    timeout: float | None = None,
-    until: float | None = None,
-    memory: int | None = MEMORY,
-    ray: str = "",
-    executor: Executor | None = None,
-    progress: Callable[[BatchProgress], None] | None = None,
-) -> BatchResult:
+def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     """`batch` for a checked request."""
-    if not 0 <= shard[0] < shard[1]:
-        raise ValueError(f"shard is {shard[0]}/{shard[1]}, allowed: i/n with i from 0 to n - 1")
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
     plan = make_plan(request, weights_hash(request.options.weights))
-    place = shard_folder(out, shard)
+    place = shard_folder(out, how.shard)
     with locked(place):
-        _agree_on(plan, out, resume=resume or shard[1] > 1)
-        valid = _valid(plan, out, shard)
+        _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
+        valid = _valid(plan, out, how.shard)
         rounds = {name: row.get("rounds", 1) for name, row in read_journals(out).items() if name in valid}
         journal = Journal(place)
-        pool = executor or _executor(ray, workers, len(plan.entries), timeout, memory)
-        seen = out.resolve() if ray else out  # workers elsewhere stand in another folder
-        run = Run(plan, plan.packs(shard), valid, seen, journal, rounds, max_failures, until, progress)
+        pool = how.executor or _executor(how, len(plan.entries))
+        seen = out.resolve() if how.ray else out  # workers elsewhere stand in another folder
+        run = Run(plan, plan.packs(how.shard), valid, seen, journal, how, rounds)
         try:
             end = run.execute(pool)
         finally:
@@ -192,12 +157,13 @@ def _judged(job: Job) -> Room | None:
     return found
 
 
-def _executor(ray: str, workers: int | None, rooms: int, timeout: float | None, memory: int | None) -> Executor:
-    if not ray:
-        return LocalWorkers(max(min(workers or cores(), rooms), 1), timeout=timeout, memory=memory)
+def _executor(how: RunOptions, rooms: int) -> Executor:
+    if not how.ray:
+        workers = max(min(how.workers or cores(), rooms), 1)
+        return LocalWorkers(workers, timeout=how.timeout, memory=how.memory)
     from echousd.batches.cluster import RayCluster
 
-    return RayCluster(ray, workers=workers, timeout=timeout, memory=memory)
+    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory)
 
 
 def cores() -> int:

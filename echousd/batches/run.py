@@ -14,6 +14,7 @@ from echousd.batches.executor import Executor, Outcome, Task
 from echousd.batches.journal import Journal
 from echousd.batches.plan import PACK, STORE, Entry, Plan
 
+MEMORY = 4096  # MiB that a worker may hold
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
 FULL = "No space left on device"
 NOTHING: tuple[work.Rows, ...] = ([],)
@@ -50,6 +51,39 @@ class BatchProgress:
         return rest / self.rate if self.rate > 0 else None
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How a plan is run; none of it changes a byte of a room.
+
+    Arguments:
+        workers: processes, None = one a core. shard: (i, n), the i-th of n parts of the plan.
+        resume: go on with the run in the folder: rooms that are complete and valid stay.
+        max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
+        memory: MiB a worker; a room that needs more fails.
+        ray: `auto` or the address of a Ray cluster, whose nodes see the folder under one path; "" = local processes.
+        executor: runs the tasks in place of either.
+        progress: called after every room.
+
+    Raises ValueError for a shard that is none of its parts.
+    """
+
+    workers: int | None = None
+    shard: tuple[int, int] = (0, 1)
+    resume: bool = False
+    max_failures: int | None = None
+    timeout: float | None = None
+    until: float | None = None
+    memory: int | None = MEMORY
+    ray: str = ""
+    executor: Executor | None = None
+    progress: Callable[[BatchProgress], None] | None = None
+
+    def __post_init__(self) -> None:
+        part, parts = self.shard
+        if not 0 <= part < parts:
+            raise ValueError(f"shard is {part}/{parts}, allowed: i/n with i from 0 to n - 1")
+
+
 @dataclass
 class _Pack:
     """Rooms whose layouts are sampled together.
@@ -73,8 +107,7 @@ class Run:
     Arguments:
         plan, packs: what there is to do; skip: ids of the rooms that are complete and valid; rounds: how many
             rounds of drafts they took.
-        folder: of the run. journal: of the shard.
-        max_failures: failed rooms after which the run stops, None = never. until: `time.time()` at which it does.
+        folder: of the run. journal: of the shard. how: when it stops, and who is told.
     """
 
     plan: Plan
@@ -82,10 +115,8 @@ class Run:
     skip: frozenset[str]
     folder: Path
     journal: Journal
+    how: RunOptions
     rounds: dict[str, int] = field(default_factory=dict)
-    max_failures: int | None = None
-    until: float | None = None
-    tell: Callable[[BatchProgress], None] | None = None
     stopped: str = ""
     _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
     _more: deque[_Pack] = field(default_factory=deque)
@@ -127,16 +158,17 @@ class Run:
                     layouts_out -= 1
                     self._drawn(asked, outcome, progress)
             progress.seconds, progress.megabytes = time.monotonic() - began, executor.megabytes
-            if self.tell is not None:
-                self.tell(progress)
+            if self.how.progress is not None:
+                self.how.progress(progress)
         return progress
 
     def _check_stop(self, progress: BatchProgress) -> None:
         if self.stopped:
             return
-        if self.max_failures is not None and progress.failed > self.max_failures:
-            self.stopped = f"{progress.failed} rooms failed, allowed: {self.max_failures}"
-        elif self.until is not None and time.time() >= self.until:
+        most, until = self.how.max_failures, self.how.until
+        if most is not None and progress.failed > most:
+            self.stopped = f"{progress.failed} rooms failed, allowed: {most}"
+        elif until is not None and time.time() >= until:
             self.stopped = "the time is over"
 
     def _submit_layouts(self, executor: Executor, pack: tuple[Entry, ...], progress: BatchProgress) -> int:

@@ -75,6 +75,7 @@ def run(
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import run_batch
     from echousd.batches.options import parse_sample, read_toml, request_of
+    from echousd.batches.run import RunOptions
     from echousd.batches.verify import finish
 
     words = list(sources or [])
@@ -96,10 +97,11 @@ def run(
     raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
     request = request_of(raw, files[0] if files else "batch")
     with _shown(json) as tell:
-        result = run_batch(
-            request, output, workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures,
-            timeout=timeout, until=_clock(until), memory=memory, ray=ray, progress=tell,
+        how = RunOptions(
+            workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,
+            until=_clock(until), memory=memory, ray=ray, progress=tell,
         )  # fmt: skip
+        result = run_batch(request, output, how)
     found = finish(output, webdataset=webdataset)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
     say(f"run      {output}: {found['done']} of {found['rooms']} rooms; see {output / 'index.html'}", err=json)
