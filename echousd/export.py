@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pxr import Sdf, Usd, UsdUtils
 
+from echousd.arkit import for_arkit
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.flattening import flat_layer
 from echousd.packing import Package, Reach, images_beside, without_clock
@@ -40,7 +41,7 @@ def export(
     Arguments:
         room: root layer of the room.
         out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
-        arkit: usdz with one usdc inside, as Apple's viewers want it.
+        arkit: usdz as Apple's viewers want it: one usdc inside, Y up, without lights and scene graph.
         force: replace a file that is in the way.
         physics: keep bodies, colliders, joints and the scene, or none of it; None = in flat USD alone.
         layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
@@ -79,6 +80,8 @@ def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False, physics: bo
     """A usdz package of one flat layer and its images."""
     root = package.reach.room
     layer = _marked(flat_layer(stage, package=package, physics=physics), stage)
+    if arkit:
+        for_arkit(layer)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         folder = Path(scratch)
         package.write(folder)

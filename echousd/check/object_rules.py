@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
 from echousd.check.findings import Finding, Rule
+from echousd.graph.nodes import OBSTACLE
 from echousd.stage import encoding as usd
 from echousd.stage.contents import read_contents, room_frame
 from echousd.stage.encoding import StageError
@@ -58,6 +59,8 @@ def one_label(stage: Usd.Stage) -> Iterator[Finding]:
                 continue
             if len(words) > 1:
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
+            elif words and words[0] == value(prim, f"{usd.FREE}{OBSTACLE}"):
+                continue
             elif words and isinstance(category, str) and known_category(words[0]) != known_category(category):
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {words[0]!r}, {usd.CATEGORY} {category!r}")
         for prim in _others(room):

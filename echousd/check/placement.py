@@ -52,6 +52,8 @@ def find_misplaced(room: RoomContents) -> tuple[Misplacement, ...]:
         if bottom < -FLOATING:
             found.append(Misplacement(thing.node.name, "sunk", -bottom))
             continue
+        if thing.node.obstacle:  # held by what only its own stage knows
+            continue
         air = _air_below(thing, room.objects)
         if air > FLOATING and not _held(thing, floor, height):
             found.append(Misplacement(thing.node.name, "floating", air))

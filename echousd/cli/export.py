@@ -20,7 +20,9 @@ def register(app: typer.Typer) -> None:
 def export(
     room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)],
-    arkit: Annotated[bool, typer.Option("--arkit", help="usdz for Apple's viewers (a usdc inside).")] = False,
+    arkit: Annotated[
+        bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
+    ] = False,
     search: Annotated[
         list[Path] | None,
         typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),

@@ -11,6 +11,8 @@ from echomodel.openings import check_openings, rectangle
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError
 
+OBSTACLE = "obstacle"  # attribute of what stands in the way and is no furniture that we know
+
 
 class PlainModel(BaseModel):
     """Frozen, without unknown fields, and with errors of one line."""
@@ -133,6 +135,12 @@ class Node(PlainModel):
         if self.asset is not None and self.source not in (None, "own", "library"):
             raise GraphError(f"asset is given, but source is {self.source!r}, allowed: own or library", ("source",))
         return self
+
+    @property
+    def obstacle(self) -> str:
+        """What it is in its own stage's words, where the vocabulary has none for it; "" for furniture."""
+        word = self.attributes.get(OBSTACLE)
+        return word if isinstance(word, str) else ""
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:

@@ -34,7 +34,8 @@ def adopted(
         raise ValueError(f"{file}: has a scene graph already; echousd generate and echousd update go on with it")
     graph, paths = foreign_pieces(stage, room)
     theirs = tuple(
-        node.replaced(locked=True, asset=joined(file.absolute().as_posix(), paths[node.name])) for node in graph.nodes
+        node.replaced(locked=True, source=None, asset=joined(file.absolute().as_posix(), paths[node.name]))
+        for node in graph.nodes
     )
     graph = graph.replaced(nodes=theirs)
     for node in lacking(graph) if add is None else map(_node, add):

@@ -23,7 +23,7 @@ from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
 from echousd.room.surface import surface
-from echousd.room.taxonomy import ade20k
+from echousd.room.taxonomy import ade20k, word_of
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
@@ -106,7 +106,7 @@ def geometry_layer(room: RoomData) -> Sdf.Layer:
         Usd.ModelAPI(UsdGeom.Xform.Define(stage, path)).SetKind(Kind.Tokens.group)
     for node in room.graph.nodes:
         prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
-        _label(prim, "ade20k", ade20k(node.category))
+        _label(prim, "ade20k", ade20k(word_of(node)))
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
 
 
@@ -269,11 +269,11 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         if name in room.carried:
             return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)
-        return Asset(name, {}, component.files(name, room.graph.node(user).category, geometry, data, folder))
+        return Asset(name, {}, component.files(name, word_of(room.graph.node(user)), geometry, data, folder))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
-    return _written(room, name, room.graph.node(user).category, room.styles[user], geometry)
+    return _written(room, name, word_of(room.graph.node(user)), room.styles[user], geometry)
 
 
 def _small_asset(room: RoomData, name: str, dressing: Dressing) -> Asset:

@@ -9,8 +9,11 @@ import trimesh
 from pxr import Gf, Usd, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
+from echousd.graph.nodes import OBSTACLE
 from echousd.room.ballast import LEAST_INERTIA, ballasted
 from echousd.room.geometry import Collider, Geometry, Mass
+
+SOLID = 200.0  # kg/m³ of what nobody knows
 
 
 def mass_of(geometry: Geometry, category: str) -> Mass:
@@ -24,11 +27,16 @@ def mass_of(geometry: Geometry, category: str) -> Mass:
     if geometry.mass is not None:
         return geometry.mass
     size = np.ptp(geometry.mesh.bounds, axis=0)
-    kilograms = round(max(0.2, float(np.prod(size)) * vocabulary().category(category).density), 2)
+    kilograms = round(max(0.2, float(np.prod(size)) * density(category)), 2)
     middle, tensor = _spread(geometry.colliders)
     moments, axes = np.linalg.eigh(kilograms * tensor)
     mass = Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes)
     return ballasted(mass, [collider.mesh.vertices for collider in geometry.colliders])
+
+
+def density(category: str) -> float:
+    """Kilograms of a cubic metre of a piece's whole box."""
+    return SOLID if category == OBSTACLE else vocabulary().category(category).density
 
 
 def _spread(colliders: Iterable[Collider]) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from pxr import Gf, Usd, UsdPhysics, UsdShade
 
 from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
+from echousd.graph.nodes import OBSTACLE
 from echousd.room.geometry import Geometry, Mass
 from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
 from echousd.room.masses import mass_of, write_mass
@@ -24,7 +25,9 @@ WOODEN = (0.6, 0.5, 0.05)  # of every other slot
 
 
 def movable(category: str) -> bool:
-    """Whether an object of this category is a rigid body; what hangs on a wall or a ceiling is not."""
+    """Whether an object of this category is a rigid body; what hangs on a wall or a ceiling and obstacles are not."""
+    if category == OBSTACLE:
+        return False
     if category in SMALL:
         return not SMALL[category].fixed
     return vocabulary().category(category).support in ("floor", "table")

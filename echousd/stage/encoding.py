@@ -117,7 +117,7 @@ def opening_values(opening: Opening) -> dict[str, Any]:
 
 def node_values(node: Node) -> dict[str, Any]:
     """The authored properties of a node's prim, in USD's types, for the `Node` `node`."""
-    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category])}
+    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.obstacle or node.category])}
     if node.style is not None:
         values[STYLE] = node.style
     if node.size is not None:

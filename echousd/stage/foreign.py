@@ -14,13 +14,14 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
+from echousd.graph.nodes import OBSTACLE
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.labels import category_of_name, is_floor, is_structure, known_category, labels, room_word
 from echousd.stage.units import metres_per_unit, up_axis
 
-OBSTACLE = "cabinet"  # what a fixed thing of an unknown class is taken for
+TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
 LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
 STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
@@ -89,9 +90,10 @@ def foreign_graph(
     """The nodes of a stage without a scene graph: its topmost prims with semantics labels and bounds, boxes fixed.
 
     A label of any SemanticsLabelsAPI instance or of Omniverse's SemanticsAPI counts if the vocabulary knows it; the
-    instance `category` is asked first. Large things of unknown labels become locked obstacles. Lengths and axes are
-    converted to metres and +Y up. A prim labelled `floor` gives the floor. Without `room_type` it is guessed: by a
-    prim's name or label, else by the furniture. Warns `SkippedPrims`; raises StageError where nothing is left.
+    instance `category` is asked first. Large things of unknown labels become fixed obstacles: locked boxes that keep
+    their label. Lengths and axes are converted to metres and +Y up. A prim labelled `floor` gives the floor. Without
+    `room_type` it is guessed: by a prim's name or label, else by the furniture. Warns `SkippedPrims`; raises StageError
+    where nothing is left.
 
     Arguments:
         names: what has no label is known by the name of its asset or prim.
@@ -167,7 +169,7 @@ def _read(stage: Usd.Stage, *, names: bool) -> _Found:
             if not words or any(is_structure(word) for word in words):
                 continue
             if not _holds_furniture(prim) and _is_large(frame.box(_object_bound(cache, prim))):
-                category, told = OBSTACLE, {"obstacle": words[0]}
+                category, told = TAKEN_FOR, {OBSTACLE: words[0]}
                 obstacles[words[0]] += 1
             else:
                 skipped[f"unknown label {words[0]!r}"] += 1
@@ -181,8 +183,9 @@ def _read(stage: Usd.Stage, *, names: bool) -> _Found:
         name = free_name(Tf.MakeValidIdentifier(ascii_name), taken)
         taken.add(name)
         node = Node(
-            name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told
-        )
+            name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told,
+            source="boxes" if told else None,
+        )  # fmt: skip
         found.nodes.append((prim.GetPath(), node))
     _tell(stage, skipped, obstacles)
     if not found.nodes:

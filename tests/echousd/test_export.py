@@ -74,6 +74,29 @@ def test_usdz_for_arkit_has_one_crate_without_whole_number_doubles(root, tmp_pat
                 assert attribute.GetTypeName() == "float3"
 
 
+@pytest.mark.parametrize("up_axis", ["Y", "Z"])
+@pytest.mark.parametrize("physics", [None, True])
+def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, physics, tmp_path):
+    options = RoomOptions(up_axis)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    root = room.save(tmp_path / "bedroom", preview=False)
+    stage = Usd.Stage.Open(str(export(root, tmp_path / "room.usdz", arkit=True, physics=physics)))
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    prims = list(stage.TraverseAll())
+    types = {str(prim.GetTypeName()) for prim in prims} | {a for prim in prims for a in prim.GetAppliedSchemas()}
+    assert not [name for name in types if name.startswith("Echo") or "Light" in name]
+    assert not [name for prim in prims for name in prim.GetPropertyNames() if name.startswith("echo:")]
+    assert {"Mesh", "Material", "Camera", "SemanticsLabelsAPI:category"} <= types
+    straight = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    wanted = world_bounds(Usd.Stage.Open(str(straight.save(tmp_path / "straight", preview=False))))
+    box = world_bounds(stage)
+    np.testing.assert_allclose([box.GetMin(), box.GetMax()], [wanted.GetMin(), wanted.GetMax()], atol=1e-4)
+    scenes = [UsdPhysics.Scene(prim) for prim in prims if prim.IsA(UsdPhysics.Scene)]
+    assert len(scenes) == (physics is True)
+    for scene in scenes:
+        np.testing.assert_allclose(scene.GetGravityDirectionAttr().Get(), (0, -1, 0), atol=1e-6)
+
+
 @pytest.mark.parametrize("ending", [".usda", ".usdc"])
 def test_flat_usd_keeps_the_graph_and_its_images(root, room, tmp_path, ending):
     path = export(root, tmp_path / "out" / f"room{ending}")

@@ -21,6 +21,7 @@ DEEP = 0.001  # metres that solids may reach into one another
 GAP = 0.001  # metres left between what was moved apart
 ROUNDS = 4  # moves a piece
 DIRECTIONS = 8
+GROUPS = 3  # sets of things that are tried for one move
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,8 @@ def cleared(
 ) -> Cleared:
     """Move what is free as little as possible until nothing starts inside anything else.
 
-    Relations are kept before distances, living rules after them; what is locked or has a position stays.
+    What is locked or has a position stays, and no relation that holds is broken: where only that would help, the two
+    stay where they are and are among the collisions. Living rules are kept before distances.
 
     Arguments:
         graph: N objects. boxes: N boxes in its order. geometry: name -> solids of each, in its own frame.
@@ -68,6 +70,7 @@ def cleared(
         walls: whether there are any; their sills and casings reach into the room.
     """
     scene = scene_of(graph, boxes, geometry, floor, walls=walls)
+    holds = frozenset(_unbroken(graph, boxes))
     moves = np.zeros((len(graph.nodes), 2))
     stuck: set[tuple[int, int]] = set()
     for _ in range(ROUNDS * max(len(graph.nodes), 1)):
@@ -75,7 +78,7 @@ def cleared(
         if not hits:
             break
         pair = hits[0][0]
-        found = _moved_apart(scene, graph, boxes, floor, moves, pair)
+        found = _moved_apart(scene, graph, boxes, floor, moves, pair, holds)
         if found is None:
             stuck.add(pair)
         else:
@@ -99,25 +102,63 @@ def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:
 
 
 def _moved_apart(
-    scene: Scene, graph: SceneGraph, boxes: Boxes, floor: np.ndarray, moves: np.ndarray, pair: tuple[int, int]
+    scene: Scene,
+    graph: SceneGraph,
+    boxes: Boxes,
+    floor: np.ndarray,
+    moves: np.ndarray,
+    pair: tuple[int, int],
+    holds: frozenset[int],
 ) -> np.ndarray | None:
-    """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere."""
+    """The moves with one of a pair moved out of everything, where most holds and it goes least far; None = nowhere.
+
+    What a thing would leave behind goes with it: a nightstand with its bed.
+
+    Arguments:
+        holds: numbers of the relations that must hold afterwards as well.
+    """
     best: tuple[float, ...] | None = None
     found = None
     for mover in pair:
         if mover >= len(graph.nodes) or scene.fixed[mover]:
             continue
-        group = scene.carried(mover)
-        space = scene.space(group, moves, GAP)
-        for way in _ways(space, scene.heading[mover]):
-            trial = moves.copy()
-            trial[group] += way
-            tried = _at(boxes, trial)
-            broken = sum(verdict.state == "broken" for verdict in relation_verdicts(graph, tried))
-            score = (broken, len(living_faults(graph, tried, floor)), scene.price(mover, way))
-            if best is None or score < best:
-                best, found = score, trial
+        other = pair[0] if mover == pair[1] else pair[1]
+        groups = [scene.carried(mover)]
+        for group in groups:
+            if other in group:
+                continue
+            for way in _ways(scene.space(group, moves, GAP), scene.heading[mover]):
+                trial = moves.copy()
+                trial[group] += way
+                tried = _at(boxes, trial)
+                kept = _unbroken(graph, tried)
+                broken = holds - kept
+                if broken:
+                    more = _with_partners(scene, graph, group, broken)
+                    if more not in groups and len(groups) <= GROUPS:
+                        groups.append(more)
+                    continue
+                price = scene.price(mover, way) * (1 + len(group) - len(groups[0]))
+                score = (-len(kept), len(living_faults(graph, tried, floor)), price)
+                if best is None or score < best:
+                    best, found = score, trial
     return found
+
+
+def _unbroken(graph: SceneGraph, boxes: Boxes) -> set[int]:
+    """Numbers of the relations that are not broken."""
+    return {row for row, verdict in enumerate(relation_verdicts(graph, boxes)) if verdict.state != "broken"}
+
+
+def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: set[int] | frozenset[int]) -> list[int]:
+    """A group and what it would leave behind: the free other ends of some relations, with all that stands on them."""
+    out = list(group)
+    for row in sorted(broken):
+        for name in (graph.relations[row].subject, graph.relations[row].object):
+            number = graph.names.index(name)
+            if number not in out and not scene.fixed[number]:
+                out += [one for one in scene.carried(number) if one not in out]
+    return out
 
 
 def _ways(space: shapely.geometry.base.BaseGeometry, heading: float) -> list[np.ndarray]:

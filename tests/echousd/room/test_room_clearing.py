@@ -15,6 +15,7 @@ from echousd.graph.openings import Opening
 from echousd.room.clearing import cleared
 from echousd.room.clearing.nofit import depth, forbidden, forbidden_moves
 from echousd.room.geometry import Collider, Geometry, Origin, Part
+from echousd.room.verdicts import relation_verdicts
 
 FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
 
@@ -97,6 +98,32 @@ def test_what_stands_on_a_piece_goes_with_it():
     assert found.collisions == ()
     assert found.moved["lamp"] == pytest.approx(found.moved["nightstand"])
     assert found.boxes.position[2, 0] == pytest.approx(1.051, abs=1e-3)
+
+
+def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
+    block = piece(board((1.0, 1.0, 1.0), (0, 0, 0)))
+    small = piece(board((0.4, 0.5, 0.4), (0, 0, 0)))
+    close = [Relation("stand", "close_by", "bed")]
+    things = (
+        ("wardrobe", "wardrobe", block, (-0.9, 0, 0), 0.0, True),
+        ("bed", "single_bed", block, (0.0, 0, 0), 0.0, False),
+    )
+    stand = ("stand", "nightstand", small, (-1.13, 0, 0.75), 0.0, False)
+    # their corners are 0.43 m apart, 0.45 m are allowed: where the bed goes, the nightstand must follow
+    graph, boxes, geometry = room(*things, stand, relations=close)
+    assert verdicts_of(graph, boxes) == ["kept"]
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert verdicts_of(graph, found.boxes) == ["kept"]
+    # locked where it is, nobody may go: the two stay, and are named
+    fixed = graph.replaced(nodes=tuple(node.replaced(locked=node.name != "bed") for node in graph.nodes))
+    found = cleared(fixed, boxes, geometry, FLOOR, walls=False)
+    assert verdicts_of(fixed, found.boxes) == ["kept"]
+    assert {found.collisions[0].first, found.collisions[0].second} == {"wardrobe", "bed"}
+
+
+def verdicts_of(graph, boxes):
+    return [verdict.state for verdict in relation_verdicts(graph, boxes)]
 
 
 @pytest.mark.parametrize("walls", [False, True])

@@ -213,6 +213,7 @@ def test_what_is_left_out_is_told():
     assert graph.names == ("bed", "piano")
     assert graph.node("piano").locked
     assert graph.node("piano").attributes == {"obstacle": "grand piano"}
+    assert (graph.node("piano").obstacle, graph.node("bed").obstacle) == ("grand piano", "")
 
 
 def test_labels_without_bounds_are_no_graph():

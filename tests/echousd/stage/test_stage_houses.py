@@ -1,9 +1,12 @@
 """Stages of others: without labels, with several rooms, with materials that cannot be read."""
 
 import pytest
-from pxr import Sdf, Usd, UsdGeom, UsdSemantics
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics
 
+import echousd
+from echousd.check import check_room
 from echousd.graph import SceneGraph
+from echousd.room import RoomOptions
 from echousd.stage import StageError, foreign_graph, foreign_rooms, open_stage, read_graph, relations_from_boxes
 from echousd.stage.files import MissingMaterials
 from echousd.stage.foreign import SkippedPrims
@@ -139,3 +142,32 @@ def test_the_command_offers_names_relations_and_rooms(tmp_path, echousd_command)
     none = echousd_command("graph", tmp_path / "house.usda", "--names", "--room", "/House/Attic")
     assert none.code == 2
     assert "no room '/House/Attic', allowed: /House/Bedroom, /House/LivingRoom_01" in none.err
+
+
+def test_an_obstacle_is_a_fixed_box_under_its_own_word(tmp_path):
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    for name, word, at in (("stool", "stool", (1.0, 0.5, 0)), ("harp", "concert harp", (-1.0, 1.5, 0))):
+        cube = UsdGeom.Cube.Define(stage, f"/{name}")
+        cube.CreateSizeAttr(1.0)
+        cube.AddTranslateOp().Set(at)
+        UsdSemantics.LabelsAPI.Apply(cube.GetPrim(), "class").CreateLabelsAttr([word])
+    with pytest.warns(SkippedPrims, match="fixed obstacles: 'concert harp'"):
+        graph = foreign_graph(stage)
+    assert (graph.node("harp").source, graph.node("stool").source) == ("boxes", None)
+    options = RoomOptions(walls=False)
+    room = echousd.generate(graph, shapes="boxes", drafts=1, options=options)
+    root = room.save(tmp_path / "room", preview=False)
+    made = Usd.Stage.Open(str(root))
+    for name, body, label, ade20k in (("harp", False, "concert harp", "box"), ("stool", True, "stool", "stool")):
+        prim = made.GetPrimAtPath(f"/Room/Objects/{name}")
+        assert prim.HasAPI(UsdPhysics.RigidBodyAPI) is body
+        assert any(below.HasAPI(UsdPhysics.CollisionAPI) for below in Usd.PrimRange(prim))
+        assert list(prim.GetAttribute("semantics:labels:category").Get()) == [label]
+        assert list(prim.GetAttribute("semantics:labels:ade20k").Get()) == [ade20k]
+    assert room.boxes.position[graph.names.index("harp")].tolist() == [-1.0, 1.0, 0.0]  # it may hang there
+    assert SceneGraph.from_stage(root).node("harp") == graph.node("harp")
+    report = check_room(root)
+    assert [wrong for layout in report.layouts for wrong in layout.placement] == []
+    assert [fault for fault in report.errors if fault.rule == "echo:OneLabel"] == []
