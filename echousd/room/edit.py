@@ -166,7 +166,7 @@ def edit(
             manifest.get("palette", ""),
         ),
         timings=timer.seconds,
-        edited=True,
+        edited=Path(root),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
     )
     warn_of_faults(room)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,20 +121,54 @@ def unfit_layer(looks: Sequence[Look], unfit: Mapping[str, Sequence[str]], data:
     return layer_bytes(layer, ".usda")
 
 
-def refitted(folder: Path, root: str, files: dict[str, bytes], current: bytes | None) -> list[str]:
+def brought(root: Path | None, folder: Path) -> dict[str, dict[str, bytes]]:
+    """The looks of a room that was edited, for another folder that it goes to.
+
+    Arguments:
+        root: root layer of the room that was edited, None = it was not. folder: where it goes.
+
+    Returns sublayer (`./looks/painted.usda`) -> path -> content of its files, strongest first; warns of those whose
+    place another look has.
+    """
+    if root is None or root.parent.resolve() == folder.resolve():
+        return {}
+    found: dict[str, dict[str, bytes]] = {}
+    stage = Usd.Stage.Open(str(root), Usd.Stage.LoadNone)  # holds the layers
+    for layer in stage.GetLayerStack(False):
+        place = Path(layer.realPath)
+        if place.parent != root.parent.resolve() / FOLDER:
+            continue
+        beside = sorted(place.with_suffix("").rglob("*"))
+        paths = [f"{FOLDER}/{each.relative_to(place.parent).as_posix()}" for each in (*beside, place) if each.is_file()]
+        content = {path: inside(root.parent, path, "a look").read_bytes() for path in paths}
+        other = [path for path in content if (folder / path).exists() and _bytes(folder / path) != content[path]]
+        if other:
+            told = f"{folder / other[0]}: is another look; that of {root.parent} is not taken along"
+            warnings.warn(told, stacklevel=5)
+            continue
+        found[f"./{FOLDER}/{place.name}"] = content
+    return found
+
+
+def refitted(
+    folder: Path, root: str, files: dict[str, bytes], current: bytes | None, edited: Path | None = None
+) -> tuple[dict[str, bytes], list[str]]:
     """Keep the looks that a room's root layer names, and mute what of them fits no longer.
 
     Arguments:
         folder: of the room. root: name of its root layer in `files`.
         files: path -> content of the room that will be written; the root layer is changed, `UNFIT` added if need be.
         current: bytes of the root layer that lies there now.
+        edited: root layer of the room that this one was edited from, whose looks go along.
 
-    Returns a sentence for every object whose paint is muted.
+    Returns the files of looks that go along, and a sentence for every object whose paint is muted.
     """
-    paths = [path for path in attached(current) if (folder / path).is_file()]
+    along = brought(edited, folder)
+    here = [path for path in attached(current) if (folder / path).is_file() and path not in along]
+    paths = [*along, *here]
     if not paths:
-        return []
-    looks = read_looks(folder, paths)
+        return {}, []
+    looks = [*(read_looks(edited.parent, along) if edited else []), *read_looks(folder, here)]
     # Beside the folder, so that what its layers refer to outside of it (a store) is found.
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.resolve().parent) as scratch:
         for path, content in {**files, root: _alone(files[root], files)}.items():
@@ -147,11 +182,15 @@ def refitted(folder: Path, root: str, files: dict[str, bytes], current: bytes | 
     if unfit:
         files[UNFIT] = unfit_layer(looks, unfit, {"generator": "echousd"})
     files[root] = with_looks(files[root], paths, unfit=bool(unfit))
-    return [
+    return {path: content for each in along.values() for path, content in each.items()}, [
         f"{folder / path}: {', '.join(name.rpartition('/')[2] for name in names)} changed or gone since painted; shown "
         "as made, export and paint again"
         for path, names in unfit.items()
     ]
+
+
+def _bytes(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None
 
 
 def _alone(root: bytes, files: Mapping[str, bytes]) -> bytes:

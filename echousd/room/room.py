@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -150,7 +151,8 @@ class RoomData:
         outcomes: what became of each layout, in their order.
         notes: what the graph asks for in vain, one sentence each.
         timings: stage of the pipeline -> seconds.
-        edited: it comes from a room that was there before; saved over that one it can be taken back.
+        edited: root layer of the room that it comes from, None = made anew; saved over that one it can be taken back,
+            saved elsewhere it takes that one's looks along.
         carried: asset name -> its files (path -> bytes), which are written again as they are.
     """
 
@@ -167,7 +169,7 @@ class RoomData:
     options: RoomOptions = RoomOptions()
     timings: Mapping[str, float] = field(default_factory=dict)
     carried: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
-    edited: bool = False
+    edited: Path | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

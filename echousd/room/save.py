@@ -78,7 +78,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files = room_files(room, shelf, folder)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     current = ownership.read(folder, root)
-    unfit = paintings.refitted(folder, root, files, current)
+    painted, unfit = paintings.refitted(folder, root, files, current, room.edited)
     owned = {path: folders.digest(content) for path, content in files.items()}
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
         files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
@@ -87,6 +87,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
             owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
     replaced = [path for path in files if path != root or root not in recorded] + ([] if old else [manifest])
     kept = ownership.backups(folder, replaced, recorded, files)
+    files |= painted  # the user's own: not among what the manifest knows as ours
     files |= {name: ownership.read(folder, path) or b"" for path, name in kept.items() if name}
     gone = [path for path in recorded if path not in owned]
     needed = ownership.referenced(folder, recorded, gone, replaced)

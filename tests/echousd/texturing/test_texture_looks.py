@@ -112,6 +112,27 @@ def test_edits_mute_what_they_change(room):
     assert np.quantile(errors_in_texels(room, fresh), 0.99) < 0.75
 
 
+def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
+    import_look(room, job_of(room), name="oil", preview=False)
+    before = {path: path.read_bytes() for path in room.parent.rglob("*") if path.is_file()}
+    graph = read_room(room).graph.relabel_node("pendant", "wardrobe")
+    made = edit(room, graph, model=StandIn(), shapes="boxes", repair=False)
+    with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
+        other = made.save(tmp_path / "far/away", preview=False)
+    assert {path: path.read_bytes() for path in before} == before
+    assert {path.relative_to(other.parent) for path in (other.parent / "looks").rglob("*") if path.is_file()} == {
+        path.relative_to(room.parent) for path in before if "looks" in path.parts
+    }
+    assert material(other, "wardrobe") == "oil_wardrobe"
+    assert material(other, "pendant") != "oil_pendant"
+    assert not check_room(other).errors
+    assert "looks/" not in str(json.loads((other.parent / "away.json").read_text())["files"])  # the user's own
+    (other.parent / "looks/oil.usda").write_text("#usda 1.0\n")
+    with pytest.warns(UserWarning, match=r"far/away/looks/oil.usda: is another look; that of .*bedroom is not taken"):
+        made.save(other.parent, preview=False)
+    assert (other.parent / "looks/oil.usda").read_text() == "#usda 1.0\n"
+
+
 def test_an_edited_root_keeps_its_words_and_gets_the_look(room):
     text = room.read_text().replace('doc = "A room made by EchoUSD.', 'doc = "Mine. A room made by EchoUSD.')
     room.write_text(text)
