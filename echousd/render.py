@@ -140,33 +140,40 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
 
 # What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
 ALBEDO, LIGHT, GLOW, NORMAL, POINT, LAYERS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), 15
-REACH = 2  # pixels
+RINGS = (1, 2, 4)  # pixels between neighbours, pass by pass
 
 
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Mean of the light over neighbours on the same flat piece of surface (joint bilateral filter), (h, w, 3) each."""
     height, width = light.shape[:2]
-    padded = [np.pad(a, ((REACH, REACH), (REACH, REACH), (0, 0)), mode="edge") for a in (light, normal, point)]
-    total, weight = np.zeros_like(light), np.zeros((height, width, 1), np.float32)
-    for down in range(2 * REACH + 1):
-        for across in range(2 * REACH + 1):
-            there = slice(down, down + height), slice(across, across + width)
-            other_light, other_normal, other_point = (a[there] for a in padded)
-            turn = np.clip((normal * other_normal).sum(-1, keepdims=True), 0, 1)
-            step = np.abs((normal * (other_point - point)).sum(-1, keepdims=True))
-            for _ in range(4):  # to the 16th power
-                turn *= turn
-            share = turn * (step < 0.02)
-            total += share * other_light
-            weight += share
-    return np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
+    for apart in RINGS:  # passes with ever wider holes reach far with few neighbours ("a trous")
+        edge = ((apart, apart), (apart, apart), (0, 0))
+        padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
+        total, weight = np.zeros_like(light), np.zeros((height, width, 1), np.float32)
+        for down in (0, apart, 2 * apart):
+            for across in (0, apart, 2 * apart):
+                there = slice(down, down + height), slice(across, across + width)
+                other_light, other_normal, other_point = (a[there] for a in padded)
+                turn = np.clip((normal * other_normal).sum(-1, keepdims=True), 0, 1)
+                step = np.abs((normal * (other_point - point)).sum(-1, keepdims=True))
+                for _ in range(4):  # to the 16th power
+                    turn *= turn
+                share = turn * (step < 0.02)
+                total += share * other_light
+                weight += share
+        light = np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
+    return light
 
 
 SUN = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
 SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
 SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
-SKY_LIGHT = np.array([0.80, 0.86, 0.95], np.float32)
+SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
 BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
+OUTSIDE = (  # what is seen through a window: height in it from -1 to 1, linear colours
+    np.array([-1.0, -0.55, -0.3, 0.2, 1.0]),
+    np.array([(0.33, 0.42, 0.25), (0.47, 0.55, 0.40), (0.80, 0.84, 0.84), (0.74, 0.83, 0.92), (0.47, 0.65, 0.88)]),
+)
 R2 = np.array([0.7548776662, 0.5698402910], np.float32)
 
 
@@ -201,6 +208,8 @@ def _shade(
     seen = np.flatnonzero(hit["primID"] >= 0)
     out = np.zeros((len(u), LAYERS), np.float32)
     out[:, GLOW] = BACKGROUND
+    missed = np.flatnonzero(hit["primID"] < 0)
+    out[missed, GLOW] = outside(scenery.panes, origin[missed], direction[missed])
     if not len(seen):
         return out.reshape(-1, size, LAYERS)
     face = hit["primID"][seen]
@@ -215,6 +224,20 @@ def _shade(
     glow = 0.5 * shine[:, None] + scenery.emissive[face]
     out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
     return out.reshape(-1, size, LAYERS)
+
+
+def outside(panes: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n, 3) colour that rays which meet nothing see: sky over fields through a window's pane, else the paper."""
+    out: np.ndarray = np.broadcast_to(BACKGROUND, direction.shape).copy()
+    for middle, side, rise in panes:
+        normal = np.cross(side, rise)
+        along = direction @ normal
+        reach = ((middle - origin) @ normal) / np.where(np.abs(along) < 1e-9, 1e-9, along)
+        point = origin + reach[:, None] * direction - middle
+        u, v = point @ side / (side @ side), point @ rise / (rise @ rise)
+        here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
+        out[here] = np.stack([np.interp(v[here], OUTSIDE[0], tone) for tone in OUTSIDE[1].T], 1)
+    return out
 
 
 def _light(
@@ -243,15 +266,15 @@ def _light(
         other = scene.run(_f32(point), _f32(away), output=1)
         blocked = other["primID"] >= 0
         # What a sky ray meets sends back a little of its own colour: one crude bounce.
-        bounce = 0.6 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
+        bounce = 0.9 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
         near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
-        open_sky = (0.55 + 0.45 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
-        sky += np.where(blocked[:, None], bounce * (0.35 + 0.65 * near), open_sky)
+        open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
+        sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
     half = _unit(toward + SUN)
     gloss = scenery.gloss[face]
     shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
-    return 0.66 * direct + 0.95 * sky, shine
+    return 0.55 * direct + 1.05 * sky, shine
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

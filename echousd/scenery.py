@@ -30,6 +30,8 @@ class Scenery:
         images: (h, w, 3) float32 linear RGB each.
         furniture: boxes of the objects.
         wall: (f,) int, which wall a face belongs to, -1 for none.
+        panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
+        pane_wall: (p,) int, the walls of the panes.
     """
 
     triangles: np.ndarray
@@ -42,6 +44,8 @@ class Scenery:
     images: tuple[np.ndarray, ...]
     furniture: Furniture
     wall: np.ndarray
+    panes: np.ndarray
+    pane_wall: np.ndarray
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -53,17 +57,19 @@ class Scenery:
         """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
         lower, upper = self.bounds
         middle = (lower + upper) / 2
-        keep = np.ones(len(self.triangles), bool)
+        keep, seen = np.ones(len(self.triangles), bool), np.ones(len(self.panes), bool)
         for number in range(int(self.wall.max(initial=-1)) + 1):
             faces = self.wall == number
             corners = self.triangles[faces].reshape(-1, 3)
             away = (corners.min(0) + corners.max(0)) / 2 - middle
             if (away * (eye - middle))[[0, 2]].sum() > 0:
                 keep &= ~faces
+                seen &= self.pane_wall != number
         if keep.all() or not keep.any():
             return self
         names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
-        return replace(self, **{name: getattr(self, name)[keep] for name in names})
+        fewer = {name: getattr(self, name)[keep] for name in names}
+        return replace(self, panes=self.panes[seen], pane_wall=self.pane_wall[seen], **fewer)
 
     def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
         """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
@@ -107,11 +113,13 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     hung: list[int] = []
     words: list[str] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
+    panes: list[tuple[str, np.ndarray]] = []
     for mesh in read_drawables(stage):
         if mesh.category == "ceiling":  # pictures look in from above
             continue
         if mesh.category == "window" and not by_class and all(p.opacity < SEEN_THROUGH for p, _ in mesh.paints):
-            continue  # panes
+            panes.append((mesh.component, _pane(mesh)))
+            continue  # light goes through
         if mesh.category == "wall":
             walls.setdefault(mesh.component, len(walls))
         count = len(mesh.triangles)
@@ -149,7 +157,22 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     sizes = np.array(boxes).reshape(-1, 7)
     furniture = Furniture(sizes[:, :3], sizes[:, 3:6], sizes[:, 6])
-    return Scenery(images=tuple(image for _, image in images.values()), furniture=furniture, **joined)
+    return Scenery(
+        images=tuple(image for _, image in images.values()),
+        furniture=furniture,
+        panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
+        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
+        **joined,
+    )
+
+
+def _pane(mesh: Drawable) -> np.ndarray:
+    """(3, 3) float: middle, half of the width and half of the height of an upright pane, metres."""
+    points = mesh.triangles.reshape(-1, 3) @ mesh.world[:3, :3].T + mesh.world[:3, 3]
+    low, high = points.min(0), points.max(0)
+    middle, flat = (low + high) / 2, points[:, [0, 2]] - (low + high)[[0, 2]] / 2
+    far = flat[int(np.argmax((flat**2).sum(1)))]
+    return np.array([middle, [far[0], 0.0, far[1]], [0.0, (high[1] - low[1]) / 2, 0.0]])
 
 
 def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[int]:

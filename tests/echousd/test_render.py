@@ -8,7 +8,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echousd.drawables import read_drawables
-from echousd.render import render_file, render_stage, smooth_light
+from echousd.render import BACKGROUND, outside, render_file, render_stage, smooth_light
 from echousd.room import RoomOptions
 from echousd.scenery import class_color, read_scenery
 
@@ -122,6 +122,26 @@ def test_light_is_smoothed_within_a_plane_only():
     assert smooth[:, :10].std() < 0.4 * light[:, :10].std()
     assert abs(smooth[:, :10].mean() - 1) < 0.1
     assert abs(smooth[:, 10:].mean() - 6) < 0.1
+
+
+def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
+    data = echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True)
+    )
+    scenery = read_scenery(Usd.Stage.Open(str(data.save(tmp_path / "bedroom", preview=False))))
+    windows = [opening for opening in data.graph.room.openings if opening.kind == "window"]
+    assert len(scenery.panes) == len(windows) > 0
+    middle, side, rise = scenery.panes[0].astype(float)
+    np.testing.assert_allclose(2 * np.linalg.norm(side), windows[0].width, atol=0.07)
+    np.testing.assert_allclose(2 * np.linalg.norm(rise), windows[0].height, atol=0.07)
+    eye = np.array([0.0, 1.4, 0.0])
+    aims = np.array([middle + 0.9 * rise, middle - 0.9 * rise, middle + 1.5 * side, 2 * eye - middle])
+    sky, field, beside, behind = outside(scenery.panes[:1], np.tile(eye, (4, 1)), aims - eye)
+    assert sky[2] > sky[1] > sky[0]
+    assert field[1] > field[2]
+    np.testing.assert_array_equal([beside, behind], [BACKGROUND] * 2)
+    outwards = middle + 5 * (middle - eye) * (1, 0, 1)
+    assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
 
 
 def test_a_small_picture_is_quick(root):
