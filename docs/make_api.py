@@ -40,6 +40,8 @@ def _words() -> list[str]:
     lines += [f"| {row.name} | {', '.join(row.aliases)} | {row.support} |" for row in words.categories]
     lines += ["", "| relation | also called | the other way round |", "|---|---|---|"]
     lines += [f"| {row.name} | {', '.join(row.aliases)} | {', '.join(row.swapped)} |" for row in words.predicates]
+    lines += ["", "| place | also called | other objects |", "|---|---|---|"]
+    lines += [f"| {row.name} | {', '.join(row.aliases)} | {row.others or ''} |" for row in words.placements]
     lines += ["", "| room type | also called |", "|---|---|"]
     lines += [f"| {row.name} | {', '.join(row.aliases)} |" for row in words.room_types]
     return lines

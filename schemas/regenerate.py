@@ -16,9 +16,14 @@ FILES = ("generatedSchema.usda", "plugInfo.json")
 
 
 def with_vocabulary(schema: str) -> str:
-    """The text of schema.usda with the room types and predicates that the vocabulary has."""
+    """The text of schema.usda with the room types, predicates and placements that the vocabulary has."""
     words = vocabulary()
-    for name, rows in (("echo:roomType", words.room_types), ("echo:predicate", words.predicates)):
+    alone = [row for row in words.placements if not row.others]
+    for name, rows in (
+        ("echo:roomType", words.room_types),
+        ("echo:predicate", words.predicates),
+        ("echo:place", alone),
+    ):
         tokens = ", ".join(f'"{row.name}"' for row in rows)
         schema, found = re.subn(rf"(token {name} .*?allowedTokens = )\[[^]]*\]", rf"\1[{tokens}]", schema, flags=re.S)
         if found != 1:
@@ -29,7 +34,7 @@ def with_vocabulary(schema: str) -> str:
 def regenerate(target: Path = RESOURCES) -> None:
     """Write generatedSchema.usda and plugInfo.json of schema.usda to the folder `target`.
 
-    The tokens of room types and predicates in schema.usda itself are brought up to date before.
+    The tokens of room types, predicates and placements in schema.usda itself are brought up to date before.
 
     Raises RuntimeError with usdGenSchema's own words where it fails (for one, when jinja2 is not installed).
     """

@@ -27,7 +27,7 @@ class LayoutReport:
 
     Arguments:
         name: of the variant, "" where the room has only one layout.
-        relations: every relation between objects with boxes, with its verdict and margin.
+        relations: every relation and placement of objects with boxes, with its verdict and margin.
         collisions, placement: what stands where it should not.
         living: what a person would point at though the graph does not forbid it; warnings.
     """

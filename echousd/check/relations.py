@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.graph import Relation
+from echousd.graph import Placed, Relation
 from echousd.repair.repair import floor_of_room
 from echousd.stage.contents import RoomContents
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
 
 
 @dataclass(frozen=True)
 class MeasuredRelation:
-    """A relation with its signed margin (metres or ratio, >= 0 = kept), None where the rules do not measure it."""
+    """A relation or placement with its signed margin (metres or ratio, >= 0 = kept), None where it is not measured."""
 
-    relation: Relation
+    relation: Relation | Placed
     kept: bool
     margin: float | None
 
@@ -28,7 +32,7 @@ class MeasuredRelation:
 
 
 def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[MeasuredRelation, ...]:
-    """Every relation between objects with boxes; raises ValueError for unknown rules."""
+    """Every relation and placement of objects with boxes; raises ValueError for unknown rules."""
     import torch
 
     from echomodel.boxes import Boxes
@@ -54,4 +58,17 @@ def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[Measu
     return tuple(
         MeasuredRelation(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
         for relation, found, value in zip(room.relations, verdict, margin, strict=True)
+    ) + _measured_placements(room, boxes, polygon)
+
+
+def _measured_placements(room: RoomContents, boxes: Boxes, floor: np.ndarray | None) -> tuple[MeasuredRelation, ...]:
+    from echomodel.rules.placements import Stated, placement_margins
+
+    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
+    told = [one for thing in room.objects for one in thing.node.placements if set(one.others) <= index.keys()]
+    stated = [Stated(one.placement, index[one.subject], tuple(index[name] for name in one.others)) for one in told]
+    margin = placement_margins(boxes, stated, floor, [thing.node.category for thing in room.objects]).tolist()
+    return tuple(
+        MeasuredRelation(one, value != value or value > -1e-4, None if value != value else value)
+        for one, value in zip(told, margin, strict=True)
     )

@@ -98,7 +98,9 @@ def new(
 ) -> None:
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
-    from echousd.graph.text import relation_from_text, with_openings
+    from echousd.graph.nodes import Placed
+    from echousd.graph.sentences import sentence, stating
+    from echousd.graph.text import with_openings
 
     if (source is None) == (room is None):
         raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
@@ -107,13 +109,18 @@ def new(
     if out.exists() and not force:
         raise GraphError(f"{out} exists, allowed: a new path, or --force to overwrite it")
     given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
-    stated = tuple(map(relation_from_text, relate or ()))
     if source is not None:
         made = load_graph(source)
-        made = made.replaced(room=made.room.replaced(**given), relations=(*made.relations, *stated))
+        made = made.replaced(room=made.room.replaced(**given))
+        later = relate or ()
     else:
         assert room is not None
+        said = {text: sentence(text) for text in relate or ()}
+        stated = [one for one in said.values() if not isinstance(one, Placed)]
+        later = [text for text, one in said.items() if isinstance(one, Placed)]
         made = starting_graph(RoomSpec(room, **given), dict(map(_counted, count or ())), stated)
+    for text in later:
+        made = stating(made, text)
     words = [("door", text) for text in door or ()] + [("window", text) for text in window or ()]
     if words:
         made = made.replaced(room=with_openings(made.room, words))
@@ -250,7 +257,8 @@ def _heading(made: SceneGraph, path: str) -> str:
 
 def _facts(node: Node) -> list[str]:
     """What is known of a node besides name and category."""
-    facts = [f"style {node.style}"] if node.style else []
+    facts = [node.title] if node.title else []
+    facts += [f"style {node.style}"] if node.style else []
     if node.size:
         facts.append("size " + " x ".join(f"{value:.3g}" for value in node.size))
     if node.position:
@@ -287,6 +295,9 @@ def _print_tree(console: Console, made: SceneGraph, path: str) -> None:
                 if relation.confidence != 1:
                     line.append(f" ({relation.confidence:.3g})", style="dim")
             branch.add(line)
+        for placed in node.placements:
+            line = Text(_words(placed.placement), style="yellow")
+            branch.add(line.append(f" {' and '.join(placed.others)}" if placed.others else "", style="cyan"))
     console.print(tree)
 
 
@@ -303,5 +314,7 @@ def _print_table(console: Console, made: SceneGraph, path: str) -> None:
     relations = Table("subject", "predicate", "object", "confidence", box=box.SIMPLE_HEAD)
     for relation in made.relations:
         relations.add_row(*map(Text, (*relation.triple, f"{relation.confidence:.3g}")))
+    for placed in made.placements:
+        relations.add_row(*map(Text, placed.triple), "")
     console.print(Text(_heading(made, path), style="bold"), *map(sentence, made.room.openings), sep="\n")
     console.print(objects, relations, sep="\n")

@@ -93,7 +93,7 @@ def tell_room(written: Written) -> None:
         kept = f"{counts['kept']} of {counts['kept'] + counts['broken']} measured relations kept"
         say(f"layout_{number} {kept}" if several else f"graph    {len(room.names)} objects, {kept}")
         for verdict in found.broken:
-            say(f"broken   {verdict.subject} {verdict.predicate} {verdict.object} (margin {verdict.margin:+.2f})")
+            say(f"broken   {verdict.said} (margin {verdict.margin:+.2f})")
         for hit in found.collisions:
             say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
     for note in room.notes:

@@ -7,7 +7,7 @@ from echousd.graph.consistency import GraphError
 from echousd.graph.difference import GraphDiff
 from echousd.graph.fields import MAX_TEXT
 from echousd.graph.files import load_graph, save_graph
-from echousd.graph.nodes import Node, Relation, RoomSpec
+from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
 from echousd.graph.starting import starting_graph
 
@@ -16,6 +16,7 @@ __all__ = [
     "GraphDiff",
     "GraphError",
     "Node",
+    "Placed",
     "Relation",
     "RoomSpec",
     "SceneGraph",

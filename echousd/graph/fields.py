@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Real
 from typing import Annotated, Any, TypeAlias
@@ -38,6 +39,12 @@ def _text(value: Any) -> str:
     if not isinstance(value, str) or not value.strip():
         raise ValueError(f"found {shown(value)}, allowed: a non-empty text")
     return _storable(value)
+
+
+def _title(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > MAX_NAME:
+        raise ValueError(f"found {shown(value)}, allowed: a text of at most {MAX_NAME} printable characters")
+    return unicodedata.normalize("NFC", value)
 
 
 def _source(value: Any) -> str:
@@ -171,6 +178,23 @@ def _scalar(key: str, value: Any) -> bool | int | float | str:
     raise ValueError(f"{key} is {shown(value)}, allowed: a text, true, false or a finite number, integers below 2^63")
 
 
+def _place(value: Any) -> str:
+    single = [row.name for row in vocabulary().placements if not row.others]
+    if not isinstance(value, str):
+        raise ValueError(f"found {shown(value)}, allowed: {', '.join(single)}")
+    word = vocabulary().placement(value).name
+    if word not in single:
+        raise ValueError(f"found {shown(value)}, allowed: {', '.join(single)}")
+    return word
+
+
+def _two_names(value: Any) -> tuple[str, ...]:
+    names = tuple(_items(value))
+    if len(names) != 2 or names[0] == names[1]:
+        raise ValueError(f"found {shown(value)}, allowed: the names of two other objects")
+    return tuple(map(checked_identifier, names))
+
+
 def _flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"found {shown(value)}, allowed: true or false")
@@ -214,6 +238,15 @@ Source: TypeAlias = Annotated[
     _optional(_source),
     WithJsonSchema({"anyOf": [{"enum": list(SOURCES)}, {"type": "null"}]}),
 ]
+Place: TypeAlias = Annotated[
+    str | None,
+    _optional(_place),
+    WithJsonSchema(
+        {"anyOf": [{"enum": [row.name for row in vocabulary().placements if not row.others]}, {"type": "null"}]}
+    ),
+]
+Two: TypeAlias = Annotated[tuple[str, str] | None, _optional(_two_names)]
+Title: TypeAlias = Annotated[str | None, _optional(_title)]
 AssetName: TypeAlias = Annotated[str | None, _optional(_text)]
 Size: TypeAlias = Annotated[
     Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -98,16 +99,40 @@ class RoomSpec(PlainModel):
         return rectangle(*self.size) if self.size else None
 
 
+@dataclass(frozen=True)
+class Placed:
+    """A placement of one object, such as lamp in corner, or table between sofa and armchair.
+
+    Arguments:
+        subject: name of the node. placement: name of its row in the vocabulary. others: names of the nodes it names.
+    """
+
+    subject: str
+    placement: str
+    others: tuple[str, ...] = ()
+
+    @property
+    def triple(self) -> tuple[str, str, str]:
+        """(subject, placement, the others as text), as relations have it."""
+        return self.subject, self.placement, " and ".join(self.others)
+
+    def __str__(self) -> str:
+        return " ".join(filter(None, self.triple))
+
+
 class Node(PlainModel):
     """An object of the room.
 
     Arguments:
         name: valid USD identifier, unique in the graph.
         category: category or an alias of one.
+        title: what people call it, in any script; None = as its name.
         style: objects with the same style group belong together.
         size: (x, y, z) extents in the object frame, metres, where fixed.
         position: (x, y, z) centre of the bottom face in the room frame, metres, where fixed.
         yaw: radians about +Y, where fixed (a text may be in degrees, such as `90 deg`); at 0 the front looks along +Z.
+        place: where it stands in the room, against_wall or in_corner.
+        between: names of two other objects that it stands between.
         locked: the object stays as it is when the room is generated again.
         source: where its geometry comes from, one of `echousd.graph.fields.SOURCES`; None = as the room's.
         asset: a model of one's own (a file, relative to that of the graph) or the id of one in a library.
@@ -116,10 +141,13 @@ class Node(PlainModel):
 
     name: field.Name
     category: field.CategoryWord
+    title: field.Title = None
     style: field.Style = None
     size: field.Size = None
     position: field.Position = None
     yaw: field.Angle = None
+    place: field.Place = None
+    between: field.Two = None
     locked: field.Flag = False
     source: field.Source = None
     asset: field.AssetName = None
@@ -130,6 +158,8 @@ class Node(PlainModel):
 
     @model_validator(mode="after")
     def _sourced(self) -> Node:
+        if self.name in (self.between or ()):
+            raise GraphError("between names the object itself, allowed: two others", ("between",))
         if self.asset is None and self.source == "own":
             raise GraphError("source is 'own' without an asset, allowed: asset, the file of the model", ("source",))
         if self.asset is not None and self.source not in (None, "own", "library"):
@@ -141,6 +171,12 @@ class Node(PlainModel):
         """What it is in its own stage's words, where the vocabulary has none for it; "" for furniture."""
         word = self.attributes.get(OBSTACLE)
         return word if isinstance(word, str) else ""
+
+    @property
+    def placements(self) -> tuple[Placed, ...]:
+        """What is said of its place in the room."""
+        told = [] if self.place is None else [Placed(self.name, self.place)]
+        return (*told, *([] if self.between is None else [Placed(self.name, "between", self.between)]))
 
     @classmethod
     def _title(cls, fields: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, check_triples, listed
 from echousd.graph.difference import GraphDiff
-from echousd.graph.nodes import Node, PlainModel, Relation, RoomSpec
+from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.text import graph_from_text, graph_to_json, graph_to_yaml
 
 
@@ -42,6 +42,11 @@ class SceneGraph(PlainModel):
                 message = f"two objects are called {node.name!r}, allowed: a name of its own for each"
                 raise GraphError(message, ("nodes", position))
             seen.add(node.name)
+        for position, node in enumerate(self.nodes):
+            for other in node.between or ():
+                if other not in seen:
+                    message = f"{other!r} is no object of this graph, allowed: {listed(sorted(seen))}"
+                    raise GraphError(f"object {node.name!r}: between: {message}", ("nodes", position, "between"))
         check_triples([relation.triple for relation in self.relations], seen)
         return self
 
@@ -60,6 +65,16 @@ class SceneGraph(PlainModel):
             raise GraphError(f"no object {field.shown(name)} in this graph, allowed: {listed(sorted(self._by_name))}")
         return self._by_name[name]
 
+    @property
+    def titles(self) -> dict[str, str]:
+        """Title of every node that has one, to its name."""
+        return {node.title: node.name for node in self.nodes if node.title is not None}
+
+    @property
+    def placements(self) -> tuple[Placed, ...]:
+        """What is said of the places of single objects, in the order of the nodes."""
+        return tuple(placed for node in self.nodes for placed in node.placements)
+
     def relations_of(self, name: str) -> tuple[Relation, ...]:
         """The relations that `name` takes part in, as subject or object."""
         self.node(name)
@@ -76,8 +91,9 @@ class SceneGraph(PlainModel):
     def remove_node(self, name: str) -> SceneGraph:
         """Without a node and without its relations."""
         gone = self.node(name)
+        left = [node for node in self.nodes if node is not gone]
         return self.replaced(
-            nodes=tuple(node for node in self.nodes if node is not gone),
+            nodes=tuple(n.replaced(between=None) if name in (n.between or ()) else n for n in left),
             relations=tuple(r for r in self.relations if name not in (r.subject, r.object)),
         )
 
@@ -89,10 +105,11 @@ class SceneGraph(PlainModel):
         def renamed(end: str) -> str:
             return new.name if end == name else end
 
-        relations = self.relations
+        relations, nodes = self.relations, [new if node is old else node for node in self.nodes]
         if new.name != name:
             relations = tuple(r.replaced(subject=renamed(r.subject), object=renamed(r.object)) for r in relations)
-        return self.replaced(nodes=tuple(new if node is old else node for node in self.nodes), relations=relations)
+            nodes = [n.replaced(between=tuple(map(renamed, n.between))) if n.between else n for n in nodes]
+        return self.replaced(nodes=tuple(nodes), relations=relations)
 
     def rename_node(self, name: str, new_name: str) -> SceneGraph:
         """With a node, and the relations it takes part in, under another name."""

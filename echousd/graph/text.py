@@ -11,18 +11,20 @@ from __future__ import annotations
 import difflib
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import yaml
 
 from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph.consistency import GraphError, unknown_ends
+from echousd.graph.consistency import GraphError, listed, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
-from echousd.graph.nodes import Node, Relation, RoomSpec
+from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
+from echousd.graph.sentences import fields_of_sentence, placed_fields
 from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
+from echousd.graph.titles import composed, identifier_of, is_title, name_of
 
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
@@ -84,20 +86,55 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     key = "nodes" if "nodes" in data else "objects"
     errors: list[GraphError] = []
     room = _tried(errors, _room, data)
-    entries = list(enumerate(_objects(data.get(key), key)))
+    objects, names = _named(list(_objects(data.get(key), key)))
+    entries = list(enumerate(objects))
     nodes = [_tried(errors, _node, fields, ("nodes", i)) for i, fields in entries]
     stated = data.get("relations")
     if not isinstance(stated, list | None):
         raise GraphError(
             f"relations: found {shown(stated)}, allowed: a list such as [bed left wardrobe]", ("relations",)
         )
-    relations = [_tried(errors, _stated_relation, entry, ("relations", i)) for i, entry in enumerate(stated or ())]
+    said = [_tried(errors, _sentence, entry, ("relations", i), names) for i, entry in enumerate(stated or ())]
+    relations = [one if isinstance(one, Relation) else None for one in said]
     if errors:
         named = {str(fields["name"]) for _, fields in entries if "name" in fields}
         errors += unknown_ends([None if r is None else r.triple for r in relations], named)
         errors[0].others = tuple(errors[1:MAX_ERRORS])
         raise errors[0]
-    return kind(room, tuple(nodes), tuple(relations))
+    for i, one in enumerate(said):
+        if isinstance(one, Placed):
+            nodes = _with_placement(nodes, one, ("relations", i))
+    rows = [i for i, one in enumerate(said) if isinstance(one, Relation)]
+    try:
+        return kind(room, tuple(nodes), tuple(one for one in relations if one is not None))
+    except GraphError as error:
+        if error.about[:1] != ("relations",):
+            raise
+        raise _where_written(error, rows) from None
+
+
+def _where_written(error: GraphError, rows: Sequence[int]) -> GraphError:
+    """A fault of the graph's relations as one of the text's, whose rows `rows` they are."""
+    told = GraphError(str(error), ("relations", rows[int(error.about[1])], *error.about[2:]))
+    told.others = tuple(_where_written(each, rows) for each in error.others)
+    return told
+
+
+def _with_placement(nodes: list[Node], placed: Placed, about: Path) -> list[Node]:
+    """The nodes with a placement that stands among the relations."""
+    at = next((i for i, node in enumerate(nodes) if node.name == placed.subject), None)
+    if at is None:
+        known = listed(sorted(node.name for node in nodes))
+        raise GraphError(f"'{placed}': subject {placed.subject!r} is no object of this graph, allowed: {known}", about)
+    fields = placed_fields(placed)
+    held = {name: getattr(nodes[at], name) for name in fields}
+    if any(value is not None and value != fields[name] for name, value in held.items()):
+        told = next(one for one in nodes[at].placements if bool(one.others) == bool(placed.others))
+        raise GraphError(f"'{placed}': {told} is stated already, allowed: one of them", about)
+    try:
+        return [node.replaced(**fields) if i == at else node for i, node in enumerate(nodes)]
+    except GraphError as error:
+        raise GraphError(str(error), about) from None
 
 
 def _node(fields: dict[str, Any], about: Path) -> Node:
@@ -105,9 +142,29 @@ def _node(fields: dict[str, Any], about: Path) -> Node:
     return built
 
 
-def _stated_relation(entry: Any, about: Path) -> Relation:
-    built: Relation = _built(Relation, _relation(entry, about), about)
-    return built
+def _sentence(entry: Any, about: Path, names: Mapping[str, str]) -> Relation | Placed:
+    said = fields_of_sentence(entry, about, names)
+    return said if isinstance(said, Placed) else cast(Relation, _built(Relation, said, about))
+
+
+def _named(objects: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """The fields of the nodes with identifiers for names in other scripts, which become titles; title to name."""
+    taken = {fields["name"] for fields in objects if isinstance(fields.get("name"), str)}
+    names: dict[str, str] = {}
+    for fields in objects:
+        title = composed(fields.get("name"))
+        if is_title(title) and title not in names:
+            names[title] = identifier_of(title, fields.get("category", ""), taken)
+            taken.add(names[title])
+    out = []
+    for fields in objects:
+        title, name = composed(fields.get("name")), name_of(fields.get("name"), names)
+        if name != fields.get("name"):
+            fields = {**fields, "name": name, "title": fields.get("title", title)}
+        if isinstance(fields.get("between"), list):
+            fields = {**fields, "between": [name_of(one, names) for one in fields["between"]]}
+        out.append(fields)
+    return out, names
 
 
 def _tried(errors: list[GraphError], build: Callable[..., Any], *words: Any) -> Any:
@@ -186,7 +243,8 @@ def _objects(entries: Any, key: str) -> Iterator[dict[str, Any]]:
     if not isinstance(entries, list):
         raise GraphError(f"{key}: found {shown(entries)}, allowed: a mapping of names to categories, or a list", (key,))
     often = Counter(_own_name(entry) for entry in entries if isinstance(entry, str))
-    taken = {entry.get("name") for entry in entries if isinstance(entry, Mapping)}
+    names = (entry.get("name") for entry in entries if isinstance(entry, Mapping))
+    taken = {name for name in names if isinstance(name, str)}
     counted: Counter[str] = Counter()
     for i, entry in enumerate(entries):
         fields = _fields(entry, "category", ("nodes", i))
@@ -217,27 +275,6 @@ def _own_name(category: str) -> str:
     """The name of an object that is listed by its category alone."""
     name = normalised(category)
     return name if IDENTIFIER.fullmatch(name) else vocabulary().category(category).name
-
-
-def relation_from_text(text: str) -> Relation:
-    """The relation that `text` states, such as bed left of wardrobe; raises `GraphError`."""
-    return _built(Relation, _relation(text, ()), ())
-
-
-def _relation(entry: Any, about: Path) -> dict[str, Any]:
-    """The fields of a relation from `bed left of wardrobe`, [bed, left, wardrobe] or a mapping."""
-    if isinstance(entry, Mapping):
-        return dict(entry)
-    words = entry.split() if isinstance(entry, str) else entry
-    if not isinstance(words, list) or len(words) < 3 or not all(isinstance(word, str) for word in words):
-        raise GraphError(
-            f"relation {shown(entry)}: allowed: subject predicate object, such as bed left wardrobe", about
-        )
-    subject, predicate, object_ = words[0], " ".join(words[1:-1]), words[-1]
-    turned = vocabulary().swapped(predicate)  # "table under lamp" is "lamp above table"
-    if turned is not None:
-        subject, predicate, object_ = object_, turned.name, subject
-    return {"subject": subject, "predicate": predicate, "object": object_}
 
 
 def plain(graph: SceneGraph) -> dict[str, Any]:

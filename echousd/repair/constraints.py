@@ -8,10 +8,11 @@ import numpy as np
 
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows
+from echousd.repair.placements import placement_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
 from echousd.repair.relations import relation_margins
 
-RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG = range(7)
+RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +23,7 @@ class Linearised:
         value: (r,) float, metres or ratio, the wanted slack already taken off.
         gradient: (r, n * 6) float.
         equal: (r,) bool, True where the value must be zero rather than not negative.
-        kind: (r,) int, `RELATION` ... `OVERHANG`.
+        kind: (r,) int, `RELATION` ... `PLACEMENT`.
         axis: (p,) int, separating axis chosen for each pair.
     """
 
@@ -80,6 +81,10 @@ def linearise(
 
     add(*_support_rows(problem, size, position), equal=True)
     add(*_overhang_rows(problem, size, position, yaw), OVERHANG)
+    if problem.stated:
+        walls = problem.surroundings
+        margin, gradient = placement_rows(problem.stated, walls, problem.categories, size, position, yaw)
+        add(margin - slack, gradient, PLACEMENT)
     return Linearised(
         np.concatenate(values), np.concatenate(gradients), np.array(equals, bool), np.concatenate(kinds), axis
     )

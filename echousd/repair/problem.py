@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.repair.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
+
+if TYPE_CHECKING:
+    from echomodel.rules.placements import Stated, Walls
 
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
@@ -34,6 +38,7 @@ class Problem:
         pairs: (p, 2) int, pairs that must not collide.
         order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
         handicap: (p, 5) float, metres by which a separating axis must be better to be chosen.
+        stated: where single objects must stand in the room.
     """
 
     categories: tuple[str, ...]
@@ -47,6 +52,14 @@ class Problem:
     pairs: np.ndarray
     order: np.ndarray
     handicap: np.ndarray
+    stated: tuple[Stated, ...] = ()
+
+    @cached_property
+    def surroundings(self) -> Walls | None:
+        """The walls as placements are measured to them, None where the room has none."""
+        from echomodel.rules.placements import Walls
+
+        return None if self.floor is None else Walls(self.floor.polygon)
 
     @cached_property
     def fronts(self) -> np.ndarray:
@@ -66,6 +79,7 @@ def pose(
     fixed: np.ndarray,
     rigid: np.ndarray,
     turned: np.ndarray,
+    stated: tuple[Stated, ...] = (),
 ) -> tuple[Problem, np.ndarray, np.ndarray]:
     """The problem of a room, with its boxes put at their height and wall furniture turned square to its wall.
 
@@ -82,7 +96,8 @@ def pose(
     position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
     wall = np.full((n, 2, 2), np.nan)
     if floor is not None:
-        wall = lean(words, size, position, yaw, floor, carrier)
+        told = {one.subject for one in stated if one.placement == "against_wall"}
+        wall = lean(words, size, position, yaw, floor, carrier, told)
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     pairs = pair_indices(n)
@@ -101,6 +116,7 @@ def pose(
         pairs,
         required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
         axis_handicap(size, position, yaw, pairs, wall),
+        stated,
     )
     return problem, position, yaw
 
@@ -203,8 +219,13 @@ def lean(
     yaw: np.ndarray,
     floor: Floor,
     carrier: np.ndarray,
+    told: Collection[int] = (),
 ) -> np.ndarray:
-    """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none."""
+    """(n, 2, 2) float: point and inward normal of the wall that each piece of wall furniture leans on, NaN = none.
+
+    Arguments:
+        told: boxes that the graph has against a wall, whatever they are.
+    """
     out = np.full((len(categories), 2, 2), np.nan)
     front = axes(yaw)[:, 1]
     start, end = floor.polygon, np.roll(floor.polygon, -1, 0)
@@ -214,7 +235,7 @@ def lean(
     corner = footprints(size, position, yaw)
     for i, word in enumerate(categories):
         row = vocabulary().category(word)
-        leaning = (row.wall and carrier[i] == ON_FLOOR) or row.support == "wall"
+        leaning = ((row.wall or i in told) and carrier[i] == ON_FLOOR) or row.support == "wall"
         if not leaning:
             continue
         facing = floor.normal @ front[i] > np.cos(WALL_TURN)

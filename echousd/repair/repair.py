@@ -14,6 +14,7 @@ from echomodel.rules.living import plan_of
 from echomodel.rules.living.sizes import laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
+from echousd.repair.placements import stated_placements
 from echousd.repair.problem import Problem, pose, stacked
 from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
@@ -21,6 +22,7 @@ from echousd.repair.solver import RepairConfig, Solution, solve, violation
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
+    from echomodel.rules.placements import Stated
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
@@ -113,6 +115,7 @@ def repair(
         floor_polygon=floor_of_room(graph.room),
         height=graph.room.height or DEFAULT_HEIGHT,
         openings=graph.room.openings,
+        stated=stated_placements(graph),
         fixed=np.array([node.locked or node.position is not None for node in nodes]),
         rigid=np.array([node.locked or node.size is not None for node in nodes]),
         turned=np.array([node.locked or node.yaw is not None for node in nodes]),
@@ -174,6 +177,7 @@ def repair_boxes(
     rigid: np.ndarray | None = None,
     turned: np.ndarray | None = None,
     openings: Sequence[Opening] = (),
+    stated: tuple[Stated, ...] = (),
     rules: str = "strict",
     config: RepairConfig | None = None,
 ) -> RepairedBoxes:
@@ -187,6 +191,7 @@ def repair_boxes(
         height: of the ceiling, metres; None = ceiling things keep their height.
         fixed, rigid, turned: (n,) bool, boxes that must keep their position, size, yaw.
         openings: doors and windows in the edges of the floor polygon.
+        stated: where single objects must stand in the room.
         rules: `strict` or `sgfront`.
 
     Raises:
@@ -215,7 +220,7 @@ def repair_boxes(
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Start:
         problem, start, turn = pose(
             categories, size, position, yaw, triplets,
-            floor_polygon=floor_polygon, height=height, fixed=fixed, rigid=rigid, turned=turned,
+            floor_polygon=floor_polygon, height=height, fixed=fixed, rigid=rigid, turned=turned, stated=stated,
         )  # fmt: skip
         return Start(replace(problem, triplets=triplets[asked]), size, start, turn)
 

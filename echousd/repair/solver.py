@@ -17,6 +17,7 @@ from echousd.repair.constraints import (
     COLLISION,
     FLOOR,
     OVERHANG,
+    PLACEMENT,
     RELATION,
     SUPPORT,
     WALL,
@@ -52,7 +53,16 @@ class RepairConfig:
 
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.
-STIFFNESS = {RELATION: 1e5, COLLISION: 1e5, FLOOR: 1e5, WALL: 3e2, SUPPORT: 1e5, CEILING: 1e3, OVERHANG: 1e4}
+STIFFNESS = {
+    RELATION: 1e5,
+    COLLISION: 1e5,
+    FLOOR: 1e5,
+    WALL: 3e2,
+    SUPPORT: 1e5,
+    CEILING: 1e3,
+    OVERHANG: 1e4,
+    PLACEMENT: 1e5,
+}
 LIMIT_STIFFNESS = 1e6
 THROUGH = 4  # rounds in which collisions do not count, in an attempt that walks through other things
 SOFT = 1e-2  # weight of a metre to the wall or the ceiling against a metre of collision when results are compared

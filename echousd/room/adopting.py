@@ -7,7 +7,7 @@ from pathlib import Path
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, SceneGraph
-from echousd.graph.text import relation_from_text
+from echousd.graph.sentences import stating
 from echousd.room.originals.loading import joined
 from echousd.stage import open_stage
 from echousd.stage.foreign import foreign_pieces
@@ -41,8 +41,7 @@ def adopted(
     for node in lacking(graph) if add is None else map(_node, add):
         graph = graph.replaced(nodes=(*graph.nodes, node))
     for text in relate:
-        new = relation_from_text(text)
-        graph = graph.relate(new.subject, new.predicate, new.object)
+        graph = stating(graph, text)
     return graph
 
 

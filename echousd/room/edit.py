@@ -179,11 +179,15 @@ def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
     fresh = {node.name for node in diff.added}
     fresh |= {new.name for old, new in diff.changed if _made_of(old) != _made_of(new)}
     moving = {relation.subject for relation in diff.related}
-    moving |= {new.name for old, new in diff.changed if (old.position, old.yaw) != (new.position, new.yaw)}
+    moving |= {new.name for old, new in diff.changed if _placed_at(old) != _placed_at(new)}
     on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
     for _ in on:  # what stands on something goes with it, and what stands on that
         moving |= {subject for subject, carrier in on if carrier in moving | fresh}
     return fresh, {name for name in moving - fresh if not after.node(name).locked}
+
+
+def _placed_at(node: Node) -> tuple[object, ...]:
+    return node.position, node.yaw, node.place, node.between
 
 
 def _made_of(node: Node) -> tuple[object, ...]:

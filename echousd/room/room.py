@@ -65,7 +65,12 @@ class Verdict:
 
     def __str__(self) -> str:
         margin = "" if self.margin is None else f" (margin {self.margin:+.2f})"
-        return f"{self.subject} {self.predicate} {self.object} is {self.state}{margin}"
+        return f"{self.said} is {self.state}{margin}"
+
+    @property
+    def said(self) -> str:
+        """The relation or placement as a sentence."""
+        return " ".join(filter(None, (self.subject, self.predicate, self.object)))
 
     def to_json(self) -> dict[str, Any]:
         """The entry of the manifest."""
@@ -92,7 +97,7 @@ class Collision:
 
 @dataclass(frozen=True)
 class LayoutOutcome:
-    """What became of one layout: one verdict per relation of the graph, and the objects that collide."""
+    """What became of one layout: one verdict per relation and placement of the graph, and the objects that collide."""
 
     verdicts: tuple[Verdict, ...] = ()
     collisions: tuple[Collision, ...] = ()
@@ -178,7 +183,7 @@ class RoomData:
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """One per relation of the graph, of the first layout."""
+        """One per relation and placement of the graph, of the first layout."""
         return self.outcomes[0].verdicts if self.outcomes else ()
 
     @property

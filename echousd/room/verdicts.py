@@ -8,13 +8,16 @@ import numpy as np
 
 from echomodel.boxes import Boxes
 from echomodel.rules import fronts, margins, verdicts
+from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import pair_indices, separation
+from echousd.repair.placements import stated_placements
 from echousd.repair.report import TOUCH
 from echousd.room.room import Collision, LayoutOutcome, RoomData, Verdict
 from echousd.room.tensors import floor_centre, graph_batch
 
+ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre
 STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
 
 
@@ -52,9 +55,9 @@ def warn_of_faults(room: RoomData) -> None:
 
 
 def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict") -> tuple[Verdict, ...]:
-    """One verdict per relation of the graph, in its order."""
+    """One verdict per relation of the graph, in its order, then one per placement."""
     if not graph.relations:
-        return ()
+        return _placement_verdicts(graph, boxes)
     triplets, centre = graph_batch(graph).triplets, floor_centre(graph)[[0, 2]]
     headed = fronts(node.category for node in graph.nodes)
     state = verdicts(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
@@ -62,4 +65,13 @@ def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict")
     return tuple(
         Verdict(r.subject, r.predicate, r.object, STATES[s], None if s < 0 else m)
         for r, s, m in zip(graph.relations, state, margin, strict=True)
+    ) + _placement_verdicts(graph, boxes)
+
+
+def _placement_verdicts(graph: SceneGraph, boxes: Boxes) -> tuple[Verdict, ...]:
+    categories = [node.category for node in graph.nodes]
+    margin = placement_margins(boxes, stated_placements(graph), graph.room.corners, categories).tolist()
+    return tuple(
+        Verdict(*placed.triple, STATES[-1 if m != m else int(m >= -ROUNDING)], None if m != m else m)
+        for placed, m in zip(graph.placements, margin, strict=True)
     )

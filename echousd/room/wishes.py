@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from echousd.graph import GraphError, SceneGraph
-from echousd.graph.text import relation_from_text
+from echousd.graph.sentences import stating, without
 from echousd.room.reading import SavedRoom, read_room
 
 MOVED = 1e-3  # metres: a place further from the room's own is somebody's wish
@@ -51,16 +51,14 @@ def wished(saved: SavedRoom, wishes: Wishes) -> SceneGraph:
     for name in wishes.remove:
         graph = graph.remove_node(name)
     for text in wishes.unrelate:
-        gone = relation_from_text(text)
-        graph = graph.unrelate(gone.subject, gone.predicate, gone.object)
+        graph = without(graph, text)
     for text in wishes.relabel:
         name, category = _named(text)
         graph = _placed(graph.relabel_node(name, category), saved, name)
     for text in wishes.add:
         graph = graph.add_node(*_named(text))
     for text in wishes.relate:
-        new = relation_from_text(text)
-        graph = graph.relate(new.subject, new.predicate, new.object)
+        graph = stating(graph, text)
     for name in wishes.lock:
         graph = _placed(graph, saved, name).lock(name)
     for name in wishes.unlock:

@@ -64,7 +64,7 @@ def read_contents(prims: RoomPrims) -> RoomContents:
     owners = [prim.GetPath() for prim in prims.nodes]
     objects, missing = [], []
     for prim in prims.nodes:
-        node = _readable(lambda prim=prim: read_node(prim, names.get(prim.GetPath(), prim.GetName())))  # type: ignore[misc]
+        node = _readable(lambda prim=prim: read_node(prim, names.get(prim.GetPath(), prim.GetName()), names))  # type: ignore[misc]
         if node is None:
             continue
         found = _readable(

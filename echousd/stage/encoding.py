@@ -59,6 +59,8 @@ STYLE = "echo:style"
 SIZE = "echo:size"
 POSITION = "echo:position"
 YAW = "echo:yaw"
+PLACE = "echo:place"
+BETWEEN = "echo:between"
 LOCKED = "echo:locked"
 SOURCE = "echo:source"
 ASSET = "echo:asset"
@@ -85,6 +87,7 @@ VALUE_TYPES = {
     SIZE: _TYPES.Double3,
     POSITION: _TYPES.Double3,
     YAW: _TYPES.Double,
+    PLACE: _TYPES.Token,
     LOCKED: _TYPES.Bool,
     SOURCE: _TYPES.Token,
     ASSET: _TYPES.String,
@@ -126,6 +129,8 @@ def node_values(node: Node) -> dict[str, Any]:
         values[POSITION] = Gf.Vec3d(*node.position)
     if node.yaw is not None:
         values[YAW] = float(node.yaw)
+    if node.place is not None:
+        values[PLACE] = node.place
     if node.locked:
         values[LOCKED] = True
     if node.source is not None:

@@ -109,7 +109,7 @@ def place(prim: Usd.Prim) -> str:
 def room_graph(prims: RoomPrims) -> SceneGraph:
     """The graph of one room; raises StageError that names the prim at fault."""
     names = node_names(prims)
-    nodes = tuple(read_node(prim, names[prim.GetPath()]) for prim in prims.nodes)
+    nodes = tuple(read_node(prim, names[prim.GetPath()], names) for prim in prims.nodes)
     relations = tuple(facts(prims, names))
     try:
         return SceneGraph(room=room_spec(prims), nodes=nodes, relations=relations)
@@ -199,9 +199,9 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
         raise StageError(f"{place(graph)}: {error}") from None
 
 
-def read_node(prim: Usd.Prim, name: str) -> Node:
-    """The node that a prim states; raises StageError."""
-    fields: dict[str, Any] = {}
+def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
+    """The node that a prim states; `names`: of all nodes of its room, by path. Raises StageError."""
+    fields: dict[str, Any] = {"title": prim.GetDisplayName() or None, "between": _between(prim, names)}
     free: dict[str, Any] = {}
     for attribute in prim.GetAuthoredPropertyNames():
         if attribute in _FIELDS:
@@ -221,12 +221,21 @@ def read_node(prim: Usd.Prim, name: str) -> Node:
         raise StageError(f"{place(prim)}: {error}") from None
 
 
+def _between(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> tuple[str, ...] | None:
+    """Names of the two objects that a node stands between, None where nothing says so or one is deactivated."""
+    if not values.targets(prim, usd.BETWEEN):
+        return None
+    ends = _ends(prim, usd.BETWEEN, 2, names)
+    return None if None in ends else tuple(end for end in ends if end is not None)
+
+
 _FIELDS = {
     usd.CATEGORY: "category",
     usd.STYLE: "style",
     usd.SIZE: "size",
     usd.POSITION: "position",
     usd.YAW: "yaw",
+    usd.PLACE: "place",
     usd.LOCKED: "locked",
     usd.SOURCE: "source",
     usd.ASSET: "asset",
@@ -264,17 +273,26 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
 
 
 def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
+    return _ends(prim, name, 1, names)[0]
+
+
+def _ends(prim: Usd.Prim, name: str, count: int, names: dict[Sdf.Path, str]) -> list[str | None]:
+    """The nodes that a relationship points to, None for one that has been deactivated; raises StageError."""
     targets = values.targets(prim, name)
-    if len(targets) != 1:
+    if len(targets) != count:
         found = f"{len(targets)} targets" + (f" ({', '.join(map(str, targets))})" if targets else "")
-        raise StageError(f"{place(prim)}: {name} has {found}, allowed: exactly one")
-    node = names.get(targets[0])
-    if node is None and not _deactivated(prim.GetStage(), targets[0]):
-        there = prim.GetStage().GetPrimAtPath(targets[0])
+        raise StageError(f"{place(prim)}: {name} has {found}, allowed: exactly {'one' if count == 1 else count}")
+    return [_node_at(prim, name, target, names) for target in targets]
+
+
+def _node_at(prim: Usd.Prim, name: str, target: Sdf.Path, names: dict[Sdf.Path, str]) -> str | None:
+    node = names.get(target)
+    if node is None and not _deactivated(prim.GetStage(), target):
+        there = prim.GetStage().GetPrimAtPath(target)
         why = f"which is no node of this room (no {usd.NODE_API})" if there else "where no prim is"
-        if _unloaded(there or prim.GetStage().GetPrimAtPath(targets[0].GetParentPath())):
+        if _unloaded(there or prim.GetStage().GetPrimAtPath(target.GetParentPath())):
             why = "whose payload is not loaded"
-        raise StageError(f"{place(prim)}: {name} points to <{targets[0]}>, {why}, allowed: a node of the room")
+        raise StageError(f"{place(prim)}: {name} points to <{target}>, {why}, allowed: a node of the room")
     return node
 
 

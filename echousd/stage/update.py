@@ -16,10 +16,10 @@ from echousd.graph import Node, Relation, SceneGraph
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 from echousd.stage.read import RoomPrims, find_rooms, node_names, place, read_node, relation_of, stated, the_room, value
-from echousd.stage.write import apply_apis, author_node, author_opening, author_relation, define, put
+from echousd.stage.write import apply_apis, author_node, author_opening, author_relation, define, put, relate
 
 Edit = Callable[[], Any]
-_OWN_INFO = {"specifier", "typeName", "apiSchemas", "active"}
+_OWN_INFO = {"specifier", "typeName", "apiSchemas", "active", "displayName"}
 
 
 def update_graph(target: Usd.Stage | Sdf.Layer, graph: SceneGraph, room: str | None = None) -> None:
@@ -96,7 +96,7 @@ class _Editor:
         for name, prim in self.nodes.items():
             if name not in wanted:
                 edits.append(self.removal(prim))
-            elif (old := read_node(prim, name)) != wanted[name]:
+            elif (old := read_node(prim, name, self.names)) != wanted[name]:
                 edits += self.changed_node(prim, old, wanted[name])
         for name, node in wanted.items():
             if name not in self.nodes:
@@ -108,18 +108,31 @@ class _Editor:
         if old is not None and old.category == new.category:
             del values[usd.LABELS], values[usd.CATEGORY]
         free = [a.GetName() for a in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1])]
-        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.LOCKED, usd.SOURCE, usd.ASSET, *free)
-        return self.value_edits(prim, values, names)
+        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.PLACE, usd.LOCKED, usd.SOURCE, usd.ASSET, *free)
+        edits = self.value_edits(prim, values, names)
+        path, was = prim.GetPath(), Node(new.name, new.category) if old is None else old
+        if was.title != new.title:
+            edits.append(lambda: self.spec(path).SetInfo("displayName", new.title or ""))
+        if was.between != new.between:
+            edits.append(
+                lambda: relate(self.spec(path), usd.BETWEEN, *(self.paths[name] for name in new.between or ()))
+            )
+        return edits
 
     def new_node(self, node: Node) -> list[Edit]:
         path = self.paths[node.name] = self.objects.AppendChild(node.name)
         prim = self.stage.GetPrimAtPath(path)
         if not prim:
-            return [lambda: author_node(define(self.layer, self.spec_path(self.objects), "Xform"), node)]
+            return [lambda: self.author(node)]
         edits = [lambda: apply_apis(self.spec(path)), *self.changed_node(prim, None, node)]
         if not prim.IsDefined() or not prim.GetTypeName():
             edits.append(lambda: define(self.layer, self.spec_path(path), "Xform"))
         return [*edits, *self.activation(prim)]
+
+    def author(self, node: Node) -> None:
+        spec = author_node(define(self.layer, self.spec_path(self.objects), "Xform"), node)
+        if node.between:
+            relate(spec, usd.BETWEEN, *(self.paths[name] for name in node.between))
 
     # -- relations -----------------------------------------------------------------------------------------------------
 
@@ -267,7 +280,7 @@ def _holds_nothing_foreign(spec: Sdf.PrimSpec) -> bool:
     """Whether a prim spec holds what this project authors for a node or a relation and nothing else."""
     listed = spec.GetInfo("apiSchemas") if spec.HasInfo("apiSchemas") else Sdf.TokenListOp()
     apis = {*listed.explicitItems, *listed.prependedItems, *listed.appendedItems}
-    own = {*usd.VALUE_TYPES, usd.SUBJECT, usd.OBJECT}
+    own = {*usd.VALUE_TYPES, usd.SUBJECT, usd.OBJECT, usd.BETWEEN}
     return (
         not spec.nameChildren
         and set(spec.ListInfoKeys()) <= _OWN_INFO

@@ -115,6 +115,10 @@ def author_node(parent: Sdf.PrimSpec, node: Node) -> Sdf.PrimSpec:
     apply_apis(spec)
     for name, value in usd.node_values(node).items():
         put(spec, name, value)
+    if node.title is not None:
+        spec.SetInfo("displayName", node.title)
+    if node.between is not None:
+        relate(spec, usd.BETWEEN, *(parent.path.StripAllVariantSelections().AppendChild(name) for name in node.between))
     return spec
 
 
@@ -151,7 +155,7 @@ def put(spec: Sdf.PrimSpec, name: str, value: Any) -> None:
     attribute.default = value
 
 
-def relate(spec: Sdf.PrimSpec, name: str, target: Sdf.Path) -> None:
-    """Author a relationship with exactly one target."""
+def relate(spec: Sdf.PrimSpec, name: str, *targets: Sdf.Path) -> None:
+    """Author a relationship with exactly these targets."""
     relationship = spec.properties.get(name) or Sdf.RelationshipSpec(spec, name, False, _UNIFORM)
-    relationship.targetPathList.explicitItems = [target]
+    relationship.targetPathList.explicitItems = list(targets)

@@ -1,11 +1,11 @@
-"""The words of the project: categories, predicates and room types, read from `vocabulary.json` (data, not code)."""
+"""The words of the project: rows of `vocabulary.json` (data, not code)."""
 
 from __future__ import annotations
 
 import difflib
 import json
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -13,6 +13,7 @@ from importlib import resources
 from typing import Any, Literal
 
 from echomodel.habits import Habit
+from echomodel.placements import Placement
 
 TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet
 SUPPORTS = ("floor", "table", "wall", "ceiling")
@@ -167,20 +168,26 @@ class Vocabulary:
     room_types: tuple[RoomType, ...]
     unsupported: tuple[str, ...]
     habits: tuple[Habit, ...] = ()
+    placements: tuple[Placement, ...] = ()
     meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
-        words: dict[str, Iterable[Category | Predicate | RoomType]] = {
-            "category": self.categories,
-            "predicate": self.predicates,
-            "room type": self.room_types,
-        }
-        for kind, entries in words.items():
+        for kind, entries in self._rows.items():
             index = {word: i for i, entry in enumerate(entries) for word in entry.aliases}
             index.update({entry.name: i for i, entry in enumerate(entries)})
             self._index[kind] = index
         self._check()
+
+    @property
+    def _rows(self) -> dict[str, Sequence[Category | Predicate | RoomType | Placement]]:
+        """The rows of every kind of word."""
+        return {
+            "category": self.categories,
+            "predicate": self.predicates,
+            "room type": self.room_types,
+            "placement": self.placements,
+        }
 
     def category(self, word: str) -> Category:
         """The category called `word` (name or alias, any case, spaces or hyphens); raises `UnknownWord`."""
@@ -193,6 +200,10 @@ class Vocabulary:
     def room_type(self, word: str) -> RoomType:
         """The room type called `word` (name or alias); raises `UnknownWord`."""
         return self.room_types[self._find("room type", word)]
+
+    def placement(self, word: str) -> Placement:
+        """The placement called `word` (name or alias); raises `UnknownWord`."""
+        return self.placements[self._find("placement", word)]
 
     @cached_property
     def sgfront_predicates(self) -> dict[int, str]:
@@ -273,21 +284,13 @@ class Vocabulary:
             raise UnknownWord(f"unknown {kind} {word!r} (not supported): {hint}")
         close = [] if unsupported else difflib.get_close_matches(key, index, n=3, cutoff=TYPO)
         close = [match for match in close if _alike(key, match) > _alike(key, close[0]) - 0.1]
-        near = list(dict.fromkeys(self._name(kind, index[match]) for match in close))
+        near = list(dict.fromkeys(self._rows[kind][index[match]].name for match in close))
         hint = f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(self._names(kind))}"
         known = " (seen in real rooms, not supported)" if unsupported else ""
         raise UnknownWord(f"unknown {kind} {word!r}{known}: {hint}")
 
     def _names(self, kind: str) -> list[str]:
-        words: dict[str, tuple[Category, ...] | tuple[Predicate, ...] | tuple[RoomType, ...]] = {
-            "category": self.categories,
-            "predicate": self.predicates,
-            "room type": self.room_types,
-        }
-        return [entry.name for entry in words[kind]]
-
-    def _name(self, kind: str, position: int) -> str:
-        return self._names(kind)[position]
+        return [entry.name for entry in self._rows[kind]]
 
 
 def _known(where: str, what: str, words: Iterable[str | None], allowed: Collection[str | None]) -> None:
@@ -341,6 +344,7 @@ def _shipped() -> Vocabulary:
         predicates=tuple(Predicate(**frozen(entry)) for entry in raw["predicates"]),
         room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
         habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
+        placements=tuple(Placement(**frozen(entry)) for entry in raw["placements"]),
         unsupported=tuple(raw["unsupported"]),
         meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},
     )

@@ -16,6 +16,7 @@ metres = st.floats(1e-3, 1e3)
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=20).filter(
     lambda text: bool(text.strip())
 )
+titles = st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=20)
 scalars = st.one_of(
     st.booleans(),
     st.integers(-(2**63), 2**63 - 1),
@@ -61,11 +62,15 @@ def rooms(draw: st.DrawFn) -> RoomSpec:
 
 
 @st.composite
-def nodes(draw: st.DrawFn, name: str) -> Node:
-    """A node with any of its optional fields."""
+def nodes(draw: st.DrawFn, name: str, others: tuple[str, ...] = ()) -> Node:
+    """A node with any of its optional fields; it may stand between two of `others`."""
+    pairs = st.permutations(others).map(lambda names: tuple(names[:2])) if len(others) > 1 else st.none()
     return Node(
         name,
         draw(st.sampled_from([category.name for category in WORDS.categories])),
+        title=draw(st.none() | titles),
+        place=draw(st.sampled_from([None, "against_wall", "in_corner"])),
+        between=draw(st.none() | pairs),
         style=draw(st.none() | texts),
         size=draw(st.none() | st.tuples(metres, metres, metres)),
         position=draw(st.none() | st.tuples(numbers, numbers, numbers)),
@@ -92,4 +97,5 @@ def graphs(draw: st.DrawFn, min_nodes: int = 1, max_nodes: int = 7) -> SceneGrap
                     subject, object_ = object_, subject
             relation = Relation(subject, predicate.name, object_, confidence)
             relations[relation.triple] = relation
-    return SceneGraph(draw(rooms()), tuple(draw(nodes(name)) for name in chosen), tuple(relations.values()))
+    made = tuple(draw(nodes(name, tuple(other for other in chosen if other != name))) for name in chosen)
+    return SceneGraph(draw(rooms()), made, tuple(relations.values()))

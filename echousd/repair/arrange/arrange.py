@@ -116,13 +116,14 @@ def _built(
 
 
 def _anchors_first(setting: Setting, order: np.ndarray) -> list[int]:
-    """The order, but nothing before what it attends or stands on."""
+    """The order, but nothing before what it attends, stands on or must stand between."""
     out: list[int] = []
 
     def add(i: int, path: tuple[int, ...] = ()) -> None:
         if i in out or i in path:
             return
-        for before in (int(setting.carrier[i]), int(setting.anchor[i])):
+        named = [k for one in setting.stated if one.subject == i for k in one.others]
+        for before in (int(setting.carrier[i]), int(setting.anchor[i]), *named):
             if before >= 0:
                 add(before, (*path, i))
         out.append(i)

@@ -11,6 +11,7 @@ from echousd.repair.arrange.comfort import uncomfortable
 from echousd.repair.arrange.outlook import missing, unseen
 from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State, Zones
+from echousd.repair.placements import placement_margins_at
 from echousd.repair.relations import pair_margins
 
 HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
@@ -103,7 +104,9 @@ def price(
     cheap = np.flatnonzero(total < below)
     out = np.full(len(poses), np.inf)
     if len(cheap):
-        out[cheap] = total[cheap] + _relations(setting, state, i, poses.take(cheap), known.aside[cheap])
+        few = poses.take(cheap)
+        out[cheap] = total[cheap] + _relations(setting, state, i, few, known.aside[cheap])
+        out[cheap] += _misplaced(setting, state, i, few)
     return out
 
 
@@ -224,6 +227,24 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
     if (~sides).any():
         missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides])
     return ((BROKEN * (missed > SLACK) + FAR * missed) * weight).sum(1)
+
+
+def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): broken placements that name box i; those that name what is not placed at a small weight."""
+    out = np.zeros(len(poses))
+    for one in setting.stated:
+        involved = [one.subject, *one.others]
+        if i not in involved:
+            continue
+        position = np.where(state.placed[:, None], state.position, setting.draft)
+        yaw = np.where(state.placed, state.yaw, setting.heading)
+        margin = placement_margins_at(
+            one, i, (poses.position, poses.yaw), setting.surroundings, setting.categories, setting.size, position, yaw
+        )
+        missed = np.maximum(SLACK - margin, 0.0)
+        weight = 1.0 if all(state.placed[k] for k in involved if k != i) else UNPLACED
+        out = out + weight * (BROKEN * (missed > SLACK) + FAR * missed)
+    return out
 
 
 def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -61,8 +62,37 @@ def places(setting: Setting, state: State, i: int) -> Poses:
             OFF_WALL if kind.wall else (3.0 if kind.role == "board" and kind.access else 1.0) + lonely,
         ),
     ]
-    out = Poses.of(rows, height)
+    out = Poses.of([*rows, *as_stated(setting, state, i)], height)
     return _as_told(setting, i, out)
+
+
+def as_stated(setting: Setting, state: State, i: int) -> list[Row]:
+    """Where the graph says that the box stands in the room: at walls, in corners, between two others."""
+    said = {one.placement for one in setting.stated if one.subject == i} if setting.standing(i) else set()
+    rows: list[Row] = []
+    if said & {"against_wall", "in_corner"}:
+        rows += along_walls(setting, i, 0.0)
+    if "in_corner" in said:
+        rows += corners(setting, i, 0.0)
+        rows += nooks(setting, i) if setting.kinds[i].front else []
+    for one in setting.stated:
+        if one.subject == i and one.others and setting.standing(i):
+            rows += along_walls(setting, i, 0.1) + in_the_open(setting, i, 0.2) + midway(setting, state, i, one.others)
+    return rows
+
+
+def midway(setting: Setting, state: State, i: int, others: Sequence[int]) -> list[Row]:
+    """On the line between the centres of two others and a little beside it, turned as either of them."""
+    at = np.where(state.placed[:, None], state.position, setting.draft)[list(others)][:, [0, 2]]
+    turn = np.where(state.placed, state.yaw, setting.heading)[list(others)]
+    way = at[1] - at[0]
+    aside = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
+    return [
+        (*(at[0] + share * way + lateral * aside).tolist(), float(yaw), 0.05 + 0.2 * abs(lateral))
+        for share in (0.3, 0.4, 0.5, 0.6, 0.7)
+        for lateral in (0.0, -0.3, 0.3, -0.6, 0.6)
+        for yaw in turn
+    ]
 
 
 def as_drawn(setting: Setting, i: int, draft: tuple[float, float], price: float) -> list[Row]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
 from echousd.repair.geometry import Floor, axes
 from echousd.repair.problem import ON_FLOOR, Problem, required_order
+
+if TYPE_CHECKING:
+    from echomodel.rules.placements import Stated, Walls
 
 MASSIVE = ("sofa", "board", "bed", "storage")
 TOGETHER = {"sofa", "board", "bed", "seat"}
@@ -49,6 +53,7 @@ class Setting:
         floor: the floor polygon; height: of the ceiling, metres.
         carrier: (n,) int, as `Problem.carrier`. anchor: (n,) int, whom each attends, -1 = nobody.
         stances: how each stands to that (`Plan.stance`). group: (n,) int, the box that its group is about.
+        stated: where single objects must stand in the room; surroundings: the walls that this is measured to.
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
     """
 
@@ -69,6 +74,8 @@ class Setting:
     group: np.ndarray
     openings: Sequence[Opening]
     outline: np.ndarray
+    stated: tuple[Stated, ...]
+    surroundings: Walls
 
     @cached_property
     def kinds(self) -> tuple[Category, ...]:
@@ -242,13 +249,14 @@ def setting_of(
     from echomodel.rules.living import plan_of
 
     assert problem.floor is not None
+    assert problem.surroundings is not None
     boxes = _Boxes(size, position, yaw)
     plan = plan_of(boxes, problem.categories, problem.floor.polygon, (), problem.triplets)
     top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
     return Setting(
         problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
         problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), plan.stance, plan.group.numpy(),
-        openings, outline,
+        openings, outline, problem.stated, problem.surroundings,
     )  # fmt: skip
 
 

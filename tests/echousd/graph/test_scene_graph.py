@@ -113,7 +113,10 @@ def test_the_graph_needs_neither_pxr_nor_torch():
         ({"attributes": {"a": float("inf")}}, "attributes: a is inf, allowed: a text"),
         ({"attributes": {"note": "x" * 10_000_000}}, f"note is a text of 10000000 characters, allowed: {MAX_TEXT}"),
         ({"attributes": {"a": "\ud800"}}, "a is '\\ud800' holds a character that a USD file cannot hold"),
-        ({"colour": "red"}, "colour: unknown field, allowed: name, category, style, size, position, yaw, locked"),
+        (
+            {"colour": "red"},
+            "colour: unknown field, allowed: name, category, title, style, size, position, yaw, place, between, locked",
+        ),
     ],
 )
 def test_faults_of_a_node(fields, text):

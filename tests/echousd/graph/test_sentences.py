@@ -1,0 +1,127 @@
+"""Placements and names of any script in the texts that people write."""
+
+from __future__ import annotations
+
+import unicodedata
+
+import pytest
+
+from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph.sentences import stating, without
+
+ROOM = """room: living_room
+objects: {sofa: sofa, armchair: armchair, table: side_table, plant: plant}
+relations:
+"""
+
+
+def read(*relations: str) -> SceneGraph:
+    return SceneGraph.from_yaml(ROOM + "".join(f"  - {relation}\n" for relation in relations))
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["plant in corner", "plant in the corner", "plant In A Corner", "[plant, in corner]", "[plant, in, corner]"],
+)
+def test_in_a_corner(words):
+    assert read(words).node("plant").place == "in_corner"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "table between sofa and armchair",
+        "table in between sofa and armchair",
+        "table between sofa, armchair",
+        "[table, between, sofa, armchair]",
+        "[table, between, sofa, and, armchair]",
+    ],
+)
+def test_between_two_others(words):
+    graph = read("sofa against wall", words, "plant close by sofa")
+    assert graph.node("table").between == ("sofa", "armchair")
+    assert [str(one) for one in graph.placements] == ["sofa against_wall", "table between sofa and armchair"]
+    assert len(graph.relations) == 1
+    assert SceneGraph.from_yaml(graph.to_yaml()) == graph == SceneGraph.from_json(graph.to_json())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("table between sofa", "line 4: 'table between sofa': found one other object, allowed: two"),
+        ("table between sofa and sofa", "line 4: .*allowed: the names of two other objects"),
+        ("table between table and sofa", "line 4: .*between names the object itself"),
+        ("lamp in corner", "line 4: 'lamp in_corner': subject 'lamp' is no object of this graph, allowed: armchair, "),
+        ("table between sofa and lamp", "object 'table': between: 'lamp' is no object of this graph"),
+    ],
+)
+def test_a_wrong_placement_is_told_with_its_line(words, message):
+    with pytest.raises(GraphError, match=message):
+        read(words)
+
+
+def test_two_places_of_one_object_contradict_each_other():
+    with pytest.raises(GraphError, match="line 5: 'plant against_wall': plant in_corner is stated already"):
+        read("plant in corner", "plant against wall")
+
+
+def test_lines_of_relations_after_a_placement_are_right():
+    with pytest.raises(GraphError, match="line 6: 'sofa left armchair' contradicts 'armchair left sofa'"):
+        read("plant in corner", "sofa left of armchair", "armchair left of sofa")
+
+
+def test_what_an_object_stands_between_goes_and_is_renamed_with_it():
+    graph = read("table between sofa and armchair")
+    assert graph.rename_node("sofa", "couch").node("table").between == ("couch", "armchair")
+    assert graph.remove_node("armchair").node("table").between is None
+
+
+def test_sentences_are_stated_and_taken_back():
+    graph = stating(read(), "table between sofa and armchair")
+    assert graph.node("table").between == ("sofa", "armchair")
+    assert without(graph, "table between armchair and sofa") == read()
+    with pytest.raises(GraphError, match="'plant in_corner' is not stated in this graph"):
+        without(graph, "plant in corner")
+
+
+TITLED = """room: bedroom
+objects: {Großes Bett: double_bed, Bücherregal: bookshelf, 沙发: sofa, Табурет: stool, lamp: floor_lamp}
+relations:
+  - Bücherregal left of Großes Bett
+  - [Табурет, close by, 沙发]
+  - {subject: lamp, predicate: close_by, object: 沙发}
+  - lamp between Großes Bett and Bücherregal
+"""
+
+
+def test_names_of_any_script_become_prims_and_stay_titles():
+    graph = SceneGraph.from_yaml(TITLED)
+    assert graph.names == ("Grosses_Bett", "Buecherregal", "sofa", "stool", "lamp")
+    assert graph.titles == {
+        "Großes Bett": "Grosses_Bett",
+        "Bücherregal": "Buecherregal",
+        "沙发": "sofa",
+        "Табурет": "stool",
+    }
+    assert [str(r) for r in graph.relations] == [
+        "Buecherregal left Grosses_Bett", "stool close_by sofa", "lamp close_by sofa"
+    ]  # fmt: skip
+    assert graph.node("lamp").between == ("Grosses_Bett", "Buecherregal")
+    assert SceneGraph.from_yaml(graph.to_yaml()) == graph == SceneGraph.from_json(graph.to_json())
+
+
+def test_one_name_written_in_two_ways_of_unicode_is_one():
+    mixed = TITLED.replace("- Bücherregal", "- " + unicodedata.normalize("NFD", "Bücherregal"))
+    assert mixed != TITLED
+    assert SceneGraph.from_yaml(mixed) == SceneGraph.from_yaml(TITLED)
+
+
+def test_names_that_meet_are_numbered():
+    graph = SceneGraph.from_yaml("room: study\nobjects: {椅子一: chair, 椅子二: chair, chair: chair}\n")
+    assert len(set(graph.names)) == 3
+    assert all(Node(name, "desk").name == name for name in graph.names)
+
+
+def test_a_title_must_be_shown_on_one_line():
+    with pytest.raises(GraphError, match=r"object 'bed': title: found 'a.nb', allowed: a text of"):
+        Node("bed", "double_bed", title="a\nb")
