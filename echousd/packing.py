@@ -15,7 +15,7 @@ from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import write_whole
-from echousd.store import store_of
+from echousd.store import store_above
 from echousd.textures import TextureError, file_of, texture_bytes
 
 PACKED = (".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")  # what a usdz may hold beside layers
@@ -46,8 +46,8 @@ class Reach:
 
     def holds(self, path: str) -> bool:
         """Whether a file, all links followed, lies in reach."""
-        real = file_of(path).resolve()
-        return any(real == place or place in real.parents for place in self.places) or store_of(real) is not None
+        real = Path(os.path.realpath(file_of(path)))
+        return any(real == place or place in real.parents for place in self.places) or store_above(real) is not None
 
     def check(self, path: str, where: str) -> None:
         """Raises StageError that names `where` (a prim, a layer) for a file out of reach."""

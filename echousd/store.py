@@ -23,6 +23,7 @@ from echomodel.files import flush, write_json
 MARK = "echousd_store.json"
 VERSION = 1
 KEY = re.compile(r"[0-9a-f]{32}")
+KEY_IN_PATH = re.compile(r"[\\/][0-9a-f]{32}[\\/]")
 NEW = ".new_"  # beginning of the name of a folder that is being written
 GRACE = 3600.0  # seconds for which a folder that nobody refers to stays: its room may be on its way
 NAMING = (".usda", ".json")  # texts of a room in which a key can be read as it is
@@ -184,7 +185,14 @@ def key_of(files: Mapping[str, bytes]) -> str:
 
 def store_of(path: Path) -> Store | None:
     """The store that a file lies in under a key, its links followed; None for any other file."""
-    for place in path.resolve().parents:
+    return store_above(path.resolve())
+
+
+def store_above(real: Path) -> Store | None:
+    """`store_of` for a path without links."""
+    if not KEY_IN_PATH.search(str(real)):
+        return None
+    for place in real.parents:
         if KEY.fullmatch(place.name) and place.parent.name == place.name[:2]:
             root = place.parent.parent
             return Store(root) if (root / MARK).is_file() else None

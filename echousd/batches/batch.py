@@ -21,7 +21,7 @@ from echousd.room.lock import locked
 from echousd.room.within import inside
 
 if TYPE_CHECKING:
-    from echousd.batches.work import Job
+    from echousd.batches.work import Best, Job
     from echousd.graph import SceneGraph
     from echousd.room import Room
 
@@ -118,7 +118,7 @@ def generate_many(
     Raises ValueError for the first graph that no room can be made of.
     """
     from echomodel.loading import load_model
-    from echousd.batches.work import Job, layouts
+    from echousd.batches.work import Best, Job, layouts
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
@@ -133,27 +133,27 @@ def generate_many(
             if found.error:
                 raise ValueError(f"graph {number + k}: {found.error}")
             jobs[k] = replace(jobs[k], text=found.text, rounds=found.rounds)
-        rooms: dict[int, Room | None] = {k: _judged(job) for k, job in enumerate(jobs)}
-        while wanting := [k for k, room in rooms.items() if room is None]:
-            for k, found in zip(wanting, layouts([jobs[k] for k in wanting]), strict=True):
-                jobs[k] = replace(jobs[k], rounds=found.rounds)
+        rooms = {k: _judged(job) for k, job in enumerate(jobs)}
+        while wanting := [(k, best) for k, best in rooms.items() if isinstance(best, Best)]:
+            for (k, best), found in zip(wanting, layouts([jobs[k] for k, _ in wanting]), strict=True):
+                jobs[k] = replace(jobs[k], rounds=found.rounds, best=best)
                 rooms[k] = _judged(jobs[k])
         for k in range(len(pack)):
             made = rooms.pop(k)
-            assert made is not None
+            assert not isinstance(made, Best)
             yield made
         number += len(pack)
 
 
-def _judged(job: Job) -> Room | None:
-    """The room of a job, None where it wants further drafts."""
-    from echousd.batches.work import generated
+def _judged(job: Job) -> Room | Best:
+    """The room of a job, or the best of its drafts where it wants further ones."""
+    from echousd.batches.work import best_of, generated
     from echousd.room.layouts import DraftsWanted
 
     try:
         found: Room = generated(job)
-    except DraftsWanted:
-        return None
+    except DraftsWanted as wanted:
+        return best_of(wanted)
     return found
 
 

@@ -15,7 +15,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 POLL = 0.25  # seconds between two looks at the workers' memory and time
-THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+# as many workers as cores: each needs one, and USD need not tell that it was told so
+ONE_CORE = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "PXR_WORK_THREAD_LIMIT"), "1"
+) | {"TF_ENV_SETTING_ALERTS_ENABLED": "0"}
 
 
 @dataclass(frozen=True)
@@ -178,8 +181,8 @@ class LocalWorkers:
     def _start(self) -> _Worker:
         mine, its = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(its, os.getpid()), daemon=True)
-        before = {name: os.environ.get(name) for name in THREADS}
-        os.environ.update(dict.fromkeys(THREADS, "1"))  # as many workers as cores: each needs one
+        before = {name: os.environ.get(name) for name in ONE_CORE}
+        os.environ.update(ONE_CORE)
         try:
             process.start()
         finally:

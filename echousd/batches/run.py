@@ -133,7 +133,8 @@ class Run:
         while waiting or self._ready or self._asked or self._more:
             self._check_stop(progress)
             while not self.stopped:
-                wanted = waiting and len(self._ready) + PACK * layouts_out < 2 * executor.workers
+                soon = len(self._ready) + PACK * layouts_out
+                wanted = waiting and (soon < 2 * executor.workers or not self._ready)  # no worker waits for another's
                 if self._more and executor.free(network=True):
                     layouts_out += self._submit_further(executor, self._more.popleft())
                 elif wanted and executor.free(network=True):
@@ -242,9 +243,9 @@ class Run:
             self._more.append(pack)
 
     def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
-        wants = outcome.fate == "done" and not outcome.value
-        self._judged(entry, outcome.task.given if wants else None)
-        if wants:
+        best = outcome.value if isinstance(outcome.value, work.Best) else None
+        self._judged(entry, None if best is None else replace(outcome.task.given, best=best))
+        if best is not None:
             return
         if outcome.fate != "done":
             if FULL in outcome.error:

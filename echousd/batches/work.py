@@ -14,9 +14,19 @@ from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
-from echousd.room.layouts import DraftsWanted, Drawn, most_drafts
+from echousd.room.layouts import DraftsWanted, Drawn, Judged, most_drafts
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
+
+
+@dataclass(frozen=True)
+class Best:
+    """`echousd.room.layouts.Judged` in numbers that any process can be sent."""
+
+    of: str
+    boxes: Rows
+    conflicts: tuple[str, ...]
+    wishes: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -27,6 +37,7 @@ class Job:
         id: its name; folder: where it goes; store: where its assets go, "" = into the folder.
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
         seed, options: as in the plan. rounds: drafts of its first layout, round by round; none = sampled alone.
+        best: of all rounds but the last, None = nobody has judged them.
     """
 
     id: str
@@ -37,6 +48,7 @@ class Job:
     draw: tuple[str, int, int] | None = None
     rounds: tuple[tuple[Rows, ...], ...] = ()
     store: str = ""
+    best: Best | None = None
 
 
 @dataclass(frozen=True)
@@ -86,8 +98,8 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
     return out
 
 
-def room(job: Job) -> dict[str, Any]:
-    """Make, save and judge one room, and return its row of the manifest; {} if it wants another round of drafts first.
+def room(job: Job) -> dict[str, Any] | Best:
+    """Make, save and judge one room, and return its row of the manifest, or the best draft if it wants further ones.
 
     Raises ValueError as `generate` and `Room.save` do.
     """
@@ -97,8 +109,8 @@ def room(job: Job) -> dict[str, Any]:
         warnings.simplefilter("always")
         try:
             made = generated(job)
-        except DraftsWanted:
-            return {}
+        except DraftsWanted as wanted:
+            return best_of(wanted)
         root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
     facts = {**_facts(made, root), "rounds": max(1, len(job.rounds))}
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
@@ -111,7 +123,9 @@ def generated(job: Job) -> Any:
     from echousd.room.pipeline import generate
 
     drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
-    drawn = Drawn(drafts, elsewhere=True) if drafts else None
+    found = job.best
+    best = None if found is None else Judged(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
+    drawn = Drawn(drafts, elsewhere=True, best=best) if drafts else None
     asked = job.options
     return generate(
         _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.assets or None, model=asked.weights or None,
@@ -119,6 +133,12 @@ def generated(job: Job) -> Any:
         repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
         options=asked.look, drawn=drawn,
     )  # fmt: skip
+
+
+def best_of(wanted: DraftsWanted) -> Best:
+    """What the next round need not judge again."""
+    found = wanted.best
+    return Best(found.of, _rows(found.boxes), found.conflicts, found.wishes)
 
 
 def _checked(job: Job) -> Any:
@@ -156,7 +176,6 @@ def _boxes(rows: Rows) -> Any:
 
 def _facts(made: Any, root: Path) -> dict[str, Any]:
     from echousd.check import check_room
-    from echousd.repair.living import living_faults
 
     report = check_room(root)
     floor, geometry = made.floor, made.geometry
@@ -175,7 +194,7 @@ def _facts(made: Any, root: Path) -> dict[str, Any]:
         "categories": dict(sorted(Counter(node.category for node in made.graph.nodes).items())),
         "relations_asked": states["kept"] + states["broken"],
         "relations_kept": states["kept"],
-        "living_faults": [fault.says for fault in living_faults(made.graph, made.boxes)],
+        "living_faults": [fault.says for fault in report.layouts[0].living],
         "collisions": len(report.collisions),
         "check": report.ok,
         "check_errors": [f"{fault.rule} <{fault.prim}>: {fault.message}"[:300] for fault in report.errors][:10],

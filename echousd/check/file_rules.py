@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import PurePosixPath
 
 from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
@@ -13,7 +14,7 @@ from echousd.packing import Reach
 from echousd.stage.encoding import StageError
 from echousd.stage.units import unit_faults
 from echousd.stage.values import asset
-from echousd.textures import READABLE, TextureError, read_image
+from echousd.textures import READABLE, TextureError, file_of, read_image
 
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
@@ -70,12 +71,22 @@ def images(stage: Usd.Stage) -> Iterator[Finding]:
         if not path or PurePosixPath(path.rstrip("]")).suffix.lower() not in READABLE:
             continue
         if path not in known:
-            known[path] = _image_fault(path)
+            known[path] = _image_fault(path, _stamp(path))
         if known[path]:
             yield Finding(prim.GetPath(), known[path])
 
 
-def _image_fault(path: str) -> str:
+def _stamp(path: str) -> tuple[int, ...]:
+    """What changes with a file."""
+    try:
+        found = file_of(path).stat()
+    except (OSError, ValueError):
+        return ()
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+@lru_cache(maxsize=4096)  # rooms of one store share their images
+def _image_fault(path: str, _stamp: tuple[int, ...]) -> str:
     try:
         read_image(path)
     except TextureError as error:

@@ -42,8 +42,27 @@ def usual_drafts(objects: int) -> int:
     return max(1, min(DRAFTS, CROWD // max(objects, 1)))
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The best of some drafts after repair.
+
+    Arguments:
+        of: JSON of the graph that they are of. boxes, conflicts: as `finished_boxes` gives them.
+        wishes: what is left to be wished for, the worse first.
+    """
+
+    of: str
+    boxes: Boxes
+    conflicts: tuple[str, ...]
+    wishes: tuple[float, ...]
+
+
 class DraftsWanted(Exception):  # no error: the caller draws them and asks again
-    """What was drawn leaves something to be wished for, and further ones are drawn elsewhere."""
+    """What was drawn leaves something to be wished for, and further ones are drawn elsewhere; `best` of them."""
+
+    def __init__(self, best: Judged) -> None:
+        super().__init__()
+        self.best = best
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +72,12 @@ class Drawn:
     Arguments:
         rounds: the first draft alone, then those of the following rounds (`draft_rounds`) that were wanted.
         elsewhere: raise `DraftsWanted` in place of drawing further ones.
+        best: of all rounds but the last, where those were judged; None = they are judged again.
     """
 
     rounds: tuple[tuple[Boxes, ...], ...]
     elsewhere: bool = False
+    best: Judged | None = None
 
 
 def sample_boxes(
@@ -125,12 +146,18 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
+    of, judged = graph.to_json() if drawn is not None else "", 0
+    if drawn is not None and drawn.best is not None and drawn.best.of == of:
+        best, worth = (drawn.best.boxes, drawn.best.conflicts), drawn.best.wishes
+        judged = len(drawn.rounds) - 1
     for at, (start, count) in enumerate(draft_rounds(drafts)):
+        if at < judged:
+            continue
         if best is not None and not any(worth):
             break
         given = drawn.rounds[at] if drawn is not None and at < len(drawn.rounds) else ()
-        if not given and drawn is not None and drawn.elsewhere:
-            raise DraftsWanted
+        if not given and best is not None and drawn is not None and drawn.elsewhere:
+            raise DraftsWanted(Judged(of, *best, worth))
         for draft in given or sample_boxes(
             model, graph, seed=seed, number=number + start, count=count, steps=steps, change=change, timer=timer
         ):
@@ -223,11 +250,13 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
         return sum(len(living_faults(graph, boxes)) for boxes in layouts)
 
     bare = graph.replaced(room=graph.room.replaced(openings=()))
+    if not graph.room.openings:
+        return with_placed_openings(bare, plan_boxes(layouts), seed)
     before = faults(graph)
-    if graph.room.openings and before <= faults(bare):
+    if not before or before <= faults(bare):
         return graph
     moved = with_placed_openings(bare, plan_boxes(layouts), seed)
-    return moved if not graph.room.openings or faults(moved) < before else graph
+    return moved if faults(moved) < before else graph
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

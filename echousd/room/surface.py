@@ -15,6 +15,7 @@ from echousd.room.finishes.slots import metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
 CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
+MANY_FACES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +106,7 @@ def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[n
     """
     st = box_projection(mesh)
     points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    board = _boards(faces, len(points))
+    board = connected_pieces(faces, len(points))
     low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
     np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
@@ -141,7 +142,7 @@ def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     if not len(shared):
         return points
     board = np.full(len(points), -1)
-    board[faces] = _boards(faces, len(points))[:, None]
+    board[faces] = connected_pieces(faces, len(points))[:, None]
     low, high = (np.full((int(board.max()) + 1, 3), sign * np.inf) for sign in (1, -1))
     used = board >= 0
     np.minimum.at(low, board[used], points[used])
@@ -164,11 +165,19 @@ def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return out.astype(np.float32)
 
 
-def _boards(faces: np.ndarray, points: int) -> np.ndarray:
-    """(f,) int, the connected piece that each face belongs to."""
-    pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
-    links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(points, points))
-    return np.unique(connected_components(links, directed=False)[1][faces[:, 0]], return_inverse=True)[1]
+def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
+    """(f,) int, the connected piece that each face belongs to, in the order of their first points."""
+    if len(faces) > MANY_FACES:
+        pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
+        links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(points, points))
+        least = connected_components(links, directed=False)[1]
+    else:  # boards: building the matrix would take ten times as long
+        least, before = np.arange(points), None
+        while before is None or not np.array_equal(least, before):
+            before, least = least, least.copy()  # the first point that each is known to be connected with
+            np.minimum.at(least, faces.ravel(), np.repeat(before[faces].min(1), 3))
+            least = least[least]
+    return np.unique(least[faces[:, 0]], return_inverse=True)[1]
 
 
 def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -44,6 +45,13 @@ def walls(polygon: np.ndarray, height: float, openings: Sequence[Opening] = ()) 
         height: of the room, metres.
         openings: in these walls.
     """
+    corners = np.ascontiguousarray(polygon, float)
+    return list(_walls(corners.tobytes(), height, tuple(openings)))
+
+
+@lru_cache(maxsize=4)  # furniture is moved away from them before they are written
+def _walls(corners: bytes, height: float, openings: tuple[Opening, ...]) -> tuple[ShellPart, ...]:
+    polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
     parts = []
     for edge, length in enumerate(lengths):
@@ -59,7 +67,7 @@ def walls(polygon: np.ndarray, height: float, openings: Sequence[Opening] = ()) 
         left_first = signed_area(polygon) > 0
         inner = [_filled(name, opening, frame, float(length), height, left_first) for opening in here]
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
-    return parts
+    return tuple(parts)
 
 
 def ceiling(polygon: np.ndarray, height: float) -> ShellPart:

@@ -19,6 +19,7 @@ from echousd.repair.problem import carriers
 from echousd.repair.repair import DEFAULT_HEIGHT
 from echousd.room.clearing.nofit import Solids, depth, forbidden_moves
 from echousd.room.geometry import Geometry
+from echousd.room.surface import connected_pieces
 from echousd.room.walls import ShellPart
 from echousd.room.walls import walls as walls_of
 
@@ -157,11 +158,14 @@ def shell_solids(parts: Sequence[ShellPart]) -> Iterator[Solids]:
         for filled in part.inner:
             for piece in filled.pieces:
                 if piece.solid:
-                    yield [np.asarray(board.vertices) for board in _boards(piece.mesh)]
+                    yield _boards(piece.mesh)
 
 
-def _boards(mesh: trimesh.Trimesh) -> Sequence[trimesh.Trimesh]:
-    return mesh.split(only_watertight=False)  # type: ignore[no-any-return]
+def _boards(mesh: trimesh.Trimesh) -> Solids:
+    """Points of the connected pieces of a mesh."""
+    faces, points = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    board = connected_pieces(faces, len(points))
+    return [points[np.unique(faces[board == number])] for number in range(int(board.max()) + 1)]
 
 
 def _placed(points: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
