@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from echousd.batches.devices import CPU, network_processes
 from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
@@ -88,6 +89,9 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
+    device = request.options.device
+    if not how.ray and how.executor is None:
+        network_processes(device)
     plan = make_plan(request, weights_hash(request.options.weights))
     place = shard_folder(out, how.shard)
     with locked(place):
@@ -95,7 +99,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
         valid = _valid(plan, out, how.shard)
         rounds = {name: row.get("rounds", 1) for name, row in read_journals(out).items() if name in valid}
         journal = Journal(place)
-        pool = how.executor or _executor(how, len(plan.entries))
+        pool = how.executor or _executor(how, len(plan.entries), device)
         seen = out.resolve() if how.ray else out  # workers elsewhere stand in another folder
         run = Run(plan, plan.packs(how.shard), valid, seen, journal, how, rounds)
         try:
@@ -122,7 +126,7 @@ def generate_many(
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
-    load_model(asked.weights or None, asked.preset)
+    load_model(asked.weights or None, asked.preset, device=asked.device)
     waiting = iter(graphs)
     number = 0
     while pack := [graph for _, graph in zip(range(PACK), waiting)]:  # noqa: B905  # the last pack is shorter
@@ -151,19 +155,20 @@ def _judged(job: Job) -> Room | Best:
     from echousd.room.layouts import DraftsWanted
 
     try:
-        found: Room = generated(job)
+        found: Room = generated(job, here=True)
     except DraftsWanted as wanted:
         return best_of(wanted)
     return found
 
 
-def _executor(how: RunOptions, rooms: int) -> Executor:
+def _executor(how: RunOptions, rooms: int, device: str) -> Executor:
     if not how.ray:
-        workers = max(min(how.workers or cores(), rooms), 1)
-        return LocalWorkers(workers, timeout=how.timeout, memory=how.memory)
+        workers, networks = max(min(how.workers or cores(), rooms), 1), network_processes(device)
+        return LocalWorkers(workers, networks=networks, timeout=how.timeout, memory=how.memory)
     from echousd.batches.cluster import RayCluster
 
-    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory)
+    gpus = 0.0 if device == CPU else 1.0
+    return RayCluster(how.ray, workers=how.workers, timeout=how.timeout, memory=how.memory, gpus=gpus)
 
 
 def cores() -> int:

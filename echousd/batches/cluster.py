@@ -32,6 +32,7 @@ class RayCluster:
         address: `auto`, the cluster that runs on this machine or a new one, or that of a cluster's head.
         workers: rooms at once, None = as many as the cluster has CPUs.
         timeout, memory: as of `LocalWorkers`; memory is watched by each worker itself.
+        gpus: of the cluster that each actor of the network has; 0 = it runs on CPUs.
 
     Raises ValueError where Ray is not installed or no cluster answers.
     """
@@ -51,9 +52,13 @@ class RayCluster:
             self._connect(address, workers)
         self._timeout, self._memory, self._gpus = timeout, memory, gpus
         self._slots = workers or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        there = int(self._ray.cluster_resources().get("GPU", 0))
+        if gpus and not there:
+            self._leave()
+            raise ValueError("device: the Ray cluster has no GPUs, allowed: cpu")
         self._begun: dict[Any, _Begun] = {}
         self._room = self._ray.remote(num_cpus=1, max_retries=0)(watched)
-        networks = max(1, int(self._ray.cluster_resources().get("GPU", 1))) if gpus else self._slots / ROOMS_A_NETWORK
+        networks = there / gpus if gpus else self._slots / ROOMS_A_NETWORK
         self._actors = [self._start() for _ in range(math.ceil(networks))]
 
     @property
@@ -76,7 +81,7 @@ class RayCluster:
         if task.network:
             busy = {begun.actor for begun in self._begun.values()}
             number = next(number for number in range(len(self._actors)) if number not in busy)
-            reference = self._actors[number].work.remote(task.call, task.given, self._memory)
+            reference = self._actors[number].work.remote(task.call, task.given, None if self._gpus else self._memory)
             self._begun[reference] = _Begun(task, time.monotonic(), number)
         else:
             self._begun[self._room.remote(task.call, task.given, self._memory)] = _Begun(task, time.monotonic())
@@ -108,6 +113,9 @@ class RayCluster:
         for actor in self._actors:
             with contextlib.suppress(self._ray.exceptions.RayError, ValueError):
                 self._ray.kill(actor)
+        self._leave()
+
+    def _leave(self) -> None:
         if self._ours:
             self._ray.shutdown()
 
@@ -140,7 +148,7 @@ class RayCluster:
     def _overdue(self) -> list[Outcome]:
         found = []
         for reference, begun in list(self._begun.items()):
-            if self._timeout is None or time.monotonic() - begun.since <= self._timeout:
+            if self._timeout is None or time.monotonic() - begun.since <= self._timeout * begun.task.rooms:
                 continue
             del self._begun[reference]
             if begun.actor < 0:

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -28,12 +28,14 @@ class Task:
     Arguments:
         key: unique in its run; call: the function; given: its one argument.
         network: whether it is the network's, where that has processes of its own.
+        rooms: how many it is for; each has the time that one may take.
     """
 
     key: str
     call: Callable[[Any], Any]
     given: Any
     network: bool = False
+    rooms: int = 1
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,7 @@ class Executor(Protocol):
 class _Worker:
     process: Any
     pipe: Connection
+    network: dict[str, str] | None = None  # its environment, if it has a device
     task: Task | None = None
     since: float = 0.0
 
@@ -92,22 +95,31 @@ class LocalWorkers:
     """Processes of this machine, one task at a time each; one that ends early is replaced.
 
     Arguments:
-        workers: how many. timeout: seconds a task may take, None = for ever. memory: MiB that a worker may hold.
+        workers: how many. timeout: seconds a room may take, None = for ever. memory: MiB that a worker may hold.
+        networks: environment of each process that runs the network and nothing else, one a device; none = the workers
+            run it, too. Their memory is not limited: it grows with the device's.
     """
 
-    def __init__(self, workers: int, *, timeout: float | None = None, memory: int | None = None) -> None:
+    def __init__(
+        self,
+        workers: int,
+        *,
+        networks: Sequence[dict[str, str]] = (),
+        timeout: float | None = None,
+        memory: int | None = None,
+    ) -> None:
         self._timeout, self._memory = timeout, memory
         self._context = multiprocessing.get_context("spawn")
-        self._workers = [self._start() for _ in range(workers)]
+        self._workers = [self._start(network) for network in (*[None] * workers, *networks)]
 
     @property
     def workers(self) -> int:
         """How many rooms are made at once."""
-        return len(self._workers)
+        return len(self._those_for(network=False))
 
     def free(self, *, network: bool = False) -> int:
         """How many more tasks are taken now, of the network or others."""
-        return sum(worker.task is None for worker in self._workers)
+        return sum(worker.task is None for worker in self._those_for(network=network))
 
     @property
     def megabytes(self) -> float:
@@ -121,7 +133,7 @@ class LocalWorkers:
 
     def submit(self, task: Task) -> None:
         """Give a task to an idle worker."""
-        worker = next(worker for worker in self._workers if worker.task is None)
+        worker = next(worker for worker in self._those_for(network=task.network) if worker.task is None)
         worker.task, worker.since = task, time.monotonic()
         with contextlib.suppress(OSError):  # it is dead; `outcomes` will see that
             worker.pipe.send((task.call, task.given))
@@ -142,7 +154,7 @@ class LocalWorkers:
                 found.append(outcome)
                 worker.task = None
                 if outcome.fate in ("limit", "died"):
-                    self._workers[number] = self._start()
+                    self._workers[number] = self._start(worker.network)
             if time.monotonic() >= until:
                 break
         return found
@@ -168,9 +180,13 @@ class LocalWorkers:
         if not worker.process.is_alive():
             return Outcome(worker.task, "died", error=_ending(worker.process.exitcode))
         error = ""
-        if self._timeout is not None and time.monotonic() - worker.since > self._timeout:
+        if self._timeout is not None and time.monotonic() - worker.since > self._timeout * worker.task.rooms:
             error = f"took longer than {self._timeout:g} s"
-        elif self._memory is not None and (held := resident(worker.process.pid)) > self._memory:
+        elif (
+            self._memory is not None
+            and worker.network is None
+            and (held := resident(worker.process.pid)) > self._memory
+        ):
             error = f"held {held:.0f} MiB of memory, allowed: {self._memory} MiB"
         if not error:
             return None
@@ -178,11 +194,16 @@ class LocalWorkers:
         worker.process.join(5)
         return Outcome(worker.task, "limit", error=error)
 
-    def _start(self) -> _Worker:
+    def _those_for(self, *, network: bool) -> list[_Worker]:
+        own = [worker for worker in self._workers if worker.network is not None]
+        return own if own and network else [worker for worker in self._workers if worker.network is None]
+
+    def _start(self, network: dict[str, str] | None = None) -> _Worker:
         mine, its = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(its, os.getpid()), daemon=True)
-        before = {name: os.environ.get(name) for name in ONE_CORE}
-        os.environ.update(ONE_CORE)
+        own = ONE_CORE | (network or {})
+        before = {name: os.environ.get(name) for name in own}
+        os.environ.update(own)
         try:
             process.start()
         finally:
@@ -192,7 +213,7 @@ class LocalWorkers:
                 else:
                     os.environ[name] = value
         its.close()
-        return _Worker(process, mine)
+        return _Worker(process, mine, network)
 
 
 def attempt(call: Callable[[Any], Any], given: Any) -> tuple[str, Any]:

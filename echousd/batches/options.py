@@ -21,6 +21,7 @@ class BatchOptions(BaseModel):
         relations: relations an object that are told of a room drawn from the room generator (`sample`).
         preview: draw a picture of every room (needs the extra `render`).
         weights: weights file or folder, "" for those that ship. assets: index of a library, "" for none.
+        device: what the network runs on, `cpu`, `cuda` or `mps`; it is part of the plan, as sums round by it.
         palette: harmony of the room, "" = the seed chooses.
         openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
@@ -32,6 +33,7 @@ class BatchOptions(BaseModel):
     preset: str | None = None
     weights: str = ""
     assets: str = ""
+    device: Literal["cpu", "cuda", "mps"] = "cpu"
     repair: bool = True
     layouts: Annotated[int, Field(ge=1, le=1000)] = 1
     drafts: Annotated[int, Field(ge=1, le=64)] | None = None
@@ -84,6 +86,8 @@ def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
     """A checked request; raises ValueError that names `where`, the field, what was found and what is allowed."""
     try:
         request = BatchRequest.model_validate(dict(raw))
+        if "device" in request.variations:
+            raise ValueError(f"{where}: variations: device, allowed: options that a room shows; one device for all")
         if not all(request.variations.values()):
             raise ValueError(f"{where}: variations: an empty list, allowed: at least one value of each option")
         for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):

@@ -120,6 +120,7 @@ class Run:
     stopped: str = ""
     _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
     _more: deque[_Pack] = field(default_factory=deque)
+    _wanted: deque[tuple[Entry, work.Job, work.Wanted]] = field(default_factory=deque)
     _of: dict[str, _Pack] = field(default_factory=dict)
     _tries: dict[str, int] = field(default_factory=dict)
     _asked: dict[str, Any] = field(default_factory=dict)
@@ -130,14 +131,18 @@ class Run:
         progress = BatchProgress(sum(map(len, self.packs)), done=len(self.skip))
         waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
         layouts_out = 0
-        while waiting or self._ready or self._asked or self._more:
+        while waiting or self._ready or self._asked or self._more or self._wanted:
             self._check_stop(progress)
             while not self.stopped:
                 soon = len(self._ready) + PACK * layouts_out
-                wanted = waiting and (soon < 2 * executor.workers or not self._ready)  # no worker waits for another's
-                if self._more and executor.free(network=True):
+                early = waiting and (soon < 2 * executor.workers or not self._ready)  # no worker waits for another's
+                if self._wanted and executor.free(network=True):
+                    entry, job, wanted = self._wanted.popleft()
+                    key = f"samples {len(job.answers)} {entry.id}"
+                    self._submit(executor, Task(key, work.samples, (job, wanted), network=True), entry)
+                elif self._more and executor.free(network=True):
                     layouts_out += self._submit_further(executor, self._more.popleft())
-                elif wanted and executor.free(network=True):
+                elif early and executor.free(network=True):
                     layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
                 elif self._ready and executor.free():
                     entry, job = self._ready.popleft()
@@ -181,14 +186,15 @@ class Run:
         if all(entry.id in self.skip for entry in good):
             return 0
         jobs = [self._job(entry) for entry in good]
-        self._submit(executor, Task(f"layouts {pack[0].number}", work.layouts, jobs, network=True), good)
+        task = Task(f"layouts {pack[0].number}", work.layouts, jobs, network=True, rooms=len(jobs))
+        self._submit(executor, task, good)
         return 1
 
     def _submit_further(self, executor: Executor, pack: _Pack) -> int:
         gone = (NOTHING,) * (pack.round + 1)  # of a room that is there: only its next drafts are drawn again
         jobs = [job or self._job(entry, rounds=gone) for entry, job in pack.wanting.items()]
         key = f"round {pack.round + 1} {pack.entries[0].number}"
-        self._submit(executor, Task(key, work.layouts, jobs, network=True), pack)
+        self._submit(executor, Task(key, work.layouts, jobs, network=True, rooms=len(jobs)), pack)
         return 1
 
     def _submit(self, executor: Executor, task: Task, asked: Any) -> None:
@@ -243,6 +249,13 @@ class Run:
             self._more.append(pack)
 
     def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
+        if isinstance(outcome.value, work.Wanted):
+            self._wanted.append((entry, outcome.task.given, outcome.value))
+            return
+        if outcome.fate == "done" and isinstance(outcome.value, bytes):
+            job = outcome.task.given[0]
+            self._ready.appendleft((entry, replace(job, answers=(*job.answers, outcome.value))))
+            return
         best = outcome.value if isinstance(outcome.value, work.Best) else None
         self._judged(entry, None if best is None else replace(outcome.task.given, best=best))
         if best is not None:

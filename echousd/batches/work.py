@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from echousd.batches.devices import CPU
+from echousd.batches.elsewhere import ElsewhereModel, SamplesWanted, sampled
 from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
 from echousd.batches.sources import sampled_graph
@@ -30,6 +32,13 @@ class Best:
 
 
 @dataclass(frozen=True)
+class Wanted:
+    """Samples that a room wants from the process that has the device (`echousd.batches.elsewhere`)."""
+
+    call: bytes
+
+
+@dataclass(frozen=True)
 class Job:
     """One room as a worker needs it.
 
@@ -38,6 +47,7 @@ class Job:
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
         seed, options: as in the plan. rounds: drafts of its first layout, round by round; none = sampled alone.
         best: of all rounds but the last, None = nobody has judged them.
+        answers: samples of the process that has the device.
     """
 
     id: str
@@ -49,6 +59,7 @@ class Job:
     rounds: tuple[tuple[Rows, ...], ...] = ()
     store: str = ""
     best: Best | None = None
+    answers: tuple[bytes, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,7 +97,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
     asked = {i: (jobs[i].options.weights, jobs[i].options.preset, jobs[i].options.steps) for i in graphs}
     for weights, preset, steps in dict.fromkeys(asked.values()):
         same = [i for i in graphs if asked[i] == (weights, preset, steps)]
-        model = load_model(weights or None, preset)
+        model = load_model(weights or None, preset, device=jobs[same[0]].options.device)
         try:
             sample(model, same, steps)
         except ValueError:
@@ -98,8 +109,19 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
     return out
 
 
-def room(job: Job) -> dict[str, Any] | Best:
-    """Make, save and judge one room, and return its row of the manifest, or the best draft if it wants further ones.
+def samples(asks: tuple[Job, Wanted]) -> bytes:
+    """What the network of a job's options makes of what it wants."""
+    from echomodel.loading import load_model
+    from echousd.room.reproducible import one_thread
+
+    asked, wanted = asks[0].options, asks[1]
+    with one_thread():
+        return sampled(load_model(asked.weights or None, asked.preset, device=asked.device), wanted.call)
+
+
+def room(job: Job) -> dict[str, Any] | Best | Wanted:
+    """Make, save and judge one room, and return its row of the manifest; or what it wants from the network first: the
+    best draft where further ones are wanted, or samples of shapes.
 
     Raises ValueError as `generate` and `Room.save` do.
     """
@@ -111,6 +133,8 @@ def room(job: Job) -> dict[str, Any] | Best:
             made = generated(job)
         except DraftsWanted as wanted:
             return best_of(wanted)
+        except SamplesWanted as wanted:
+            return Wanted(wanted.call)
         root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
     facts = {**_facts(made, root), "rounds": max(1, len(job.rounds))}
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
@@ -118,8 +142,13 @@ def room(job: Job) -> dict[str, Any] | Best:
     return facts
 
 
-def generated(job: Job) -> Any:
-    """The room (`Room`) of a job; raises DraftsWanted where it has drafts and none of them is good enough."""
+def generated(job: Job, *, here: bool = False) -> Any:
+    """The room (`Room`) of a job; raises DraftsWanted where it has drafts and none of them is good enough.
+
+    Arguments:
+        here: this process has the device; else SamplesWanted is raised for what another one must sample.
+    """
+    from echomodel.loading import load_model
     from echousd.room.pipeline import generate
 
     drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
@@ -127,8 +156,11 @@ def generated(job: Job) -> Any:
     best = None if found is None else Judged(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
     drawn = Drawn(drafts, elsewhere=True, best=best) if drafts else None
     asked = job.options
+    model = load_model(asked.weights or None, asked.preset, device=asked.device if here else CPU)
+    if asked.device != CPU and not here:
+        model = ElsewhereModel(model, job.answers)
     return generate(
-        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.assets or None, model=asked.weights or None,
+        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.assets or None, model=model,
         preset=asked.preset,
         repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
         options=asked.look, drawn=drawn,

@@ -61,6 +61,9 @@ def run(
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    device: Annotated[
+        str | None, typer.Option(help="Of the network: cpu, cuda (a process for each) or mps; default cpu.")
+    ] = None,
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
     dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
@@ -90,6 +93,7 @@ def run(
         "shapes": shapes,
         "assets": str(assets.absolute()) if assets else None,
         "weights": str(weights) if weights else None,
+        "device": device,
         "preview": preview,
         "walls": walls,
     }

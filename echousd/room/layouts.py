@@ -113,7 +113,7 @@ def sample_boxes(
     if change is not None:
         extra["edit"] = repeated(change, len(nodes), count)
     with timer.stage("layout") as tell, one_thread():
-        found = model.sample_layout(batch, generator=seeded(seed, "layout", number), progress=tell, **extra)
+        found = model.sample_layout(batch, generator=seeded(seed, "layout", number), progress=tell, **extra).to("cpu")
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
         for rows in torch.arange(count * len(nodes)).chunk(count)

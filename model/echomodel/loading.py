@@ -14,10 +14,13 @@ from echomodel.protocols import RoomModel
 PRESETS = ("compact", "paper", "released")
 
 
-def load_model(model: RoomModel | str | Path | None, preset: str | None = None) -> RoomModel:
+def load_model(model: RoomModel | str | Path | None, preset: str | None = None, *, device: str = "cpu") -> RoomModel:
     """The model itself, or the one in a weights file (None: shipped), of the kind that the file says it is.
 
     A file that did not change since is not read again.
+
+    Arguments:
+        preset: that it must be of, None = any. device: where to load one, as torch calls it (`cpu`, `cuda`, `mps`).
 
     Raises ValueError where there is none, or one of another preset than `preset`.
     """
@@ -26,23 +29,23 @@ def load_model(model: RoomModel | str | Path | None, preset: str | None = None) 
         found: RoomModel = model
     else:
         path = None if model is None else Path(model).absolute()
-        found = _loaded(path, _stamp(path))
+        found = _loaded(path, _stamp(path), device)
     if preset not in (None, found.preset):
         raise ValueError(f"{model}: holds a model of the preset {found.preset!r}, asked for: {preset!r}")
     return found
 
 
 @lru_cache(maxsize=2)
-def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...]) -> RoomModel:
+def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
     from echomodel.checkpoint import is_released
 
     if path is not None and is_released(path):
         from echomodel.released.echo import ReleasedEcho
 
-        return ReleasedEcho.load(path)
+        return ReleasedEcho.load(path, device=device)
     from echomodel.echo import EchoModel
 
-    return EchoModel.load(path)
+    return EchoModel.load(path, device=device)
 
 
 def _stamp(path: Path | None) -> tuple[tuple[str, int, int], ...]:

@@ -72,7 +72,7 @@ def descriptions(request: ShapeRequest) -> np.ndarray:
             graph_batch(graph), centred, generator=seeded(request.seed, "parts"), steps=request.steps,
             styles=styles, progress=tell, **extra,
         )  # fmt: skip
-    return rounded_descriptions(np.asarray(found))
+    return rounded_descriptions(np.asarray(found.cpu()))
 
 
 SOURCE = AssembledParts()

@@ -6,13 +6,13 @@ import tarfile
 from pathlib import Path
 
 import pytest
+from inline_batches import QUICK, Inline, digests
 from pxr import Usd
 
 from echousd.batches import batch as front
 from echousd.batches import run as running
 from echousd.batches import work
 from echousd.batches.batch import batch, generate_many
-from echousd.batches.executor import Outcome, attempt
 from echousd.batches.journal import read_journals, room_digest, shard_folder
 from echousd.batches.manifest import manifest_rows
 from echousd.batches.plan import load_plan
@@ -24,36 +24,6 @@ from echousd.room.lock import locked
 from echousd.store import Store
 
 SAMPLES = Path(__file__).parents[3] / "samples"
-QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
-
-
-class Inline:
-    """Runs tasks where it stands; `fates` are forced upon the first tries of some."""
-
-    workers = 1
-
-    def __init__(self, fates=()):
-        self.fates, self.done, self.megabytes, self.calls = dict(fates), [], 0.0, []
-
-    def free(self, *, network=False):
-        return 1 - len(self.done)
-
-    def submit(self, task):
-        self.calls.append(task.key)
-        forced = self.fates.get(task.key)
-        if forced:
-            fate = forced.pop(0)
-            self.done.append(Outcome(task, fate, error=f"forced: {fate}"))
-            return
-        fate, value = attempt(task.call, task.given)
-        self.done.append(Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value))
-
-    def outcomes(self, seconds):
-        out, self.done = self.done, []
-        return out
-
-    def close(self):
-        pass
 
 
 def small(tmp_path):
@@ -75,10 +45,6 @@ def calm(tmp_path_factory):
     source = small(folder)
     result = batch(source, folder / "run", executor=Inline(), workers=1, **QUICK)
     return source, folder / "run", result
-
-
-def digests(folder):
-    return {path.name: room_digest(path) for path in sorted((folder / "rooms").glob("*/*"))}
 
 
 def test_a_poisonous_graph_is_recorded_and_the_others_are_made(calm):

@@ -1,0 +1,39 @@
+"""Batches in the test's own process, of rooms that are made fast."""
+
+from echousd.batches.executor import Outcome, attempt
+from echousd.batches.journal import room_digest
+
+QUICK = {"shapes": "boxes", "preview": False, "drafts": 1, "steps": 2}
+
+
+class Inline:
+    """Runs tasks where it stands; `fates` are forced upon the first tries of some."""
+
+    workers = 1
+
+    def __init__(self, fates=()):
+        self.fates, self.done, self.megabytes, self.calls = dict(fates), [], 0.0, []
+
+    def free(self, *, network=False):
+        return 1 - len(self.done)
+
+    def submit(self, task):
+        self.calls.append(task.key)
+        forced = self.fates.get(task.key)
+        if forced:
+            fate = forced.pop(0)
+            self.done.append(Outcome(task, fate, error=f"forced: {fate}"))
+            return
+        fate, value = attempt(task.call, task.given)
+        self.done.append(Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value))
+
+    def outcomes(self, seconds):
+        out, self.done = self.done, []
+        return out
+
+    def close(self):
+        pass
+
+
+def digests(folder):
+    return {path.name: room_digest(path) for path in sorted((folder / "rooms").glob("*/*"))}
