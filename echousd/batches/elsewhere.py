@@ -1,7 +1,7 @@
 """A model whose shapes are sampled in another process, which has the device: a room asks, and is made with the answer.
 
-A room's shapes depend on its repaired boxes, which its worker makes; the device's process samples them. What the two say
-to one another are pickles of this run's own processes, and nothing of them is ever on a disk.
+A room's shapes depend on its repaired boxes, which its worker makes; the device's process samples them. What the two
+say to one another are pickles of this run's own processes, and nothing of them is ever on a disk.
 """
 
 from __future__ import annotations

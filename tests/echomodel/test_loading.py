@@ -16,14 +16,15 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
         preset = "compact"
 
     read = []
-    monkeypatch.setattr("echomodel.echo.EchoModel.load", lambda path: read.append(path) or Model())
+    monkeypatch.setattr("echomodel.echo.EchoModel.load", lambda path, device: read.append((path, device)) or Model())
     path = tmp_path / "weights.safetensors"
     path.write_bytes(b"1")
     first = load_model(path)
     assert load_model(str(path)) is first
     path.write_bytes(b"22")
     assert load_model(path) is not first
-    assert read == [path, path]
+    assert load_model(path, device="cuda") is not load_model(path)
+    assert read == [(path, "cpu"), (path, "cpu"), (path, "cuda")]
     assert load_model(first) is first
 
 
