@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
 from echomodel.released.layout import LayoutNet, check_inputs, edge_input
 from echomodel.released.packed import PackedLinear, folded_norm
-from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, time_signal
+from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, time_signal, walk
 
 
 def _tap(conv: Any) -> Tensor:
@@ -172,17 +172,7 @@ class CompiledLayout:
 
     def denoise(self, x: Tensor, time: Tensor, context: Tensor) -> Tensor:
         """(N, 8) state, (N, W) table rows and (N, C) contexts of all transformer blocks -> (N, 8) noise."""
-        h, skips = x, []
-        for block in self.inputs:
-            for part in block:
-                h = part(h, time, context)
-            skips.append(h)
-        for part in self.middle:
-            h = part(h, time, context)
-        for block in self.outputs:
-            h = torch.cat([h, skips.pop()], dim=1)
-            for part in block:
-                h = part(h, time, context)
+        h = walk(x, self.inputs, self.middle, self.outputs, lambda part, h: part(h, time, context))
         return self.out(self.out_norm.silu(h))
 
 

@@ -18,7 +18,7 @@ from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
 from echomodel.released.layout import check_inputs, edge_input
 from echomodel.released.packed import PackedLinear, folded_norm
 from echomodel.released.shape import ShapeUNet
-from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up
+from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, walk
 from echomodel.released.volumes import WinogradConv, convolve_repeated
 
 LAST = torch.channels_last_3d
@@ -181,17 +181,8 @@ class CompiledShape:
 
     def denoise(self, x: Tensor, time: Tensor, context: Tensor) -> Tensor:
         """(N, 3, D, H, W) state, (N, .) time shifts and (N, .) contexts of all blocks -> (N, 3, D, H, W) noise."""
-        h, skips = x.contiguous(memory_format=LAST), []
-        for block in self.inputs:
-            for part in block:
-                h = part(h, time, context)
-            skips.append(h)
-        for part in self.middle:
-            h = part(h, time, context)
-        for block in self.outputs:
-            h = torch.cat([h, skips.pop()], dim=1)
-            for part in block:
-                h = part(h, time, context)
+        h = x.contiguous(memory_format=LAST)
+        h = walk(h, self.inputs, self.middle, self.outputs, lambda part, h: part(h, time, context))
         return self.out(F.silu(self.out_norm(h), inplace=True)).contiguous()
 
 

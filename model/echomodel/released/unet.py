@@ -9,6 +9,8 @@ context is a single token, so cross-attention is its value path, broadcast. The 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -18,6 +20,7 @@ from echomodel.released.config import UNetConfig
 from echomodel.released.volumes import convolve_repeated
 
 GROUPS = 32
+Part = TypeVar("Part")
 
 
 def time_signal(t: Tensor, width: int) -> Tensor:
@@ -172,6 +175,35 @@ class Up(nn.Module):
         return convolve(self.conv, h)
 
 
+def walk(
+    h: Tensor,
+    inputs: Iterable[Iterable[Part]],
+    middle: Iterable[Part],
+    outputs: Iterable[Iterable[Part]],
+    call: Callable[[Part, Tensor], Tensor],
+) -> Tensor:
+    """Down and up through a U-Net's blocks, what every block of the way down gave joined to the way up.
+
+    Arguments:
+        h: (N, C, ...) features. inputs, middle, outputs: blocks, each a row of parts.
+        call: a part and its features -> its result.
+    """
+
+    def run(block: Iterable[Part], h: Tensor) -> Tensor:
+        for part in block:
+            h = call(part, h)
+        return h
+
+    skips = []
+    for block in inputs:
+        h = run(block, h)
+        skips.append(h)
+    h = run(middle, h)
+    for block in outputs:
+        h = run(block, torch.cat([h, skips.pop()], dim=1))
+    return h
+
+
 class UNet(nn.Module):
     """Noise prediction from a noisy state, a time and one context token per node.
 
@@ -230,24 +262,13 @@ class UNet(nn.Module):
     def denoise(self, h: Tensor, embedding: Tensor, context: Tensor | None) -> Tensor:
         """(N, channels, ...) state, (N, 4 width) time, (N, context) token -> (N, channels, ...) noise."""
 
-        def run(block: nn.Module, h: Tensor) -> Tensor:
-            for part in block:  # type: ignore[attr-defined]
-                if isinstance(part, ResBlock):
-                    h = part(h, embedding)
-                elif isinstance(part, SpatialTransformer):
-                    h = part(h, context)
-                elif isinstance(part, Down | Up):
-                    h = part(h)
-                else:
-                    h = convolve(part, h)
-            return h
+        def call(part: nn.Module, h: Tensor) -> Tensor:
+            if isinstance(part, ResBlock):
+                return part(h, embedding)
+            if isinstance(part, SpatialTransformer):
+                return part(h, context)
+            return part(h) if isinstance(part, Down | Up) else convolve(part, h)
 
-        skips = []
-        for block in self.input_blocks:
-            h = run(block, h)
-            skips.append(h)
-        h = run(self.middle_block, h)
-        for block in self.output_blocks:
-            h = run(block, torch.cat([h, skips.pop()], dim=1))
+        h = walk(h, self.input_blocks, self.middle_block, self.output_blocks, call)  # type: ignore[arg-type]
         norm, act, conv = self.out
         return convolve(conv, act(norm(h)))
