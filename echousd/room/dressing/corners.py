@@ -28,13 +28,9 @@ def corner_plants(setting: Setting) -> None:
         inside = [inward_normal(setting.floor, edge) for edge in (corner - 1, corner)]
         if abs(float(inside[0] @ inside[1])) > 0.5:
             continue
-        for off in (0.1, 0.2):
-            spot = setting.floor[corner] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off)
-            thing = Thing(kind, size, np.array([spot[0], 0.0, spot[1]]), float(rng.uniform(-3, 3)), "", variant)
-            if setting.clear(thing, margin=AROUND):
-                setting.placed.append(thing)
-                green += 1
-                break
+        middles = [setting.floor[corner] + (inside[0] + inside[1]) * (float(size[0]) / 2 + off) for off in (0.1, 0.2)]
+        wanted = (Thing(kind, size, np.array([x, 0.0, z]), float(rng.uniform(-3, 3)), "", variant) for x, z in middles)
+        green += setting.put_first(wanted, margin=AROUND) is not None
 
 
 def poufs(setting: Setting) -> None:
@@ -45,14 +41,10 @@ def poufs(setting: Setting) -> None:
         rng = setting.rng(host.name, "pouf")
         size, variant = usual_size("pouf", rng), int(rng.integers(1 << 30))
         w, _, d = host.size
-        for x in (w / 2 + 0.45, -w / 2 - 0.45):
-            for z in (d / 2 + 0.35, d / 2 + 0.8, 0.0):
-                spot = host.to_room(np.array([[x, 0.0, z]]))[0]
-                spot[1] = 0.0
-                thing = Thing("pouf", size, spot, host.yaw, "", variant)
-                if setting.clear(thing, margin=0.25):
-                    setting.placed.append(thing)
-                    return
+        spots = [(x, z) for x in (w / 2 + 0.45, -w / 2 - 0.45) for z in (d / 2 + 0.35, d / 2 + 0.8, 0.0)]
+        wanted = (Thing("pouf", size, host.on_floor(x, z), host.yaw, "", variant) for x, z in spots)
+        if setting.put_first(wanted, margin=0.25):
+            return
 
 
 def slippers(setting: Setting) -> None:
@@ -64,14 +56,12 @@ def slippers(setting: Setting) -> None:
         size, variant = usual_size("slippers", rng), int(rng.integers(1 << 30))
         w, _, d = host.size
         for side in (1, -1):
-            for z in (0.0, 0.15 * d, -0.15 * d, 0.35 * d):
-                spot = host.to_room(np.array([[side * (w / 2 + 0.22), 0.0, z]]))[0]
-                spot[1] = 0.0
-                yaw = host.yaw + side * np.pi / 2 + float(rng.uniform(-0.2, 0.2))
-                thing = Thing("slippers", size, spot, yaw, "", variant)
-                if setting.clear(thing, margin=0.02):
-                    setting.placed.append(thing)
-                    break
+            x, yaw = side * (w / 2 + 0.22), host.yaw + side * np.pi / 2
+            wanted = (
+                Thing("slippers", size, host.on_floor(x, z), yaw + float(rng.uniform(-0.2, 0.2)), "", variant)
+                for z in (0.0, 0.15 * d, -0.15 * d, 0.35 * d)
+            )
+            setting.put_first(wanted, margin=0.02)
 
 
 def cables(setting: Setting) -> None:
@@ -80,10 +70,8 @@ def cables(setting: Setting) -> None:
         return
     for host in setting.of("floor_lamp"):
         rng = setting.rng(host.name, "cable")
-        for thing in _ways_to_walls(setting, host, rng):
-            if setting.clear(thing, host=host.name, margin=0.004) and not _on_rug(setting, thing):
-                setting.placed.append(thing)
-                break
+        ways = (thing for thing in _ways_to_walls(setting, host, rng) if not _on_rug(setting, thing))
+        setting.put_first(ways, host=host.name, margin=0.004)
 
 
 def _ways_to_walls(setting: Setting, host: Standing, rng: np.random.Generator) -> list[Thing]:

@@ -28,8 +28,7 @@ def rugs(setting: Setting) -> None:
             continue
         for share in shrink:
             extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
-            spot = host.to_room(np.array([[centre[0], 0.0, centre[1]]]))[0]
-            spot[1] = 0.0
+            spot = host.on_floor(*centre)
             plan = rectangle(spot[[0, 2]], extents, host.yaw)
             if _lies(setting, plan, group) and not any(plan.intersects(other) for other in done):
                 done.append(plan.buffer(0.1))
@@ -88,12 +87,13 @@ def by_doors(setting: Setting) -> None:
         hinge, closed = hinge_point(setting.floor, door)
         inside = inward_normal(setting.floor, door.edge)
         yaw = float(np.arctan2(-inside[0], -inside[1])) + float(rng.uniform(-0.15, 0.15))
-        for along in (door.width + 0.3, door.width + 0.45, door.width + 0.65, -0.3, -0.5):
-            spot = hinge + closed * along + inside * (size[2] / 2 + 0.05)
-            shoes = Thing("shoes", size, np.array([spot[0], 0.0, spot[1]]), yaw, variant=int(rng.integers(1 << 30)))
-            if setting.clear(shoes, margin=0.03):
-                setting.placed.append(shoes)
-                return
+        along = (door.width + 0.3, door.width + 0.45, door.width + 0.65, -0.3, -0.5)
+        middles = [hinge + closed * share + inside * (size[2] / 2 + 0.05) for share in along]
+        pairs = (
+            Thing("shoes", size, np.array([x, 0.0, z]), yaw, variant=int(rng.integers(1 << 30))) for x, z in middles
+        )
+        if setting.put_first(pairs, margin=0.03):
+            return
 
 
 def baskets(setting: Setting) -> None:
@@ -104,12 +104,9 @@ def baskets(setting: Setting) -> None:
         rng = setting.rng(host.name, "basket")
         size = usual_size("basket", rng)
         variant = int(rng.integers(1 << 30))
-        for side in (1, -1):
-            x = side * (host.size[0] / 2 + size[0] / 2 + 0.06)
-            for z in (-host.size[2] / 2 + size[2] / 2 + 0.05, 0.0, host.size[2] / 2 - size[2] / 2):
-                spot = host.to_room(np.array([[x, 0.0, z]]))[0]
-                spot[1] = 0.0
-                thing = Thing("basket", size, spot, host.yaw, "", variant)
-                if setting.clear(thing, margin=0.03):
-                    setting.placed.append(thing)
-                    return
+        x = host.size[0] / 2 + size[0] / 2 + 0.06
+        back, front = -host.size[2] / 2 + size[2] / 2 + 0.05, host.size[2] / 2 - size[2] / 2
+        spots = [(side * x, z) for side in (1, -1) for z in (back, 0.0, front)]
+        wanted = (Thing("basket", size, host.on_floor(*spot), host.yaw, "", variant) for spot in spots)
+        if setting.put_first(wanted, margin=0.03):
+            return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -30,14 +30,11 @@ def shelves(setting: Setting) -> None:
     for wall in _roomiest(setting):
         rng = setting.rng(f"wall {wall.edge}", "shelf")
         size, variant = usual_size("wall_shelf", rng), int(rng.integers(4))
-        for share in SHARES:
-            board = _hung(setting, wall, share, Thing("wall_shelf", size, np.zeros(3), wall.yaw, "", variant),
-                          SHELF - float(size[1]), ABOVE)  # fmt: skip
-            if board:
-                setting.placed.append(board)
-                _filled(setting, board, f"wall shelf {wall.edge}")
-                done += 1
-                break
+        one, spots = Thing("wall_shelf", size, np.zeros(3), 0.0, "", variant), [(wall, share) for share in SHARES]
+        board = _hang_first(setting, one, spots, SHELF - float(size[1]), ABOVE)
+        if board:
+            _filled(setting, board, f"wall shelf {wall.edge}")
+            done += 1
         if done == 2:
             return
 
@@ -72,13 +69,8 @@ def clock(setting: Setting) -> None:
         return
     rng = setting.rng("wall clock")
     size, variant = usual_size("wall_clock", rng), int(rng.integers(1 << 30))
-    for wall in _roomiest(setting):
-        for share in SHARES:
-            one = Thing("wall_clock", size, np.zeros(3), wall.yaw, "", variant)
-            found = _hung(setting, wall, share, one, 1.72, 0.05)
-            if found:
-                setting.placed.append(found)
-                return
+    spots = [(wall, share) for wall in _roomiest(setting) for share in SHARES]
+    _hang_first(setting, Thing("wall_clock", size, np.zeros(3), 0.0, "", variant), spots, 1.72, 0.05)
 
 
 def coats(setting: Setting) -> None:
@@ -90,12 +82,10 @@ def coats(setting: Setting) -> None:
             rng = setting.rng(door.name, "coats")
             size, variant = usual_size("coats", rng), int(rng.integers(1 << 30))
             half = float(size[0]) / 2 + 0.12
-            for along in (door.end + half, door.offset - half):
-                one = Thing("coats", size, np.zeros(3), wall.yaw, "", variant)
-                found = _hung(setting, wall, along / wall.length, one, 1.78 - float(size[1]), 0.02)
-                if found:
-                    setting.placed.append(found)
-                    return
+            spots = [(wall, along / wall.length) for along in (door.end + half, door.offset - half)]
+            one = Thing("coats", size, np.zeros(3), 0.0, "", variant)
+            if _hang_first(setting, one, spots, 1.78 - float(size[1]), 0.02):
+                return
 
 
 def tall_mirror(setting: Setting) -> None:
@@ -104,13 +94,9 @@ def tall_mirror(setting: Setting) -> None:
         return
     rng = setting.rng("tall mirror")
     size, variant = usual_size("tall_mirror", rng), int(rng.integers(1 << 30))
-    for wall in _roomiest(setting):
-        for share in (0.18, 0.82, *SHARES):
-            one = Thing("tall_mirror", size, np.zeros(3), wall.yaw, "", variant)
-            found = _hung(setting, wall, share, one, 0.3, 0.02)
-            if found and _free_before(setting, wall, found):
-                setting.placed.append(found)
-                return
+    spots = [(wall, share) for wall in _roomiest(setting) for share in (0.18, 0.82, *SHARES)]
+    one = Thing("tall_mirror", size, np.zeros(3), 0.0, "", variant)
+    _hang_first(setting, one, spots, 0.3, 0.02, _free_before)
 
 
 def _free_before(setting: Setting, wall: Wall, mirror: Thing) -> bool:
@@ -133,6 +119,23 @@ def _roomiest(setting: Setting) -> Iterable[Wall]:
         return here - wall.length
 
     return sorted(walls_of(setting), key=lambda wall: (round(used(wall), 6), wall.edge))
+
+
+def _hang_first(
+    setting: Setting,
+    one: Thing,
+    spots: Iterable[tuple[Wall, float]],
+    low: float,
+    above: float,
+    wanted: Callable[[Setting, Wall, Thing], bool] = lambda setting, wall, thing: True,
+) -> Thing | None:
+    """Hang a thing at the first of some shares of walls' lengths where it fits and is wanted; None where none is."""
+    for wall, share in spots:
+        found = _hung(setting, wall, share, one, low, above)
+        if found and wanted(setting, wall, found):
+            setting.placed.append(found)
+            return found
+    return None
 
 
 def _hung(setting: Setting, wall: Wall, share: float, thing: Thing, low: float, above: float) -> Thing | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -70,6 +70,12 @@ class Standing:
         x, y, z = np.asarray(points, float).T
         return np.stack([cos * x + sin * z, y, cos * z - sin * x], 1) + self.position
 
+    def on_floor(self, x: float, z: float) -> np.ndarray:
+        """(3,) the point of the room's floor below or above a point (x, z) of the object's frame."""
+        spot = self.to_room(np.array([[x, 0.0, z]]))[0]
+        spot[1] = 0.0
+        return spot
+
 
 @dataclass(eq=False)
 class Setting:
@@ -128,6 +134,20 @@ class Setting:
             and other.position[1] < high
             and other.position[1] + other.size[1] > low + 1e-4
         )
+
+    def put_first(
+        self, things: Iterable[Thing], *, host: str = "", margin: float = APART, floor: bool = True
+    ) -> Thing | None:
+        """Place the first of some things that is clear, and give it back; None where none is.
+
+        Arguments:
+            things: taken one by one, those after the first clear one not at all.
+            others: as `clear`.
+        """
+        found = next((one for one in things if self.clear(one, host=host, margin=margin, floor=floor)), None)
+        if found is not None:
+            self.placed.append(found)
+        return found
 
 
 def standing(

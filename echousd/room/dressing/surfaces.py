@@ -92,8 +92,7 @@ class Surface:
                 kind, size, position, self.host.yaw + turn, self.host.name,
                 int(rng.integers(1 << 30)) if variant is None else variant, count,
             )  # fmt: skip
-            if setting.clear(thing, host=self.host.name, floor=False):
-                setting.placed.append(thing)
+            if setting.put_first([thing], host=self.host.name, floor=False):
                 self.area = self.area.difference(plan.buffer(2 * APART))
                 return thing
         return None

@@ -40,8 +40,7 @@ def cushions(setting: Setting) -> None:
                 continue
             place, yaw = host.to_room(spot[None])[0], host.yaw + turn
             thing = Thing("cushion", size, place, yaw, host.name, variant)
-            if setting.clear(thing, host=host.name, margin=0.0, floor=False):
-                setting.placed.append(thing)
+            setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 
 def folded(setting: Setting) -> None:
@@ -51,15 +50,12 @@ def folded(setting: Setting) -> None:
     for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
         rng = setting.rng(host.name, "folded")
         size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(4)), _Seat.of(host)
-        for end in (0.25, -0.3, 0.0) if seat else ():
-            spot = seat.resting(end, size) if seat else None
-            if spot is None:
-                continue
-            spot = spot + np.array([0.0, 0.002, 0.0])
-            thing = Thing("folded_throw", size, host.to_room(spot[None])[0], host.yaw, host.name, variant)
-            if setting.clear(thing, host=host.name, margin=0.0, floor=False):
-                setting.placed.append(thing)
-                break
+        if seat is None:
+            continue
+        spots = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)
+        places = (host.to_room(spot[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
+        wanted = (Thing("folded_throw", size, place, host.yaw, host.name, variant) for place in places)
+        setting.put_first(wanted, host=host.name, margin=0.0, floor=False)
 
 
 def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
@@ -159,18 +155,20 @@ def throws(setting: Setting) -> None:
         mesh = host.geometry.mesh
         corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
         deep = float(np.clip(0.3 * host.size[2], 0.4, 0.75))
-        for back in (0.12, 0.2, 0.3):
-            z = float(host.size[2]) / 2 - back - deep / 2
-            here = corners[(corners[..., 2].min(1) < z + deep / 2) & (corners[..., 2].max(1) > z - deep / 2)]
-            lying = here[..., 2].min(1) > z - 3 * deep  # boards along the whole bed end where the bed ends
-            top = float(here[lying][..., 1].max()) if lying.any() else 0.0
-            if not 0.25 < top < 0.85:
-                continue
-            side = here[here[..., 1].max(1) > top - 0.2]
-            half = float(np.abs(side[..., 0]).max())
-            size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
-            spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
-            thing = Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)))
-            if setting.clear(thing, host=host.name, margin=0.0):
-                setting.placed.append(thing)
-                break
+        depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.12, 0.2, 0.3))
+        wanted = (thing for z in depths if (thing := _across(host, corners, z, deep, rng)) is not None)
+        setting.put_first(wanted, host=host.name, margin=0.0)
+
+
+def _across(host: Standing, corners: np.ndarray, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
+    """A throw across a bed, its middle at `z`; None where nothing of a bed's height lies there."""
+    here = corners[(corners[..., 2].min(1) < z + deep / 2) & (corners[..., 2].max(1) > z - deep / 2)]
+    lying = here[..., 2].min(1) > z - 3 * deep  # boards along the whole bed end where the bed ends
+    top = float(here[lying][..., 1].max()) if lying.any() else 0.0
+    if not 0.25 < top < 0.85:
+        return None
+    side = here[here[..., 1].max(1) > top - 0.2]
+    half = float(np.abs(side[..., 0]).max())
+    size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+    spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
+    return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)))

@@ -204,5 +204,5 @@ def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: S
         size = np.round([first.size[0] * 0.5, first.size[1] * 0.75, 0.03], 2)
         spot = along + side * (first.size[0] / 2 + size[0] / 2 + 0.1)
         thing = _hung(setting, wall, spot, "picture", size, float(first.position[1]), first.variant + side, host.name)
-        if thing and setting.clear(thing, margin=0.02, floor=False, host=host.name):
-            setting.placed.append(thing)
+        if thing:
+            setting.put_first([thing], margin=0.02, floor=False, host=host.name)
