@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echousd.repair.belonging import allowed_overlap
-from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows
+from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows, spread
 from echousd.repair.placements import placement_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
 from echousd.repair.relations import relation_margins
@@ -64,10 +64,10 @@ def linearise(
         equals.extend([equal] * len(value))
         kinds.append(np.broadcast_to(np.asarray(kind, int), len(value)))
 
-    margin, gradient = relation_margins(
+    margin, by_pair = relation_margins(
         size, position, yaw, problem.triplets, rules=rules, centre=centre, fronts=problem.fronts
     )
-    add(margin - slack, gradient, RELATION)
+    add(margin - slack, spread(by_pair, problem.triplets[:, [0, 2]], n), RELATION)
 
     apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)
     allowed = allowed_overlap(problem.categories, size, problem.pairs)

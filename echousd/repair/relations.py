@@ -26,7 +26,7 @@ from echousd.repair.footprints import (
     pairs_of,
     penetration,
 )
-from echousd.repair.geometry import COLUMNS, spread
+from echousd.repair.geometry import COLUMNS
 
 if TYPE_CHECKING:
     from echomodel.rules.sets import RuleSet
@@ -41,36 +41,18 @@ def relation_margins(
     rules: str,
     centre: np.ndarray,
     fronts: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
+    slopes: bool = True,
+) -> Values:
     """The margins of the relations and their gradients; 0 where the rules do not measure the predicate.
 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians; triplets: (e, 3) int.
         rules: `strict` or `sgfront`; centre: (2,) float, x and z of the room's centre.
         fronts: (n,) bool, boxes that have a front; None = none.
-
-    Returns: margins (e,) float and gradient (e, n, 6) float in the columns of `geometry`.
-    """
-    ends = triplets[:, [0, 2]]
-    value, gradient = pair_margins(size, position, yaw, triplets, rules=rules, centre=centre, fronts=fronts)
-    return value, spread(gradient, ends, len(size))
-
-
-def pair_margins(
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    triplets: np.ndarray,
-    *,
-    rules: str,
-    centre: np.ndarray,
-    fronts: np.ndarray | None = None,
-    slopes: bool = True,
-) -> Values:
-    """The margins as `relation_margins`, their gradients (e, 2, 6) by the two boxes of each relation alone.
-
-    Arguments:
         slopes: False where nobody asks for the gradients, which are then not right.
+
+    Returns: margins (e,) float and gradients (e, 2, 6) float by the two boxes of each relation, in the columns of
+        `geometry` (`spread` puts them at the boxes).
     """
     from echomodel.rules import sets
 

@@ -254,7 +254,9 @@ def repair_boxes(
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
-    margin, _ = relation_margins(found.size, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts)
+    margin, _ = relation_margins(
+        found.size, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts, slopes=False
+    )
     hit, beyond = collisions(problem, found.size, end, turn), outside(problem, found.size, end, turn)
     failures = (
         set(np.flatnonzero(verdict.numpy() == 0).tolist()),

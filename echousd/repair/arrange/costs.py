@@ -12,7 +12,7 @@ from echousd.repair.arrange.outlook import missing, unseen
 from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State, Zones
 from echousd.repair.placements import placement_margins_at
-from echousd.repair.relations import pair_margins
+from echousd.repair.relations import relation_margins
 
 HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
 BROKEN, FAR = 12.0, 6.0  # for a broken relation at all, and per metre or ratio that it is missed by
@@ -258,7 +258,7 @@ def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarr
     rows = np.empty((count, *told.shape), told.dtype)
     rows[:] = told
     rows[:, (told == i) & [True, False, True]] = n + np.arange(count)[:, None]
-    margin, _ = pair_margins(
+    margin, _ = relation_margins(
         setting.size[every], position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre,
         fronts=setting.fronts[every], slopes=False,
     )  # fmt: skip

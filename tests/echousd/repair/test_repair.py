@@ -11,7 +11,7 @@ from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.repair import RepairConfig, allowed_overlap, repair, repair_boxes
-from echousd.repair.geometry import floor_from_polygon, inside, separation
+from echousd.repair.geometry import floor_from_polygon, inside, separation, spread
 from echousd.repair.relations import relation_margins
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
@@ -194,9 +194,10 @@ def test_margins_and_gradients_are_those_of_the_rules(rules: str, square: bool, 
     yaw = rng.integers(-1, 3, n) * np.pi / 2 if square else rng.uniform(-3, 3, n)
     triplets = np.array([(i, p, j) for i in range(n) for j in range(n) if i != j for p in range(16)])
     fronts = np.arange(n) < (4 if headed else 0)
-    value, gradient = relation_margins(
+    value, by_pair = relation_margins(
         size, position, yaw, triplets, rules=rules, centre=np.array([0.2, -0.1]), fronts=fronts
     )
+    gradient = spread(by_pair, triplets[:, [0, 2]], n)
     tensors = [torch.tensor(v, requires_grad=True) for v in (size, position)]
     plain = margins(
         Boxes(*tensors, torch.as_tensor(yaw)), torch.as_tensor(triplets), rules=rules,
