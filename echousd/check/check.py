@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pxr import Usd
 
@@ -19,6 +19,9 @@ from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
 from echousd.stage.layouts import layout_names, showing_layout
 from echousd.stage.read import find_rooms
+
+if TYPE_CHECKING:
+    from echousd.settle import SettleReport
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,7 @@ class CheckReport:
         source: the file (or layer) that was checked; rooms: prim paths of its rooms.
         layouts: what was found in each layout, the only one of most rooms called "".
         errors, warnings: of the USD validators, ours included.
+        settled: how every layout behaved under gravity, None where nobody asked.
     """
 
     source: str
@@ -82,6 +86,7 @@ class CheckReport:
     layouts: tuple[LayoutReport, ...]
     errors: tuple[Fault, ...]
     warnings: tuple[Fault, ...]
+    settled: tuple[SettleReport, ...] | None = None
 
     @property
     def relations(self) -> tuple[MeasuredRelation, ...]:
@@ -110,8 +115,13 @@ class CheckReport:
 
     @property
     def ok(self) -> bool:
-        """Nothing but warnings was found."""
-        return not self.errors and all(layout.ok for layout in self.layouts)
+        """Nothing but warnings was found, and all that was simulated rests."""
+        rests = all(found.ok for found in self.settled or ())
+        return not self.errors and rests and all(layout.ok for layout in self.layouts)
+
+    def good(self, *, strict: bool = False) -> bool:
+        """Whether the check is passed; broken living rules fail a strict one."""
+        return self.ok and not (strict and self.living)
 
     def to_json(self) -> dict[str, Any]:
         """The report as `echousd check --json` prints it; of several layouts, each has its entry."""
@@ -121,6 +131,7 @@ class CheckReport:
             if several
             else self.layouts[0].to_json()
         )
+        rest = {} if self.settled is None else {"settle": [each.to_json() for each in self.settled]}
         return {
             "ok": self.ok,
             **found,
@@ -128,11 +139,16 @@ class CheckReport:
                 "errors": [fault.to_json() for fault in self.errors],
                 "warnings": [fault.to_json() for fault in self.warnings],
             },
+            **rest,
         }
 
 
 def check_room(
-    stage: Usd.Stage | str | os.PathLike[str], *, rules: str = "strict", layout: int | None = None
+    stage: Usd.Stage | str | os.PathLike[str],
+    *,
+    rules: str = "strict",
+    layout: int | None = None,
+    settle: bool = False,
 ) -> CheckReport:
     """Check every room on a stage, in all of its layouts.
 
@@ -140,9 +156,11 @@ def check_room(
         stage: an open stage or a file.
         rules: `strict` or `sgfront`, for the relations.
         layout: number of the only layout to check.
+        settle: simulate two seconds of every layout as well, in which everything must rest.
 
     Raises:
         ValueError: the file cannot be opened, holds no room or no such layout, or the rules are unknown.
+        SettleUnavailable: `settle` without the extra `sim`.
     """
     from echomodel.rules import rule_set
 
@@ -154,7 +172,12 @@ def check_room(
     rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
-    return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings)
+    settled = None
+    if settle:
+        from echousd.settle import settle_layouts
+
+        settled = settle_layouts(stage, layout=layout)
+    return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings, settled)
 
 
 def _check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tuple[tuple[str, ...], LayoutReport]:

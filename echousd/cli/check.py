@@ -66,28 +66,19 @@ def _one(
     """Check one room and show what was found, in a line unless it is alone: whether it is good, and the report."""
     from echousd.check import check_room
 
-    report = check_room(room, rules=rules, layout=layout)
-    settled: tuple[SettleReport, ...] = ()
-    if settle:
-        from echousd.settle import settle_layouts
-
-        settled = settle_layouts(room, layout=layout)
-    rests = all(found.ok for found in settled)
-    told = report.to_json()
-    if settle:
-        told["settle"] = [found.to_json() for found in settled]
-        told["ok"] = told["ok"] and rests
-    good = report.ok and rests and not (strict and report.living)
+    report = check_room(room, rules=rules, layout=layout, settle=settle)
+    good = report.good(strict=strict)
     if not json and alone:
         _show(report, strict)
-        _show_settled(settled)
+        _show_settled(report.settled or ())
     elif not json:
         seen = [f"{len(report.errors)} USD errors"] * bool(report.errors)
         for each in report.layouts:
             counts = {"broken": each.broken, "colliding": each.collisions, "misplaced": each.placement}
             seen += [f"{each.name} {len(what)} {word}".strip() for word, what in counts.items() if what]
+        seen += [f"{rest.layout} {len(rest.restless)} restless".strip() for rest in report.settled or () if not rest.ok]
         say(f"{'ok' if good else 'no'}  {room}  {', '.join(seen)}".rstrip())
-    return good, told
+    return good, report.to_json()
 
 
 def _show(report: CheckReport, strict: bool) -> None:
