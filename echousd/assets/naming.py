@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from echomodel.data.furniture.sizes import size_statistics
 from echomodel.data.meshes import class_by_name
+from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
 
 LABELLED, CALLED, MEANT, SHELVED = 0.97, 0.9, 0.75, 0.55  # confidence in a category by where its word stands

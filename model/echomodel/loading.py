@@ -37,7 +37,7 @@ def load_model(model: RoomModel | str | Path | None, preset: str | None = None, 
 
 @lru_cache(maxsize=2)
 def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
-    from echomodel.checkpoint import is_released
+    from echomodel.released.weights import is_released
 
     if path is not None and is_released(path):
         from echomodel.released.echo import ReleasedEcho

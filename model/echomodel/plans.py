@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.furniture.sizes import size_statistics
 from echomodel.data.rooms.statistics import quantile, room_type_statistics
 from echomodel.openings import Opening
+from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
 
 # Share of the floor that furniture covers in real rooms: median of each type (300 rooms), the rest like the last.

@@ -5,9 +5,9 @@ import pytest
 import trimesh
 
 from echomodel.data.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
-from echomodel.data.furniture.sizes import size_score, size_statistics
 from echomodel.data.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.data.tsdf import mesh_from_tsdf, tsdf_from_mesh
+from echomodel.sizes import size_score, size_statistics
 from echomodel.vocabulary import UnknownWord, vocabulary
 
 CATEGORIES = [category.name for category in vocabulary().categories]

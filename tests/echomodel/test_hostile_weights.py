@@ -11,8 +11,8 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from echomodel.checkpoint import load_released
 from echomodel.echo import EchoModel
+from echomodel.released.weights import load_released
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import trimesh
 from published_shapes import fit_to_box, mesh_from_grid
 
 from echomodel.boxes import Boxes
-from echomodel.checkpoint import class_names, convert, write_released
+from echomodel.checkpoint import class_names, convert
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
 from echomodel.released.bounds import statistics_from_bounds
@@ -20,6 +20,7 @@ from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig,
 from echomodel.released.echo import ReleasedEcho, floor_relations
 from echomodel.released.model import ReleasedModel
 from echomodel.released.tables import LayoutTables
+from echomodel.released.weights import write_released
 from echomodel.vocabulary import vocabulary
 from echousd.room.meshing import mesh_from_shape
 

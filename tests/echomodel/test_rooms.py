@@ -5,7 +5,6 @@ import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
-from echomodel.data.furniture.sizes import size_score
 from echomodel.data.rooms import generate_room, generate_rooms
 from echomodel.data.rooms.arranging import arranged
 from echomodel.data.rooms.builder import Item, overlaps
@@ -16,6 +15,7 @@ from echomodel.data.rooms.statistics import room_requests, room_statistics, room
 from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures
 from echomodel.openingrows import ROW
+from echomodel.sizes import size_score
 from echomodel.vocabulary import vocabulary
 
 TYPES = [kind.name for kind in vocabulary().room_types]

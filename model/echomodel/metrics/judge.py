@@ -10,9 +10,9 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable, seen_from, wall_features
-from echomodel.data.furniture.sizes import size_score
 from echomodel.floors import centred
 from echomodel.roomboxes import RoomBoxes
+from echomodel.sizes import size_score
 from echomodel.vocabulary import vocabulary
 
 WIDTH, STEPS, RATE, DECAY = 48, 160, 3e-3, 3e-3

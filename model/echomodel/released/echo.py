@@ -13,7 +13,6 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.checkpoint import load_released
 from echomodel.graph import GraphBatch
 from echomodel.protocols import touched_nodes
 from echomodel.released.editing import pack_changes, pack_scenes
@@ -21,6 +20,7 @@ from echomodel.released.encoder import SceneGraphTensors
 from echomodel.released.grids import DISTANCE, LEVEL, published_grids, turned_back
 from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
 from echomodel.released.scene import published_scene
+from echomodel.released.weights import load_released
 from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary
 

@@ -10,7 +10,6 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.checkpoint import load_released, write_released
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.released.config import PaperSizes, paper
@@ -19,6 +18,7 @@ from echomodel.released.encoder import SceneGraphTensors
 from echomodel.released.grids import published_grids
 from echomodel.released.model import GraphChange, ReleasedModel
 from echomodel.released.scene import published_scene
+from echomodel.released.weights import load_released, write_released
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
 from echomodel.training.shapes import read

@@ -9,7 +9,6 @@ import pytest
 import torch
 from published_shapes import fit_to_box
 
-from echomodel.checkpoint import load_released
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
@@ -17,6 +16,7 @@ from echomodel.released.echo import ReleasedEcho
 from echomodel.released.grids import DISTANCE, published_grids, turned_back
 from echomodel.released.model import ReleasedModel
 from echomodel.released.tables import LayoutTables
+from echomodel.released.weights import load_released
 from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.logs import read_log
 from echomodel.training.paper_stage import PaperModel, PaperStage, scene_boxes, text_encoder

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.furniture.sizes import sample_size, size_statistics
+from echomodel.data.furniture.sizes import sample_size
 from echomodel.data.rooms.floor import Floor, Wall
 from echomodel.data.rooms.statistics import QUARTILE, back_gaps
+from echomodel.sizes import size_statistics
 
 HALF_PI = math.pi / 2
 Size = tuple[float, float, float]

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.furniture.sizes import size_score
 from echomodel.data.rooms.generator import generate_room
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_statistics, room_type_statistics
+from echomodel.sizes import size_score
 
 ROUNDS, ROOMS, SIZE_ROOMS, SEED = 8, 1200, 3000, 20
 FEWEST, FARTHEST = 60, 1.0  # pieces that a median needs, and the largest shift in standard deviations

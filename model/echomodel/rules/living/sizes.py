@@ -10,6 +10,7 @@ import torch
 
 from echomodel.rules.living.found import Found, found
 from echomodel.rules.living.plan import Plan, kind_of
+from echomodel.sizes import size_statistics
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
 SHORTER = 0.85  # times the least usual side, where the row of a category names usual sizes
@@ -23,8 +24,6 @@ LEAST_DEPTH = 0.75  # metres of a table at which people sit opposite each other
 @cache
 def size_range(category: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Smallest and largest side lengths x, y, z in metres that a person takes for one of the category."""
-    from echomodel.data.furniture.sizes import size_statistics
-
     table, usual = size_statistics(category), kind_of(category).usual
     low, high = table.low * SMALLEST, table.high * LARGEST
     if usual:  # a bed of 1.5 m is longer than half of what few beds have, and yet nobody sleeps in it
@@ -39,8 +38,6 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
         categories: n words. size: (n, 3) float, metres.
         lenient: (n,) bool, boxes that are only brought into what the rule of scale allows.
     """
-    from echomodel.data.furniture.sizes import size_statistics
-
     out = size.copy()
     for number, word in enumerate(categories):
         if not kind_of(word).name:
