@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from echomodel.vocabulary import vocabulary
 
 Triple = tuple[str, str, str]
+MAX_ERRORS = 20  # of one graph that are told
 
 
 class GraphError(ValueError):
@@ -24,7 +25,7 @@ class GraphError(ValueError):
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
-    """Raise `GraphError` at the first fault among `triples`, each (subject, predicate, object) in canonical words.
+    """Raise `GraphError` of the faults among `triples`, each (subject, predicate, object) in canonical words.
 
     Faults: an endpoint that is none of `names`, a self relation, a relation stated twice, and a cycle in one of the
     orders that the vocabulary defines (left and right are one order along the room's z axis, bigger, smaller and `in`
@@ -32,25 +33,28 @@ def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
     """
     stated = dict[Triple, int]()
     wrong = unknown_ends(triples, set(names))
-    if wrong:
-        wrong[0].others = tuple(wrong[1:])
-        raise wrong[0]
     for position, (subject, predicate, object_) in enumerate(triples):
         here = ("relations", position)
         if subject == object_:
-            raise GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself", here)
-        if (subject, predicate, object_) in stated:
-            raise GraphError(f"relation '{subject} {predicate} {object_}' is stated twice", here)
-        stated[subject, predicate, object_] = position
-    for order, edges in ordered_edges(triples).items():
+            wrong.append(
+                GraphError(f"relation '{subject} {predicate} {object_}': an object cannot relate to itself", here)
+            )
+        elif (subject, predicate, object_) in stated:
+            wrong.append(GraphError(f"relation '{subject} {predicate} {object_}' is stated twice", here))
+        stated.setdefault((subject, predicate, object_), position)
+    for order, edges in ordered_edges(triple for triple in stated if triple[0] != triple[2]).items():
         cycle = find_cycle(edges)
         if cycle:
             said = [f"'{' '.join(edges[pair])}'" for pair in cycle]
             here = ("relations", max(stated[edges[pair]] for pair in cycle))
             if len(said) == 2:
-                raise GraphError(f"{said[0]} contradicts {said[1]} ({order} order)", here)
+                wrong.append(GraphError(f"{said[0]} contradicts {said[1]} ({order} order)", here))
+                continue
             together = f"{', '.join(said[:-1])} and {said[-1]}"
-            raise GraphError(f"{together} contradict each other: a cycle in the {order} order", here)
+            wrong.append(GraphError(f"{together} contradict each other: a cycle in the {order} order", here))
+    if wrong:
+        wrong[0].others = tuple(wrong[1:MAX_ERRORS])
+        raise wrong[0]
 
 
 def unknown_ends(triples: Sequence[Triple | None], known: Collection[str]) -> list[GraphError]:

@@ -3,10 +3,11 @@ sofa and armchair`."""
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
+from echomodel.vocabulary import TYPO, UnknownWord, normalised, vocabulary
 from echousd.graph.consistency import GraphError
 from echousd.graph.fields import shown
 from echousd.graph.nodes import Placed, Relation
@@ -38,6 +39,7 @@ def fields_of_sentence(entry: Any, about: Path, names: Mapping[str, str] | None 
             f"relation {shown(entry)}: allowed: subject predicate object, such as bed left wardrobe", about
         )
     subject, predicate, object_ = words[0], " ".join(words[1:-1]), words[-1]
+    _refuse_slip(words, about)
     turned = vocabulary().swapped(predicate)  # "table under lamp" is "lamp above table"
     if turned is not None:
         subject, predicate, object_ = object_, turned.name, subject
@@ -60,6 +62,22 @@ def _placed(words: list[str], about: Path) -> Placed | None:
         said = " ".join(words)
         raise GraphError(f"'{said}': found one other object, allowed: two, such as table {named} sofa and chair", about)
     return Placed(words[0], named, others)
+
+
+def _refuse_slip(words: list[str], about: Path) -> None:
+    """Raise `GraphError` for words that are no predicate but nearly a placement: `e agaist wall`."""
+    try:
+        vocabulary().predicate(" ".join(words[1:-1]))
+    except UnknownWord:
+        said = {word: row for row in vocabulary().placements for word in (row.name, *row.aliases)}
+        whole, first = normalised(" ".join(words[1:])), normalised(words[1])
+        alone = [word for word, row in said.items() if not row.others]
+        near = difflib.get_close_matches(whole, alone, n=1, cutoff=TYPO)
+        if "and" in words[2:]:
+            near = near or difflib.get_close_matches(first, [w for w in said if w not in alone], n=1, cutoff=TYPO)
+        if near:
+            text = f"relation '{' '.join(words)}': did you mean {said[near[0]].name.replace('_', ' ')}?"
+            raise GraphError(text, about) from None
 
 
 def _placement(words: str) -> str | None:

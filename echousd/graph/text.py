@@ -18,7 +18,7 @@ import yaml
 
 from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph.consistency import GraphError, listed, unknown_ends
+from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
@@ -29,7 +29,6 @@ from echousd.graph.titles import composed, identifier_of, is_title, name_of
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
 
-MAX_ERRORS = 20  # of one file that are told
 TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
@@ -103,7 +102,10 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
         raise errors[0]
     for i, one in enumerate(said):
         if isinstance(one, Placed):
-            nodes = _with_placement(nodes, one, ("relations", i))
+            nodes = _tried(errors, _with_placement, nodes, one, ("relations", i)) or nodes
+    if errors:
+        errors[0].others = tuple(errors[1:MAX_ERRORS])
+        raise errors[0]
     rows = [i for i, one in enumerate(said) if isinstance(one, Relation)]
     try:
         return kind(room, tuple(nodes), tuple(one for one in relations if one is not None))

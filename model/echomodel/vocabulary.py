@@ -170,6 +170,7 @@ class Vocabulary:
     habits: tuple[Habit, ...] = ()
     placements: tuple[Placement, ...] = ()
     meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
+    hints: dict[str, str] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -279,18 +280,16 @@ class Vocabulary:
                     raise UnknownWord(f"unknown predicate {word!r}: swap the two objects and say {predicate.name}")
         unsupported = kind == "category" and key in self.unsupported
         meant = self.meant.get(kind, {}).get(key)
+        allowed = f"allowed: {', '.join(row.name for row in self._rows[kind])}"
         if meant is not None:
-            hint = f"nearest by meaning: {', '.join(meant)}" if meant else f"allowed: {', '.join(self._names(kind))}"
+            hint = self.hints.get(meant[0], f"nearest by meaning: {', '.join(meant)}") if meant else allowed
             raise UnknownWord(f"unknown {kind} {word!r} (not supported): {hint}")
         close = [] if unsupported else difflib.get_close_matches(key, index, n=3, cutoff=TYPO)
         close = [match for match in close if _alike(key, match) > _alike(key, close[0]) - 0.1]
         near = list(dict.fromkeys(self._rows[kind][index[match]].name for match in close))
-        hint = f"did you mean {' or '.join(near)}?" if near else f"allowed: {', '.join(self._names(kind))}"
+        hint = f"did you mean {' or '.join(near)}?" if near else allowed
         known = " (seen in real rooms, not supported)" if unsupported else ""
         raise UnknownWord(f"unknown {kind} {word!r}{known}: {hint}")
-
-    def _names(self, kind: str) -> list[str]:
-        return [entry.name for entry in self._rows[kind]]
 
 
 def _known(where: str, what: str, words: Iterable[str | None], allowed: Collection[str | None]) -> None:
@@ -346,5 +345,6 @@ def _shipped() -> Vocabulary:
         habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
         placements=tuple(Placement(**frozen(entry)) for entry in raw["placements"]),
         unsupported=tuple(raw["unsupported"]),
+        hints=raw["hints"],
         meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},
     )

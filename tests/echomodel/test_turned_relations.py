@@ -60,7 +60,8 @@ def test_they_are_differentiable_and_not_labelled():
     [
         (WORDS.room_type, "bathroom", "unknown room type 'bathroom' (not supported): allowed: bedroom, living_room"),
         (WORDS.room_type, "kids room", "unknown room type 'kids room' (not supported): nearest by meaning: bedroom"),
-        (WORDS.category, "carpet", "unknown category 'carpet' (not supported): allowed: armchair"),
+        (WORDS.category, "carpet", "unknown category 'carpet' (not supported): rugs, curtains,"),
+        (WORDS.category, "window", "unknown category 'window' (not supported): doors and windows are listed beside"),
         (WORDS.category, "fridge", "unknown category 'fridge' (not supported): nearest by meaning: cabinet"),
     ],
 )

@@ -95,7 +95,7 @@ def test_the_graph_needs_neither_pxr_nor_torch():
         ({"name": ""}, "name: '' is no identifier"),
         ({"name": "b" * 101}, "has 101 characters, allowed: 100"),
         ({"category": "bedd"}, "object 'bed': category: unknown category 'bedd': did you mean double_bed?"),
-        ({"category": "vase"}, "unknown category 'vase' (seen in real rooms, not supported): allowed: armchair,"),
+        ({"category": "piano"}, "unknown category 'piano' (seen in real rooms, not supported): allowed: armchair,"),
         ({"category": None}, "category: found None, allowed: the name of a category"),
         ({"style": " "}, "style: found ' ', allowed: a non-empty text"),
         ({"size": (1, 0, 2)}, "size: found (1, 0, 2), allowed: three positive numbers [x, y, z], metres"),

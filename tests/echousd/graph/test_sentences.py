@@ -52,6 +52,9 @@ def test_between_two_others(words):
         ("table between sofa and sofa", "line 4: .*allowed: the names of two other objects"),
         ("table between table and sofa", "line 4: .*between names the object itself"),
         ("lamp in corner", "line 4: 'lamp in_corner': subject 'lamp' is no object of this graph, allowed: armchair, "),
+        ("plant agaist wall", "line 4: relation 'plant agaist wall': did you mean against wall"),
+        ("plant in a cornr", "line 4: relation 'plant in a cornr': did you mean in corner"),
+        ("table betwen sofa and plant", "line 4: .*did you mean between"),
         ("table between sofa and lamp", "object 'table': between: 'lamp' is no object of this graph"),
     ],
 )
@@ -125,3 +128,19 @@ def test_names_that_meet_are_numbered():
 def test_a_title_must_be_shown_on_one_line():
     with pytest.raises(GraphError, match=r"object 'bed': title: found 'a.nb', allowed: a text of"):
         Node("bed", "double_bed", title="a\nb")
+
+
+def test_all_contradictions_are_told_at_once_with_their_lines():
+    with pytest.raises(GraphError) as caught:
+        read(
+            "sofa left of plant", "plant left of sofa", "sofa taller than table", "plant near plant",
+            "table taller than sofa", "sofa left of plant", "plant in corner", "plant against wall",
+        )  # fmt: skip
+    assert str(caught.value).startswith("line 11: 'plant against_wall': plant in_corner is stated already")
+    with pytest.raises(GraphError) as caught:
+        read("sofa left of plant", "plant in corner", "plant left of sofa", "plant near plant", "sofa left of plant")
+    lines = str(caught.value).splitlines()
+    assert [line.split(":")[0] for line in lines] == ["line 7", "line 8", "line 6"]
+    assert "cannot relate to itself" in lines[0]
+    assert "stated twice" in lines[1]
+    assert "(left-right order)" in lines[2]
