@@ -9,7 +9,6 @@ Whoever names a file in a store knows the hash of its content; that is why packi
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 import shutil
@@ -18,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from echomodel.files import flush, write_json
+from echomodel.files import flush, read_json, write_json
 
 MARK = "echousd_store.json"
 VERSION = 1
@@ -28,6 +27,8 @@ NEW = ".new_"  # beginning of the name of a folder that is being written
 GRACE = 3600.0  # seconds for which a folder that nobody refers to stays: its room may be on its way
 NAMING = (".usda", ".json")  # texts of a room in which a key can be read as it is
 LAYERS = (".usd", ".usdc")
+LARGEST = 4 * 2**30  # bytes of one folder
+BLOCK = 2**20
 
 
 @dataclass(frozen=True)
@@ -62,21 +63,22 @@ class Store:
 
     @classmethod
     def open(cls, root: str | os.PathLike[str]) -> Store:
-        """The store in a folder; raises ValueError where there is none of this version."""
+        """The store in a folder; raises ValueError where there is none, or one of another version."""
         root = Path(root)
         try:
-            mark = json.loads((root / MARK).read_bytes())
+            mark = read_json(root / MARK, 2**16)
         except OSError:
             raise ValueError(f"{root}: no store of assets there (no {MARK})") from None
-        except ValueError:
-            mark = None
         if not isinstance(mark, dict) or mark.get("echousd_store") != VERSION:
             raise ValueError(f"{root / MARK}: not a store of this version ({VERSION})")
         return cls(root)
 
     def folder(self, key: str) -> Path:
-        """Where the files of a key lie."""
-        return self.root / key[:2] / key
+        """Where the files of a key lie; raises ValueError where a link would lead out of the store."""
+        shelf = self.root / key[:2]
+        if shelf.is_symlink():
+            raise ValueError(f"{shelf}: a link, allowed in a store: folders")
+        return shelf / key
 
     def put(self, files: Mapping[str, bytes]) -> str:
         """Have a folder with these files (relative path -> content) in the store; returns its key.
@@ -109,19 +111,25 @@ class Store:
             raise ValueError(f"{place}: changed since it was stored; make its room again")
         return files
 
+    def whole(self, key: str) -> bool:
+        """Whether the files of a key are what it says; none is held in memory."""
+        place = self.folder(key)
+        try:
+            digests = {path.relative_to(place).as_posix(): _digest(path) for path in _files(place)}
+            return place.is_dir() and _key(digests) == key
+        except (OSError, ValueError):
+            return False
+
     def keys(self) -> Iterator[str]:
         """All keys, sorted."""
         for shelf in sorted(self.root.iterdir()):
-            if shelf.is_dir() and len(shelf.name) == 2:
+            if len(shelf.name) == 2 and shelf.is_dir():
+                self.folder(shelf.name)  # no link
                 yield from sorted(path.name for path in shelf.iterdir() if KEY.fullmatch(path.name))
 
     def wrong(self) -> Iterator[str]:
         """Keys whose files are no longer what the key says."""
-        for key in self.keys():
-            try:
-                self.read(key)
-            except ValueError:
-                yield key
+        yield from (key for key in self.keys() if not self.whole(key))
 
     def remove(self, key: str) -> None:
         """Take a folder away."""
@@ -139,11 +147,11 @@ class Store:
             dry: remove nothing.
         """
         used, now = keys_named(users), time.time()
-        gone = [key for key in self.keys() if key not in used and now - self.folder(key).stat().st_mtime >= grace]
+        gone = [key for key in self.keys() if key not in used and now - self.folder(key).lstat().st_mtime >= grace]
         for key in () if dry else gone:
             self.remove(key)
         for left in () if dry else self.root.glob(f"{NEW}*"):  # of a run that was killed
-            if now - left.stat().st_mtime >= grace:
+            if now - left.lstat().st_mtime >= grace:
                 _delete(left)
         return gone
 
@@ -174,12 +182,17 @@ class Store:
 
 def key_of(files: Mapping[str, bytes]) -> str:
     """Hash of some files, their relative paths and their bytes; raises ValueError for a path that leads elsewhere."""
+    return _key({name: hashlib.blake2b(content, digest_size=16).hexdigest() for name, content in files.items()})
+
+
+def _key(digests: Mapping[str, str]) -> str:
+    """The hash of relative paths and the hashes of what is there."""
     total = hashlib.blake2b(digest_size=16)
-    for name, content in sorted(files.items()):
+    for name, digest in sorted(digests.items()):
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or path.as_posix() != name or "\\" in name or ":" in name:
             raise ValueError(f"store: a file is called {name!r:.200}, allowed: a relative path with forward slashes")
-        total.update(f"{name}\0{hashlib.blake2b(content, digest_size=16).hexdigest()}\n".encode())
+        total.update(f"{name}\0{digest}\n".encode())
     return total.hexdigest()
 
 
@@ -205,10 +218,20 @@ def keys_named(folders: Iterable[Path]) -> set[str]:
     for folder in folders:
         for path in sorted(folder.rglob("*")):
             if path.suffix in NAMING and path.is_file():
-                found.update(word.decode() for word in re.findall(rb"(?<![0-9a-f])[0-9a-f]{32}", path.read_bytes()))
+                found.update(_words_in(path))
             elif path.suffix in LAYERS and path.is_file() and store_of(path) is None:
                 found.update(word for name in _named_by(path) for word in KEY.findall(name))
     return found
+
+
+def _words_in(path: Path) -> Iterator[str]:
+    """Words of a text that may be keys, block by block."""
+    with path.open("rb") as file:
+        rest = b""
+        while block := file.read(BLOCK):
+            rest += block
+            yield from (word.decode() for word in re.findall(rb"(?<![0-9a-f])[0-9a-f]{32}", rest))
+            rest = rest[-40:]  # a word across two blocks, and what stands before it
 
 
 def _named_by(layer: Path) -> list[str]:
@@ -230,16 +253,32 @@ def _whole(place: Path, files: Mapping[str, bytes]) -> bool:
 
 
 def _files(place: Path) -> list[Path]:
-    """All files of a folder; raises ValueError for a link, which never belongs there."""
+    """All files of a folder; raises ValueError for a link, which never belongs there, and for more than `LARGEST`."""
+    if place.is_symlink():
+        raise ValueError(f"{place}: a link, allowed in a store: folders")
     found = [path for path in place.rglob("*") if path.is_symlink() or not path.is_dir()]
     for path in found:
         if path.is_symlink() or not path.is_file():
             raise ValueError(f"{path}: a link or no plain file, allowed in a store: plain files")
+    size = sum(path.stat().st_size for path in found)
+    if size > LARGEST:
+        raise ValueError(f"{place}: {size} bytes, allowed in a store: folders of {LARGEST}")
     return found
 
 
+def _digest(path: Path) -> str:
+    total = hashlib.blake2b(digest_size=16)
+    with path.open("rb") as file:
+        while block := file.read(BLOCK):
+            total.update(block)
+    return total.hexdigest()
+
+
 def _delete(place: Path) -> None:
-    for path in place.rglob("*"):
+    if place.is_symlink() or not place.is_dir():  # whatever a link leads to is not ours
+        place.unlink(missing_ok=True)
+        return
+    for path in place.rglob("*") if os.name == "nt" else ():  # it deletes nothing that is read-only
         if not path.is_dir() and not path.is_symlink():
-            path.chmod(0o644)  # Windows deletes nothing that is read-only
+            path.chmod(0o644)
     shutil.rmtree(place, ignore_errors=True)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from echomodel.files import whole_file
+from echomodel.files import read_bounded, whole_file
 from echomodel.vocabulary import vocabulary
 from echousd.assets.describe import PLACEMENT
 from echousd.assets.record import AssetRecord, vector
 
 COLUMNS = ("id", "use", "category", "turn", "metres", "found", "name", "width", "height", "depth", "licence", "fault")
+LARGEST = 64 * 2**20  # bytes of a table
 Corrections = Mapping[str, Mapping[str, str]]
 
 
@@ -41,7 +43,7 @@ def read_corrections(path: Path) -> Corrections:
     """The table by id; raises ValueError naming the file, the line, what was found and what is allowed."""
     out: dict[str, Mapping[str, str]] = {}
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with io.StringIO(read_bounded(path, LARGEST).decode("utf-8"), newline="") as file:
             reader = csv.DictReader(file)
             missing = [name for name in COLUMNS[:5] if name not in (reader.fieldnames or ())]
             if missing:

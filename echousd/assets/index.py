@@ -65,7 +65,9 @@ def index(
     entries = list(_entries(folders, said.append))
     if not entries:
         where = ", ".join(map(str, folders))
-        raise ValueError(f"{where}: holds no models; allowed: usd, usda, usdc, usdz, glb, gltf, obj, and libraries")
+        kinds = "usd, usda, usdc, usdz, glb, gltf, obj, and libraries"
+        why = f" ({said[0]})" if said else ""
+        raise ValueError(f"{where}: holds no models; allowed: {kinds}{why}")
     wishes = read_corrections(table) if table is not None and table.exists() else {}
     before = dict(read_library(file).records) if file.exists() else {}
     done: dict[str, AssetRecord] = {}

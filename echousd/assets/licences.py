@@ -55,6 +55,11 @@ def needs_credit(licence: str) -> bool:
     return spdx(licence) not in ("CC0-1.0",)
 
 
+def _beginning(file: Path) -> str:
+    with file.open(encoding="utf-8", errors="replace") as opened:
+        return opened.read(MOST)
+
+
 @lru_cache(maxsize=4096)
 def licence_beside(folder: Path, top: Path) -> tuple[str, str]:
     """(licence, author) of the text nearest to a model, from its folder up to the library's; ("", "") where none is."""
@@ -62,7 +67,7 @@ def licence_beside(folder: Path, top: Path) -> tuple[str, str]:
         for name in NOTICES:
             for file in (folder / name, folder / f"{name}.txt", folder / f"{name}.md"):
                 try:
-                    text = file.read_text("utf-8", "replace")[:MOST] if file.is_file() else ""
+                    text = _beginning(file) if file.is_file() else ""
                 except OSError:
                     continue
                 found = spdx(text) if text else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ STAGES = (".usd", ".usda", ".usdc", ".usdz")
 MESHES = (".obj", ".glb", ".gltf")
 MODELS = (*STAGES, *MESHES)
 MAX_MODEL = 2 * 2**30  # bytes
+TEXTS, MAX_TEXT = (".obj", ".gltf"), 2**28  # what is read takes ten times as much memory
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class ModelFile:
             archive = _archive(self.path, self.path.stat().st_mtime_ns)
             _check_size(self, archive.getinfo(self.member).file_size)
             yield io.BytesIO(archive.read(self.member))
-        except (zipfile.BadZipFile, KeyError, OSError, NotImplementedError) as error:
+        except (zipfile.BadZipFile, zlib.error, KeyError, OSError, EOFError, RuntimeError) as error:  # or encrypted
             raise ValueError(f"{self}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
     def beside(self) -> Beside:
@@ -75,8 +77,9 @@ def _archive(path: Path, changed: int) -> zipfile.ZipFile:
 
 
 def _check_size(model: ModelFile, size: int) -> None:
-    if not 0 < size <= MAX_MODEL:
-        raise ValueError(f"{model}: {size} bytes, allowed for a model: 1 to {MAX_MODEL}")
+    most = MAX_TEXT if model.suffix in TEXTS else MAX_MODEL
+    if not 0 < size <= most:
+        raise ValueError(f"{model}: {size} bytes, allowed for a model: 1 to {most}")
 
 
 class Beside(Resolver):
@@ -96,7 +99,7 @@ class Beside(Resolver):
         said = said.replace("\\", "/").strip()
         try:
             content = self._member(said) if self.model.member else self._file(said)
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        except (OSError, KeyError, ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error):
             self.missing.append(said)
             raise ValueError(f"{self.model}: names {said!r}, which is not there") from None
         self.images[said] = content

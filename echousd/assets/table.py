@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from echomodel.files import whole_file
+from echomodel.vocabulary import vocabulary
 from echousd.assets.record import AssetRecord
 
 VERSION = 1
@@ -45,8 +47,9 @@ class Library:
         return (self.file.absolute().parent / file), member
 
     def root(self, record: AssetRecord) -> Path:
-        """The folder that a record's files lie in."""
-        return self.file.absolute().parent / record.root
+        """The folder that a record's files lie in; the model's own where an index claims all that somebody has."""
+        root = Path(os.path.realpath(self.file.absolute().parent / record.root))
+        return self.path(record)[0].parent if Path.home().is_relative_to(root) else root
 
 
 def arrow() -> Any:
@@ -117,14 +120,32 @@ def _read(file: Path, changed: int) -> Library:
     if wrong:
         raise ValueError(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
     records: dict[str, AssetRecord] = {}
-    for row in table.select(wanted.names).to_pylist():
+    try:
+        rows = table.select(wanted.names).to_pylist()
+    except ValueError as error:  # words that are no UTF-8
+        raise ValueError(f"{file}: cannot be read as an index ({error})") from None
+    for row in rows:
         empty = [name for name, value in row.items() if value is None]
         if empty:
             raise ValueError(f"{file}: row {len(records) + 1} has no {empty[0]}; index the folder again")
         fields_of: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}
         record = AssetRecord(**fields_of)
+        fault = _fault(record)
+        if fault:
+            raise ValueError(f"{file}: row {len(records) + 1}: {fault}; index the folder again")
         records[record.id] = record
     return Library(file, records)
+
+
+def _fault(record: AssetRecord) -> str:
+    """What no index of ours says of a model, "" where nothing is wrong."""
+    for name, count in (("turn", 9), ("low", 3), ("high", 3), ("dims", 3)):
+        numbers = getattr(record, name)
+        if len(numbers) != count or not all(map(math.isfinite, numbers)):
+            return f"{name} is {str(numbers):.60}, allowed: {count} finite numbers"
+    if record.category and record.category not in {category.name for category in vocabulary().categories}:
+        return f"category is {record.category!r:.60}, allowed: a word of the vocabulary"
+    return ""
 
 
 def _unpacked(metadata: Any) -> int:

@@ -89,7 +89,11 @@ def shelf_of(manifest: Mapping[str, Any], folder: Path) -> Shelf | None:
         return None
     if "\0" in at or "\\" in at or PurePosixPath(at).is_absolute() or PureWindowsPath(at).drive:
         raise ValueError(f"{folder}: its manifest names the store {at!r:.80}, allowed: a relative path")
-    return Shelf(Store.open(os.path.realpath(folder / at)), folder, dict(manifest.get("stored") or {}))
+    try:
+        store = Store.open(os.path.realpath(folder / at))
+    except ValueError as error:
+        raise ValueError(f"{folder}: its manifest names the store {at!r:.80}: {error}") from None
+    return Shelf(store, folder, dict(manifest.get("stored") or {}))
 
 
 def asset_from(shelf: Shelf, asset: str) -> dict[str, bytes]:

@@ -8,7 +8,7 @@ import tempfile
 import warnings
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import whole_file
 from echousd.stage.encoding import StageError
@@ -38,7 +38,9 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
         raise StageError(f"{path}: not a USD file (extension {path.suffix!r}), allowed: {', '.join(READABLE)}")
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well
     try:
+        layers = regular_layers(path)
         stage = Usd.Stage.Open(str(path))
+        del layers
     except Tf.ErrorException as error:
         raise StageError(f"{path}: not a USD file that can be read ({said(error)})") from None
     finally:
@@ -48,6 +50,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
         errors = [str(error) for error in stage.GetCompositionErrors()]
     except UnicodeDecodeError as error:  # USD quotes the damaged layer
         raise StageError(f"{path}: does not compose: a layer that is no UTF-8 text ({error.reason})") from None
+    _check_clips(stage, path)
     materials = [text for text in errors if MATERIALS.match(text)]
     if len(materials) < len(errors):
         wrong = next(text for text in errors if text not in materials)
@@ -58,6 +61,44 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
             f"{path}: materials that cannot be read here are left out: {names}", MissingMaterials, stacklevel=2
         )
     return stage
+
+
+def regular_layers(path: Path) -> list[Sdf.Layer]:
+    """All layers that a stage may compose, opened; raises StageError for one that is a pipe, which USD would wait for.
+
+    Broken and missing ones are left to composition, which says what is wrong with them.
+    """
+    found: dict[str, Sdf.Layer] = {}
+    todo = [str(path)]
+    while todo:
+        name = todo.pop()
+        if name in found:
+            continue
+        try:
+            layer = found[name] = Sdf.Layer.FindOrOpen(name)
+        except Tf.ErrorException:
+            continue
+        for asset in layer.GetCompositionAssetDependencies() if layer else ():
+            other = layer.ComputeAbsolutePath(asset)
+            _check_regular(str(Ar.GetResolver().Resolve(other)), f"{path}: a layer, {layer.identifier},")
+            todo.append(other)
+    return [layer for layer in found.values() if layer]
+
+
+def _check_clips(stage: Usd.Stage, path: Path) -> None:
+    """Raises StageError for value clips that are no files: their layers are opened when a value is asked for."""
+    for prim in stage.TraverseAll():
+        sets = prim.GetMetadata("clips") if prim.HasAuthoredMetadata("clips") else None
+        for clips in filter(lambda told: isinstance(told, dict), (sets or {}).values()):
+            for asset in (clips.get("manifestAssetPath"), *(clips.get("assetPaths") or ())):
+                if isinstance(asset, Sdf.AssetPath):
+                    _check_regular(asset.resolvedPath, f"{path}: <{prim.GetPath()}>: clips")
+
+
+def _check_regular(resolved: str, where: str) -> None:
+    file = Path(Ar.SplitPackageRelativePathOuter(resolved)[0]) if resolved else None
+    if file is not None and file.exists() and not file.is_file():
+        raise StageError(f"{where} names {str(file)!r}, not a regular file, allowed: layers")
 
 
 class MissingMaterials(UserWarning):

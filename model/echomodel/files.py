@@ -1,14 +1,15 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and files of others that are read with doubt."""
 
 from __future__ import annotations
 
 import json
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -67,3 +68,28 @@ def flush(path: Path) -> None:
         os.fsync(file)
     finally:
         os.close(file)
+
+
+def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
+    """The bytes of a file that anybody may have put there.
+
+    Raises ValueError that names it for what is no regular file (a pipe would wait for ever, a device never ends) or has
+    more than `most` bytes, and OSError as the system does.
+    """
+    file = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(file, "rb") as opened:
+        found = os.fstat(file)
+        if not stat.S_ISREG(found.st_mode):
+            raise ValueError(f"{path}: not a regular file, allowed: a file of at most {most} bytes")
+        if found.st_size > most:
+            raise ValueError(f"{path}: {found.st_size} bytes, allowed: at most {most}")
+        return opened.read(most)
+
+
+def read_json(path: str | os.PathLike[str], most: int) -> Any:
+    """The plain data of a JSON file, read as `read_bounded` does; ValueError also where it is no JSON."""
+    content = read_bounded(path, most)
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: cannot be read as JSON ({error})") from None

@@ -39,9 +39,9 @@ class Abo:
         found = []
         models = table.parent.parent / "original"
         for row in rows_of(table):
-            path = models / row.get("path", "")
-            if ".." not in Path(row.get("path", "")).parts and row.get("path") and path.is_file():
-                found.append(_entry(row["3dmodel_id"], path, folder, listed.get(row["3dmodel_id"], {})))
+            said, key = Path(row.get("path", "")), row.get("3dmodel_id", "")
+            if key and said.name and not said.is_absolute() and ".." not in said.parts and (models / said).is_file():
+                found.append(_entry(key, models / said, folder, listed.get(key, {})))
         if not found:
             tell(f"{table}: none of its models is below {models}")
         return found

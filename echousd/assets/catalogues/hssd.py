@@ -10,6 +10,7 @@ from echousd.assets.catalogues.entry import Entry, Told
 from echousd.assets.catalogues.tables import rows_of
 from echousd.assets.model_file import ModelFile
 
+HEAD = 4096  # characters of a table that may name its columns
 NAMES = ("main_category", "wnsynsetkey", "main_wnsynsetkey", "category", "super_category")
 
 
@@ -70,8 +71,10 @@ def _turn(up: str, front: str) -> np.ndarray | None:
 def _table(folder: Path) -> Path | None:
     for place in (folder, folder / "semantics", folder / "metadata"):
         for path in sorted(place.glob("*.csv")) if place.is_dir() else ():
+            if not path.is_file():
+                continue
             with path.open(encoding="utf-8", errors="replace") as file:
-                columns = [word.strip().strip('"').lower() for word in file.readline().split(",")]
+                columns = [word.strip().strip('"').lower() for word in file.readline(HEAD).split(",")]
             if {"id", "up", "front"} <= set(columns):
                 return path
     return None

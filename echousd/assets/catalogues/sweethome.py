@@ -19,11 +19,11 @@ class SweetHome:
 
     def holds(self, folder: Path) -> bool:
         """A library, or a folder with libraries somewhere below it."""
-        return folder.suffix == SUFFIX or (folder.is_dir() and any(folder.rglob(f"*{SUFFIX}")))
+        return folder.suffix == SUFFIX or (folder.is_dir() and any(p.is_file() for p in folder.rglob(f"*{SUFFIX}")))
 
     def entries(self, folder: Path, tell: Told) -> list[Entry]:
         """All models; those that were looked at for this project have the class that was found by eye."""
-        libraries = [folder] if folder.is_file() else sorted(folder.rglob(f"*{SUFFIX}"))
+        libraries = [folder] if folder.is_file() else sorted(p for p in folder.rglob(f"*{SUFFIX}") if p.is_file())
         found: list[Entry] = []
         for library in libraries:
             try:

@@ -6,23 +6,24 @@ import csv
 import gzip
 import io
 import json
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-MAX_TEXT = 2 * 2**30  # bytes of one table, unpacked
+from echomodel.files import read_bounded
+
+MAX_TEXT = 2**30  # bytes of one table, unpacked
 
 
 def text_of(path: Path) -> str:
     """The text of a file, unpacked where it ends in `.gz`; raises ValueError that names it."""
     try:
+        content = read_bounded(path, MAX_TEXT)
         if path.suffix == ".gz":
-            with gzip.open(path) as file:
+            with gzip.open(io.BytesIO(content)) as file:
                 content = file.read(MAX_TEXT + 1)
-        else:
-            with path.open("rb") as file:
-                content = file.read(MAX_TEXT + 1)
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise ValueError(f"{path}: cannot be read ({error})") from None
     if len(content) > MAX_TEXT:
         raise ValueError(f"{path}: more than {MAX_TEXT} bytes, allowed for a table: that many")

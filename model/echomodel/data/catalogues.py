@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,8 @@ import trimesh
 
 MESH_FILES = (".obj", ".glb", ".gltf", ".ply", ".stl")
 CATALOGUE = "PluginFurnitureCatalog.properties"
+NOTICE = "LICENSE.TXT"
+MAX_TEXT = 64 * 2**20  # bytes of one of them
 Loader = Callable[[Path], trimesh.Trimesh]
 
 
@@ -38,15 +41,22 @@ class MeshEntry:
 
 def read_library(path: Path) -> list[MeshEntry]:
     """Entries of a Sweet Home 3D furniture library; raises ValueError for a file that is none."""
+    if not path.is_file():
+        raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)")
     try:
         with zipfile.ZipFile(path) as archive:
             names = set(archive.namelist())
             if CATALOGUE not in names:
                 raise ValueError(f"{path}: not a furniture library, it holds no {CATALOGUE}")
+            for name in names & {CATALOGUE, NOTICE}:
+                if archive.getinfo(name).file_size > MAX_TEXT:
+                    raise ValueError(f"{path}: {name} of {archive.getinfo(name).file_size} bytes, allowed: {MAX_TEXT}")
             text = archive.read(CATALOGUE).decode("latin-1")
-            notice = archive.read("LICENSE.TXT").decode("latin-1") if "LICENSE.TXT" in names else ""
+            notice = archive.read(NOTICE).decode("latin-1") if NOTICE in names else ""
     except zipfile.BadZipFile:
         raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)") from None
+    except (zlib.error, EOFError, RuntimeError) as error:  # damaged, encrypted, or packed in a way that nobody knows
+        raise ValueError(f"{path}: cannot be unpacked ({error})") from None
     head, items = _properties(text)
     licence = _plain(head.get("license", "")) or _licence_in(notice)
     entries = []
@@ -57,6 +67,8 @@ def read_library(path: Path) -> list[MeshEntry]:
         key = f"{path.stem}/{Path(item['model']).stem}"
         centimetres = [float(item[axis]) for axis in ("width", "height", "depth")]
         turn = np.array([float(v) for v in item.get("modelRotation", "1 0 0 0 1 0 0 0 1").split()]).reshape(3, 3)
+        if not all(0 < length < 1e5 for length in centimetres) or not np.isfinite(turn).all():
+            continue  # nothing that could stand anywhere
         entries.append(
             MeshEntry(
                 key=key,
