@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
-from echousd.stage.files import write_whole
+from echousd.stage.files import assets_in, write_whole
 from echousd.store import store_above
 from echousd.textures import TextureError, file_of, texture_bytes
 
@@ -184,17 +184,5 @@ def asset_paths(layer: Sdf.Layer) -> Iterator[tuple[str, str]]:
         spec = layer.pseudoRoot if at == Sdf.Path.absoluteRootPath else layer.GetObjectAtPath(at)
         if spec:
             for key in spec.ListInfoKeys():
-                for path in _assets_in(spec.GetInfo(key)):
+                for path in assets_in(spec.GetInfo(key)):
                     yield f"<{at}>", path
-
-
-def _assets_in(value: object) -> Iterator[str]:
-    if isinstance(value, Sdf.AssetPath):
-        if value.path:
-            yield value.path
-    elif isinstance(value, dict):
-        for key in sorted(value, key=str):
-            yield from _assets_in(value[key])
-    elif isinstance(value, Sdf.AssetPathArray | list | tuple):
-        for entry in value:
-            yield from _assets_in(entry)

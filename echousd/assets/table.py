@@ -142,7 +142,7 @@ def _fault(record: AssetRecord) -> str:
     for name, count in (("turn", 9), ("low", 3), ("high", 3), ("dims", 3)):
         numbers = getattr(record, name)
         if len(numbers) != count or not all(map(math.isfinite, numbers)):
-            return f"{name} is {str(numbers):.60}, allowed: {count} finite numbers"
+            return f"{name} is {numbers!s:.60}, allowed: {count} finite numbers"
     if record.category and record.category not in {category.name for category in vocabulary().categories}:
         return f"category is {record.category!r:.60}, allowed: a word of the vocabulary"
     return ""

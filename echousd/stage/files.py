@@ -6,6 +6,7 @@ import os
 import re
 import tempfile
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
@@ -50,7 +51,6 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
         errors = [str(error) for error in stage.GetCompositionErrors()]
     except UnicodeDecodeError as error:  # USD quotes the damaged layer
         raise StageError(f"{path}: does not compose: a layer that is no UTF-8 text ({error.reason})") from None
-    _check_clips(stage, path)
     materials = [text for text in errors if MATERIALS.match(text)]
     if len(materials) < len(errors):
         wrong = next(text for text in errors if text not in materials)
@@ -78,6 +78,8 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
             layer = found[name] = Sdf.Layer.FindOrOpen(name)
         except Tf.ErrorException:
             continue
+        if layer:
+            _check_clips(layer, path)
         for asset in layer.GetCompositionAssetDependencies() if layer else ():
             other = layer.ComputeAbsolutePath(asset)
             _check_regular(str(Ar.GetResolver().Resolve(other)), f"{path}: a layer, {layer.identifier},")
@@ -85,14 +87,28 @@ def regular_layers(path: Path) -> list[Sdf.Layer]:
     return [layer for layer in found.values() if layer]
 
 
-def _check_clips(stage: Usd.Stage, path: Path) -> None:
-    """Raises StageError for value clips that are no files: their layers are opened when a value is asked for."""
-    for prim in stage.TraverseAll():
-        sets = prim.GetMetadata("clips") if prim.HasAuthoredMetadata("clips") else None
-        for clips in filter(lambda told: isinstance(told, dict), (sets or {}).values()):
-            for asset in (clips.get("manifestAssetPath"), *(clips.get("assetPaths") or ())):
-                if isinstance(asset, Sdf.AssetPath):
-                    _check_regular(asset.resolvedPath, f"{path}: <{prim.GetPath()}>: clips")
+def _check_clips(layer: Sdf.Layer, path: Path) -> None:
+    """Raises StageError for value clips that are no files: USD opens their layers for values, or at once."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    prims = [layer.GetPrimAtPath(at) for at in paths if at.IsPrimPath() or at.IsPrimVariantSelectionPath()]
+    for prim in (prim for prim in prims if prim and prim.HasInfo("clips")):
+        for asset in assets_in(prim.GetInfo("clips")):
+            resolved = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(asset)))
+            _check_regular(resolved, f"{path}: {layer.identifier}: <{prim.path}>: clips")
+
+
+def assets_in(value: object) -> Iterator[str]:
+    """Asset paths in a value of a layer: in itself, or in the lists and dictionaries that it consists of."""
+    if isinstance(value, Sdf.AssetPath):
+        if value.path:
+            yield value.path
+    elif isinstance(value, dict):
+        for key in sorted(value, key=str):
+            yield from assets_in(value[key])
+    elif isinstance(value, Sdf.AssetPathArray | list | tuple):
+        for entry in value:
+            yield from assets_in(entry)
 
 
 def _check_regular(resolved: str, where: str) -> None:

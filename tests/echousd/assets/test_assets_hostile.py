@@ -49,7 +49,7 @@ def test_pipes_and_devices_are_left_alone(folder, name, make):
 def test_tables_that_are_pipes_are_told(folder, echousd_command):
     for name in ("3dmodels.csv", "listings_1.json"):
         os.mkfifo(folder / name)
-        with pytest.raises(ValueError, match="not a regular file|holds no models"):
+        with pytest.raises(ValueError, match=r"not a regular file|holds no models"):
             indexed(folder)
         (folder / name).unlink()
         (folder / "3dmodels.csv").write_text("3dmodel_id,path\na,x.glb\n")

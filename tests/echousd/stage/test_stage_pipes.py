@@ -12,7 +12,8 @@ WAYS = {
     "reference": 'def "A" (references=@./pipe.usda@) {}\n',
     "payload": 'def "A" (payload=@./pipe.usda@) {}\n',
     "deeper": 'def "A" (references=@./between.usda@) {}\n',
-    "variant": 'def "A" (prepend variantSets = "v") {\n variantSet "v" = {\n"a" (references=@./pipe.usda@) {\n}\n}\n}\n',
+    "variant": 'def "A" (prepend variantSets = "v") {\n variantSet "v" = {\n'
+    '"a" (references=@./pipe.usda@) {\n}\n}\n}\n',
     "clips": 'def "A" (clips = {\n dictionary default = {\n asset[] assetPaths = [@./pipe.usda@]\n'
     ' string primPath = "/A"\n double2[] active = [(0, 0)]\n }\n }\n) {\n double x = 1\n}\n',
 }  # fmt: skip
