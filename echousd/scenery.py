@@ -28,7 +28,7 @@ class Scenery:
         st: (f, 3, 2) float32 texture coordinates.
         texture: (f,) int, which of `images` colours the face, -1 for none.
         images: (h, w, 3) float32 linear RGB each.
-        furniture: boxes of the objects.
+        furniture: boxes of the objects. hung: of what hangs on walls.
         wall: (f,) int, which wall a face belongs to, -1 for none.
         panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
         pane_wall: (p,) int, the walls of the panes.
@@ -43,6 +43,7 @@ class Scenery:
     texture: np.ndarray
     images: tuple[np.ndarray, ...]
     furniture: Furniture
+    hung: Furniture
     wall: np.ndarray
     panes: np.ndarray
     pane_wall: np.ndarray
@@ -109,7 +110,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
     """
     parts: list[dict[str, np.ndarray]] = []
     images: dict[tuple, tuple[int, np.ndarray]] = {}
-    boxes = []
+    boxes, curtains = [], []
     hung: list[int] = []
     words: list[str] = []
     walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
@@ -151,15 +152,19 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             boxes.append(_box(mesh))
         if mesh.category in HUNG:
             hung.append(len(parts) - 1)
+            curtains.append(_box(mesh))
     _hang(parts, [*hung, *_on_shelves(parts, words)], len(walls))
     if not parts:
         raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-    sizes = np.array(boxes).reshape(-1, 7)
-    furniture = Furniture(sizes[:, :3], sizes[:, 3:6], sizes[:, 6])
+    furniture, at_walls = (
+        Furniture(found[:, :3], found[:, 3:6], found[:, 6])
+        for found in (np.array(each).reshape(-1, 7) for each in (boxes, curtains))
+    )
     return Scenery(
         images=tuple(image for _, image in images.values()),
         furniture=furniture,
+        hung=at_walls,
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
         **joined,

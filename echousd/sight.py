@@ -6,6 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.roomboxes import footprints
+
+SIDEWAYS = 0.7  # cosine of the angle to which a wide picture reaches
+
 
 @dataclass(frozen=True, eq=False)
 class Furniture:
@@ -28,13 +32,21 @@ class Furniture:
         weight = self.size[:, [0, 2]].prod(1)
         return np.asarray(weight @ self.position[:, [0, 2]] / max(float(weight.sum()), 1e-9))
 
-    def crowding(self, eye: np.ndarray, reach: float) -> float:
-        """How much stands right before `eye` (3,): a box nearer than `reach` metres counts 0 (there) to 2 (here)."""
+    def crowding(self, eye: np.ndarray, reach: float, way: np.ndarray | None = None) -> float:
+        """How much stands right before `eye` (3,): a box nearer than `reach` metres counts 0 (there) to 2 (here).
+
+        Where `way` (2,), x and z of a look, is given, only what is in a wide picture of it counts.
+        """
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = (eye - self.position - self.size * (0.0, 0.5, 0.0)).T
         local = np.stack([cos * x - sin * z, y, sin * x + cos * z], 1)
         away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
-        return float(2.0 * np.clip(1.0 - away / reach, 0.0, 1.0).sum())
+        near = 2.0 * np.clip(1.0 - away / reach, 0.0, 1.0)
+        if way is not None:
+            corners = footprints(self.size, self.position, self.yaw) - eye[[0, 2]]
+            along = (corners @ way) / np.maximum(np.linalg.norm(corners, axis=-1) * np.linalg.norm(way), 1e-9)
+            near = near * (along.max(1) > SIDEWAYS)
+        return float(near.sum())
 
     def hidden(self, eye: np.ndarray) -> float:
         """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from echousd.naming import free_name
 from echousd.scenery import Scenery
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.views import APERTURE, FOCAL_LENGTH, WIDE, inside_view, perspective_view
+from echousd.views import APERTURE, EYES, FOCAL_LENGTH, WIDE, inside_view, perspective_view
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -68,7 +68,7 @@ def eye_view(scenery: Scenery) -> View:
     lower, upper = scenery.bounds
     x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
     floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
-    matrix = inside_view(floor, scenery.furniture, EYE / 0.72)
+    matrix = inside_view(floor, scenery.furniture, EYE / EYES, scenery.hung)
     return View(matrix, APERTURE / 2 / WIDE, False)
 
 

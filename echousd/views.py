@@ -11,7 +11,8 @@ APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 WIDE = 21.0  # mm, for a camera inside: 81 degrees across
 EYES = 0.62  # of the height of the walls: where a camera inside is
-BEFORE = 1.6  # metres: what is nearer to the eye fills the picture
+BEFORE, BESIDE = 1.6, 1.0  # metres: what stands, what hangs nearer to the eye fills the picture
+STEPS = (0.3, 0.5)  # metres from a corner that a camera inside may stand
 MARGIN = 1.06
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
@@ -55,22 +56,37 @@ def _framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return view_matrix(target + direction * distance, target)
 
 
-def inside_view(floor: np.ndarray, furniture: Furniture, height: float) -> np.ndarray:
+def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None) -> np.ndarray:
     """(4, 4) float camera to world of a view from a corner inside a room with walls, where little is hidden.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
         furniture: what shall be seen, its fronts rather than its backs.
         height: of the walls, metres.
+        hung: what hangs or stands at the walls: none of it shall be right before the eye.
     """
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
-    step = middle - floor
-    step = floor + 0.3 * step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9)
-    seen = [room.contains(shapely.LineString([corner, middle])) for corner in step]
-    eyes = np.insert(step, 1, EYES * height, axis=1)
-    reach = np.linalg.norm(floor - middle, axis=1) + (floor - middle) @ furniture.facing
-    reach = reach - [furniture.hidden(eye) + furniture.crowding(eye, BEFORE) for eye in eyes]
-    corner = step[int(np.argmax(np.where(seen, reach, -np.inf)))] if any(seen) else middle + 0.1
     aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
-    return view_matrix(np.array([corner[0], EYES * height, corner[1]]), np.array([aim[0], 0.3 * height, aim[1]]))
+    best, most = middle + 0.1, -np.inf
+    for corner in floor:
+        inwards = (middle - corner) / max(float(np.linalg.norm(middle - corner)), 1e-9)
+        for step in STEPS:
+            spot = corner + step * inwards
+            if not room.contains(shapely.LineString([spot, middle])):
+                continue
+            eye = np.array([spot[0], EYES * height, spot[1]])
+            merit = _depth(room, spot, aim - spot) + (corner - middle) @ furniture.facing
+            merit -= furniture.hidden(eye) + furniture.crowding(eye, BEFORE)
+            merit -= hung.crowding(eye, BESIDE, aim - spot) if hung is not None and len(hung.size) else 0.0
+            if merit > most:
+                best, most = spot, merit
+    return view_matrix(np.array([best[0], EYES * height, best[1]]), np.array([aim[0], 0.3 * height, aim[1]]))
+
+
+def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:
+    """Metres that one sees from a spot in the mean of a wide picture, up to the walls."""
+    turn = np.arctan2(way[1], way[0]) + np.linspace(-0.7, 0.7, 15)
+    ends = spot + 50.0 * np.stack([np.cos(turn), np.sin(turn)], 1)
+    lines = shapely.linestrings([[spot, end] for end in ends])
+    return float(shapely.distance(shapely.Point(spot), shapely.intersection(lines, room.boundary)).mean())

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from pxr import Gf, Usd, UsdGeom
 
+from echousd.room.volume import Volume
 from echousd.sight import Furniture
 from echousd.views import APERTURE, FOCAL_LENGTH, MARGIN, WIDE, inside_view, perspective_view
 
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
 
 
-@dataclass(frozen=True)
-class Volume:
-    """What the cameras must see, in the frame of `/Room`: (3,) float lower and upper corners, metres."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Middle of the volume."""
-        return (self.lower + self.upper) / 2
-
-
 def write_cameras(
-    stage: Usd.Stage, volume: Volume, points: np.ndarray, furniture: Furniture, walled: np.ndarray | None = None
+    stage: Usd.Stage,
+    volume: Volume,
+    points: np.ndarray,
+    furniture: Furniture,
+    walled: np.ndarray | None = None,
+    hung: Furniture | None = None,
 ) -> None:
     """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`.
 
@@ -35,6 +26,7 @@ def write_cameras(
         stage: receives the cameras.
         volume: of the room. points, furniture: see `perspective_view`.
         walled: corners of the floor of a room with walls; its perspective camera stands inside.
+        hung: what hangs or stands at the walls and must not fill that camera's picture.
     """
     UsdGeom.Scope.Define(stage, "/Room/Cameras")
     top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
@@ -48,7 +40,7 @@ def write_cameras(
     top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
     if walled is not None:
-        matrix = inside_view(walled, furniture, float(volume.upper[1]))
+        matrix = inside_view(walled, furniture, float(volume.upper[1]), hung)
     else:
         matrix = perspective_view(points, furniture)
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))

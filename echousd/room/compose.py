@@ -12,8 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
-from echomodel.roomboxes import footprints
-from echousd.room import assets, cameras, lights, looks, materials, physics, shell, structure, walls
+from echousd.room import assets, cameras, lights, looks, materials, physics, structure
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
@@ -24,6 +23,7 @@ from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
 from echousd.room.surface import surface
 from echousd.room.taxonomy import ade20k, word_of
+from echousd.room.volume import room_points, room_volume
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
@@ -82,7 +82,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
             shelf.redirect(layer)
         path = layer_file(name)
         files[path] = layer_bytes(layer, path[-5:])
-    files[f"{room.name}.usda"] = layer_bytes(root_layer(room), ".usda")
+    files |= lights.image_files(room)
+    files[f"{room.name}.usda"] = layer_bytes(root_layer(room, dressing.hung), ".usda")
     return files
 
 
@@ -203,8 +204,8 @@ def materials_layer(
     return stage.GetRootLayer()
 
 
-def root_layer(room: RoomData) -> Sdf.Layer:
-    """The root layer: metadata, sublayers, lights and cameras."""
+def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
+    """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls."""
     stage = _room_stage(room, "")
     layer = stage.GetRootLayer()
     layer.documentation = "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten."
@@ -215,37 +216,15 @@ def root_layer(room: RoomData) -> Sdf.Layer:
     Usd.ModelAPI(prim).SetAssetName(room.name)
     if room.options.up_axis == "Z":
         root.AddRotateXOp().Set(90.0)  # without a suffix: three.js reads no other
-    volume = room_volume(room)
-    low, high = (Gf.Vec3f(*map(float, corner)) for corner in (volume.lower, volume.upper))
+    seen = room_volume(room)
+    low, high = (Gf.Vec3f(*map(float, corner)) for corner in (seen.lower, seen.upper))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
     furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
-    lights.write_lights(stage, room, volume)
+    lights.write_lights(stage, room, seen)
     walled = room.floor if room.options.walls else None
-    cameras.write_cameras(stage, volume, room_points(room), furniture, walled)
+    cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
     return assets.without_stage(stage, lambda layer: _add_sublayers(layer, names))
-
-
-def room_points(room: RoomData) -> np.ndarray:
-    """(n, 3) float, metres: corners of the floor (and the walls) and of all boxes, in the frame of `/Room`."""
-    size, position = np.asarray(room.boxes.size, float), np.asarray(room.boxes.position, float)
-    plan = footprints(size, position, np.asarray(room.boxes.yaw, float)).reshape(-1, 2)
-    low, high = np.repeat(position[:, 1], 4), np.repeat(position[:, 1] + size[:, 1], 4)
-    points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
-    points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]
-    if room.options.walls:
-        points += [
-            np.insert(walls.outline(room.floor), 1, height, axis=1) for height in (-shell.THICKNESS, room.height)
-        ]
-    if room.options.ceiling:
-        points.append(np.insert(room.floor, 1, room.height + shell.THICKNESS, axis=1))
-    return np.concatenate(points)
-
-
-def room_volume(room: RoomData) -> cameras.Volume:
-    """Box around the floor and all furniture, metres."""
-    points = room_points(room)
-    return cameras.Volume(points.min(0), points.max(0))
 
 
 def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:

@@ -14,8 +14,9 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 from echomodel.boxes import Boxes
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
-from echousd.room.cameras import Volume
+from echousd.room.finishes import baking
 from echousd.room.room import RoomData
+from echousd.room.volume import Volume
 from echousd.views import view_matrix
 
 LIGHTS = "/Room/Lights"
@@ -24,8 +25,11 @@ LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # 
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
 SHARES = {"open": (1.0, 1.0), "walls": (0.9, 0.12), "ceiling": (1.8, 0.4)}
+SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
-SUN = 1.4  # irradiance of the sun: a white surface that faces it gains 0.45, about what the sky gives
+# Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
+# walls without a ceiling, which have the sky already, so much would leave them blank.
+SUN, OVERHEAD = 1.4, 0.55
 ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
 # What is left of sky, panel, sun and lamps.
 TIMES: Mapping[str, tuple[float, float, float, float]] = {
@@ -50,6 +54,9 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     UsdGeom.Scope.Define(stage, LIGHTS)
     sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
     sky.CreateColorAttr(Gf.Vec3f(0.95, 0.98, 1.0))
+    if room.options.walls:  # who looks out of a window or over a wall sees something
+        sky.CreateTextureFileAttr(Sdf.AssetPath(f"./{SKY}"))
+        sky.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
     kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
     above, panel = SHARES[kind]
     full: Intensities = {sky.GetPath(): (0, 0.5 * above), **_panel(stage, volume, room.height, panel)}
@@ -65,6 +72,11 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
                 light = UsdLux.LightAPI(stage.OverridePrim(path))
                 light.CreateIntensityAttr(round(intensity * shares[column], 4))
     times.SetVariantSelection("day")
+
+
+def image_files(room: RoomData) -> dict[str, bytes]:
+    """Path in the room's folder -> image that its lights name."""
+    return {SKY: baking.sky_image()} if room.options.walls else {}
 
 
 def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Intensities:
@@ -100,7 +112,7 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
     sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    return {sun.GetPath(): (2, SUN)}
+    return {sun.GetPath(): (2, SUN if room.options.ceiling else OVERHEAD)}
 
 
 def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:

@@ -16,8 +16,10 @@ from echousd.room.dressing.setting import Setting, Thing, standing
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import mass_of, part_of, within_budget
 from echousd.room.room import RoomData
+from echousd.sight import Furniture
 
 ORIGIN = Origin("dressing")
+TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
 RULES = (
     floors.rugs,
     walls.curtains,
@@ -57,6 +59,14 @@ class Dressing:
     def kinds(self) -> dict[str, str]:
         """Name of an asset -> its kind."""
         return {self.assets[name]: t.kind for things in self.layouts for name, t in things.items()}
+
+    @property
+    def hung(self) -> Furniture:
+        """Boxes of what a camera at a wall would have right before it, in the first layout."""
+        things = [t for t in next(iter(self.layouts), {}).values() if t.size[1] > TALL or t.position[1] > TALL]
+        size = np.array([t.size for t in things]).reshape(-1, 3)
+        position = np.array([t.position for t in things]).reshape(-1, 3)
+        return Furniture(size, position, np.array([t.yaw for t in things]))
 
 
 def dress(room: RoomData) -> Dressing:

@@ -9,7 +9,7 @@ import numpy as np
 
 from echousd.room.finishes.harmonies import HARMONIES, Color, linear
 from echousd.room.finishes.patterns import SIZE, relief
-from echousd.room.finishes.pictures import painting
+from echousd.room.finishes.pictures import painting, sky
 
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
@@ -52,6 +52,12 @@ def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
     rough = None if pattern.startswith("painting_") else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
+
+
+@cache
+def sky_image() -> bytes:
+    """What lies around a room, for its dome light, as JPEG."""
+    return _jpeg(sky())
 
 
 def _jpeg(value: np.ndarray) -> bytes:

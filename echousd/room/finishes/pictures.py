@@ -1,4 +1,4 @@
-"""Pictures to hang: plain compositions in the colours of a room's harmony, made by programs of ours."""
+"""Pictures to hang, plain compositions in the colours of a room's harmony, and the sky; made by programs of ours."""
 
 from __future__ import annotations
 
@@ -41,3 +41,18 @@ def painting(colors: Sequence[Sequence[float]], number: int) -> np.ndarray:
         for color, top, bottom in zip((rest[0], rest[1], rest[2]), cuts, cuts[1:], strict=False):
             out[(soft > top + 0.015) & (soft < bottom - 0.015) & (u > 0.06) & (u < 0.94)] = color
     return np.clip(out * grain, 0, 1)
+
+
+SKY = (  # elevation in degrees, linear RGB: fields, haze, a bright horizon, blue
+    (-90.0, -25.0, -7.0, -1.5, 4.0, 30.0, 90.0),
+    ((0.22, 0.27, 0.15), (0.31, 0.38, 0.21), (0.50, 0.56, 0.42), (0.76, 0.80, 0.78), (0.86, 0.90, 0.93),
+     (0.62, 0.76, 0.94), (0.50, 0.68, 0.92)),
+)  # fmt: skip
+
+
+def sky() -> np.ndarray:
+    """(128, 256, 3) linear RGB: a clear sky over fields by longitude and latitude, the zenith in the first row."""
+    elevation = 90 - (np.arange(128) + 0.5) / 128 * 180
+    level, tones = SKY[0], np.array(SKY[1])
+    row = np.stack([np.interp(elevation, level, tone) for tone in tones.T], 1)
+    return np.repeat(row[:, None], 256, axis=1)

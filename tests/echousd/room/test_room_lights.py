@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 from pxr import Gf, Usd, UsdGeom, UsdLux
 from small_room import StandIn, small_graph
 
@@ -49,6 +50,22 @@ def test_the_sun_falls_in_through_the_window(stage) -> None:
     assert np.linalg.norm(way) == pytest.approx(1)
     assert way[1] < -0.5
     assert way[2] > 0.5
+
+
+def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path) -> None:
+    dome = UsdLux.DomeLight(stage.GetPrimAtPath("/Room/Lights/sky"))
+    assert dome.GetTextureFileAttr().Get().resolvedPath.endswith("textures/sky.jpg")
+    with Image.open(dome.GetTextureFileAttr().Get().resolvedPath) as picture:
+        up, down = picture.getpixel((9, 20)), picture.getpixel((9, 100))
+    assert up[2] > up[0] > 150
+    assert down[1] > down[2]
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
+    options = RoomOptions(walls=True, ceiling=True)
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+    closed = Usd.Stage.Open(str(room.save(tmp_path / "closed", preview=False)))
+    assert intensity(closed, "sun") > 2 * intensity(stage, "sun")  # through the window alone
+    bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes").save(tmp_path / "bare", preview=False)
+    assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
 
 
 def test_lamps_shine_where_they_are(stage) -> None:
