@@ -24,7 +24,7 @@ NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a
 LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
-SHARES = {"open": (1.0, 1.0), "walls": (0.9, 0.12), "ceiling": (1.8, 0.4)}
+SHARES = {"open": (1.0, 1.0), "walls": (1.1, 0.12), "ceiling": (3.2, 0.7)}
 SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
@@ -87,7 +87,7 @@ def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Int
     panel.CreateWidthAttr(width)
     panel.CreateHeightAttr(depth)
     panel.CreateEnableColorTemperatureAttr(True)
-    panel.CreateColorTemperatureAttr(4300.0)
+    panel.CreateColorTemperatureAttr(5000.0)
     panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
     panel.AddRotateXOp().Set(-90.0)
     return {panel.GetPath(): (1, share * min(20.0, 1.6 * height**2 / (width * depth)))}
