@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from echousd.cli.output import say
+from echousd.cli.output import AsJson, say
+from echousd.cli.report import say_written
 
 assets_app = typer.Typer(help="Libraries of furniture: index them, look through them.", no_args_is_help=True)
 SHOWN = 20  # faults that are told; the table holds all
@@ -30,6 +32,7 @@ def index(
     descriptors: Annotated[
         bool, typer.Option("--descriptors", help="Also say what each shape is like, for generate --shapes guided.")
     ] = False,
+    json: AsJson = False,
 ) -> None:
     """Index a library: what its models are, how large, where their front is, and whose they are.
 
@@ -42,7 +45,7 @@ def index(
 
     if table is not None and not table.is_file():
         raise ValueError(f"{table}: no such file, allowed: a table that `echousd assets review` wrote")
-    console = Console(stderr=True)
+    started, console = time.perf_counter(), Console(stderr=True)
     with Progress(console=console, disable=not console.is_terminal) as bar:
         task = bar.add_task("Reading the models", total=None)
         done = make(
@@ -53,6 +56,10 @@ def index(
             descriptors=descriptors,
             progress=lambda count, of: bar.update(task, completed=count, total=of),
         )
+    if json:
+        counts = {"models": done.models, "usable": done.usable, "read": done.read}
+        say_written([output], started, more={**counts, "left_out": list(map(str, done.faults))})
+        return
     for fault in done.faults[:SHOWN]:
         say(f"left out {fault}")
     if len(done.faults) > SHOWN:
@@ -66,6 +73,7 @@ def review(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder; default: INDEX_review, beside it.")
     ] = None,
+    json: AsJson = False,
 ) -> None:
     """Write what there is to look at and to correct: a page, a sheet of pictures for each category, and the table.
 
@@ -75,7 +83,7 @@ def review(
     from echousd.assets.review import write_page, write_sheets
     from echousd.assets.table import read_library
 
-    found = read_library(library)
+    started, found = time.perf_counter(), read_library(library)
     records = list(found.records.values())
     folder = output or library.with_name(f"{library.stem}_review")
     if folder.exists() and not folder.is_dir():
@@ -84,6 +92,9 @@ def review(
     write_page(folder / "review.html", records)
     table = library.with_suffix(".csv")
     write_table(table, records, read_corrections(table) if table.exists() else None)
+    if json:
+        say_written([folder / "review.html", *sheets, table], started, more={"models": len(records)})
+        return
     say(f"page     {folder / 'review.html'}")
     say(f"sheets   {len(sheets)} in {folder}")
     say(f"table    {table}: correct it and run echousd assets index again")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from echousd.cli.output import one_line, plain_json, say, say_error
+from echousd.cli.output import AsJson, one_line, plain_json, say, say_error, say_json
 
 if TYPE_CHECKING:
     from echousd.batches.run import BatchProgress
@@ -138,17 +138,22 @@ def status(
 def verify(
     folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
     check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
     from echousd.batches.verify import verify as found_wrong
 
-    wrong = 0
+    wrong = []
     for fault in found_wrong(folder, check=check):
-        wrong += 1
-        say(f"{fault.room}: {one_line(fault.problem)}")
+        wrong.append({"room": fault.room, "problem": fault.problem})
+        if not json:
+            say(f"{fault.room}: {one_line(fault.problem)}")
+    if json:
+        say_json({"ok": not wrong, "wrong": wrong}, indent=2)
     if wrong:
         raise typer.Exit(1)
-    say("every room is there and as it was made")
+    if not json:
+        say("every room is there and as it was made")
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import typer
 
-from echousd.cli.output import say
+from echousd.cli.output import AsJson, say
+from echousd.cli.report import say_written
 
 SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
 OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
@@ -28,6 +30,7 @@ def convert(
     bounds: Path | None = BOUNDS,
     classes: Path | None = CLASSES,
     force: bool = FORCE,
+    json: AsJson = False,
 ) -> None:
     """Convert a published EchoScene, EchoLayout or VQ-VAE checkpoint.
 
@@ -36,6 +39,7 @@ def convert(
 
     Example: echousd convert model2050.pth -o echoscene.safetensors --bounds centered_bounds_all_trainval.txt
     """
+    started = time.perf_counter()
     if output.suffix != ".safetensors":
         raise ValueError(f"{output}: the output's name must end by .safetensors")
     if output.exists() and not force:
@@ -49,6 +53,10 @@ def convert(
     config = checkpoint.convert(source, output, classes=names, statistics=statistics)
     parts = [name for name in ("encoder", "layout", "shape", "vqvae") if getattr(config, name) is not None]
     echo = config.layout or config.shape
+    if json:
+        has = {"parts": parts, "bytes": output.stat().st_size, "boxes": statistics is not None}
+        say_written([output], started, more={**has, "classes": config.encoder.classes if config.encoder else None})
+        return
     say(f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB")
     if config.encoder:
         timed = "with" if echo and echo.time_in_echo else "without"

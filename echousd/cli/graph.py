@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import math
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import check_picture, safe, say
+from echousd.cli.output import AsJson, check_picture, safe, say, say_json
+from echousd.cli.report import say_written
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -95,6 +96,7 @@ def new(
         typer.Option(metavar="WALL ...", help="A window: wall, metres from its first corner, width, sill=, height=."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite OUT.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Author a scene graph, as a stage or as text, from a file or from a room type."""
     from echousd.graph import GraphError, RoomSpec, load_graph, save_graph, starting_graph
@@ -102,6 +104,7 @@ def new(
     from echousd.graph.sentences import sentence, stating
     from echousd.graph.text import with_openings
 
+    started = time.perf_counter()
     if (source is None) == (room is None):
         raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
     if source is not None and count:
@@ -129,6 +132,10 @@ def new(
     except OSError as error:
         raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
     save_graph(made, out)
+    if json:
+        counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
+        say_written([out], started, more=counts)
+        return
     say(f"wrote {out}: {_summary(made)}")
 
 
@@ -173,7 +180,7 @@ def graph(
     if len(chosen) > 1:
         raise GraphError(f"{' and '.join(chosen)} exclude each other")
     if schema:
-        typer.echo(json.dumps(SceneGraph.model_json_schema(), indent=2))
+        say_json(SceneGraph.model_json_schema(), indent=2)
         return
     if source is None:
         raise GraphError("GRAPH is missing, allowed: a stage, a YAML or a JSON file")

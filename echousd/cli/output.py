@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
 
+AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000
 MARK = b"echousd"

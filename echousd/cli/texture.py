@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import say
+from echousd.cli.output import AsJson, say
+from echousd.cli.report import say_written
 
 if TYPE_CHECKING:
     from echousd.texturing import Job
@@ -37,13 +39,19 @@ def export(
     ] = None,
     layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a job that lies there, its results too.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
     from echousd.texturing import export_job
 
+    started = time.perf_counter()
     job = export_job(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, force=force
     )
+    if json:
+        told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
+        say_written([output / "job.json"], started, more=told)
+        return
     say(f"job      {output / 'job.json'}")
     say(f"objects  {len(job.objects)}, prompt {job.prompt!r}")
     _tell(job)
@@ -58,11 +66,17 @@ def import_(
     preview: Annotated[bool, typer.Option("--preview/--no-preview", help="Draw the room's picture anew.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace a look of that name.")] = False,
     wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    json: AsJson = False,
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
     from echousd.texturing import import_look
 
+    started = time.perf_counter()
     look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
+    if json:
+        told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
+        say_written([look.layer], started, more={**told, "left_out": list(look.skipped)})
+        return
     say(f"look     {look.layer}")
     say(f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without")
     for words, what in ((look.unpainted, "no result"), (look.skipped, "left out")):

@@ -20,7 +20,7 @@ def is_title(word: Any) -> bool:
     """Whether a word is a name with letters beyond ASCII: letters, marks, digits, spaces, _, - and '."""
     return (
         isinstance(word, str)
-        and not word.isascii()
+        and any(not c.isascii() and c.isalpha() for c in word)
         and word == word.strip()
         and len(word) <= MAX_NAME
         and all(c in " _-'’" or unicodedata.category(c)[0] in "LMN" for c in word)

@@ -197,7 +197,7 @@ def test_graphs_come_from_parquet(calm, tmp_path):
     assert [entry.text for entry in found] == [entry.text for entry in find_graphs([str(source)]) if entry.text]
 
 
-def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path):
+def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path, echousd_command):
     source, folder, _ = calm
     out = tmp_path / "run"
     shutil.copytree(folder, out)
@@ -209,6 +209,11 @@ def test_a_damaged_asset_of_the_store_is_told_and_made_again(calm, tmp_path):
     file.write_bytes(b"no crate")
     told = [f"{wrong.room}: {wrong.problem}" for wrong in verify(out)]
     assert "graphs_000000: 1 of its assets are missing in the store or changed" in told
+    for words, count in ((("batch", "verify", out), "wrong"), (("store", "verify", out / "store"), "changed")):
+        done = echousd_command(*words, "--json")
+        assert done.code == 1
+        assert json.loads(done.out)["ok"] is False
+        assert json.loads(done.out)[count]
     batch(source, out, executor=Inline(), workers=1, resume=True, **QUICK)
     assert [wrong.problem[:7] for wrong in verify(out)] == ["failed:"]
     assert digests(out) == digests(folder)

@@ -139,3 +139,63 @@ def test_a_picture_for_each_camera(tmp_path, echousd_command):
     (tmp_path / "shots/door.png").write_bytes(b"mine")
     done = echousd_command(*words, tmp_path / "shots")
     assert (done.code, "no picture of echousd" in done.err) == (2, True)
+
+
+WITHOUT_JSON = {
+    "plugin-path",
+    "train",
+    "build",
+    "rooms",
+    "plot",
+    "meshes",
+    "sheet",
+    "to-usd",
+    "from-usd",
+    "to-sgfront",
+    "from-sgfront",
+}
+
+
+def test_every_command_with_results_has_json():
+    def leaves(group):
+        for command in group.commands.values():
+            yield from leaves(command) if hasattr(command, "commands") else (command,)
+
+    lacking = {c.name for c in leaves(main.command()) if not any("--json" in option.opts for option in c.params)}
+    assert lacking <= WITHOUT_JSON
+
+
+def test_json_of_graphs_and_stores(graph, tmp_path, echousd_command):
+    made = read(echousd_command("new", tmp_path / "new.yaml", "--room", "study", "--json").out)
+    assert made["written"] == [str(tmp_path / "new.yaml")]
+    assert made["objects"] == 4
+    store = tmp_path / "store"
+    echousd_command("generate", graph, "-o", tmp_path / "room", *BOXES, "--store", store)
+    told = read(echousd_command("store", "verify", store, "--json").out)
+    assert told["ok"]
+    assert told["count"] > 0
+    told = read(echousd_command("store", "gc", store, "--dry-run", "--json").out)
+    assert (told["gone"], told["dry_run"]) == ([], True)
+
+
+def test_json_of_libraries_and_of_jobs_for_painters(graph, tmp_path, echousd_command):
+    root = tmp_path / "bedroom/bedroom.usda"
+    echousd_command("generate", graph, "-o", root.parent, *BOXES)
+    index = tmp_path / "library.parquet"
+    told = read(echousd_command("assets", "index", root.parent / "assets", "-o", index, "--workers", 1, "--json").out)
+    assert told["written"] == [str(index)]
+    assert told["usable"] == 5  # the two nightstands are one asset
+    assert told["models"] - told["usable"] == len(told["left_out"])
+    told = read(echousd_command("assets", "review", index, "--json").out)
+    assert told["written"][0].endswith("review.html")
+
+    job = tmp_path / "job"
+    told = read(
+        echousd_command("texture", "export", root, "-o", job, "--for", "generic", "--resolution", 64, "--json").out
+    )
+    assert told["written"] == [str(job / "job.json")]
+    name = told["objects"][-1]
+    (job / "results").mkdir(exist_ok=True)
+    Image.new("RGB", (64, 64), "red").save(job / f"results/{name}.png")
+    told = read(echousd_command("texture", "import", root, job, "--no-preview", "--json").out)
+    assert told["painted"] == [name]
