@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 from echomodel.vocabulary import vocabulary
 
@@ -22,6 +23,17 @@ class GraphError(ValueError):
         super().__init__(message)
         self.about = about
         self.others: tuple[GraphError, ...] = ()
+
+
+@contextmanager
+def faults_of(file: str) -> Iterator[None]:
+    """Every `GraphError` of the block begins with the name of a file; empty = it stays as it is."""
+    try:
+        yield
+    except GraphError as error:
+        if not file:
+            raise
+        raise GraphError(f"{file}: {error}", error.about) from None
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:

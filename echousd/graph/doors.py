@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
 
 ALLOWED = 1e-3  # square metres of a swing that a locked object may touch
+QUARTERS = (0.0, np.pi / 2)  # headings that a locked object may get which states none
 
 
 def check_doors(graph: SceneGraph) -> None:
-    """Raise `GraphError` for a door that opens into a locked object whose size, position and yaw are fixed."""
+    """Raise `GraphError` for a door that opens into a locked object whose size and position are stated.
+
+    Of one that states no yaw it must be in the way however that is turned, by quarter turns.
+    """
     corners = graph.room.corners
-    fixed = [n for n in graph.nodes if n.locked and n.size and n.position and n.yaw is not None]
+    fixed = [n for n in graph.nodes if n.locked and n.size and n.position]
     if corners is None or not fixed:
         return
     import shapely
@@ -32,11 +36,11 @@ def check_doors(graph: SceneGraph) -> None:
         for node in fixed:
             assert node.size is not None
             assert node.position is not None
-            assert node.yaw is not None
             if node.position[1] > opening.height:
                 continue
-            plan = footprints(np.array([node.size]), np.array([node.position]), np.array([node.yaw]))[0]
-            met = area.intersection(shapely.Polygon(plan)).area
+            yaws = QUARTERS if node.yaw is None else (node.yaw,)
+            plans = footprints(np.array([node.size] * len(yaws)), np.array([node.position] * len(yaws)), np.array(yaws))
+            met = min(area.intersection(shapely.Polygon(plan)).area for plan in plans)
             if met > ALLOWED:
                 raise GraphError(
                     f"door {opening.name!r} opens into the locked object {node.name!r} "

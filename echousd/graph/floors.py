@@ -115,7 +115,7 @@ def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:
 
 
 def check_space(graph: SceneGraph) -> tuple[str, ...]:
-    """A sentence where the furniture leaves hardly a way through the floor that the graph states.
+    """Sentences where the furniture leaves hardly a way through the floor that is stated, and of what stands beside it.
 
     Raises `GraphError` where the furniture cannot fit: its least footprint covers more than the floor, or one piece of
     a stated size is longer than the room.
@@ -145,10 +145,24 @@ def check_space(graph: SceneGraph) -> tuple[str, ...]:
             "fewer or smaller objects",
             ("room",),
         )
+    out = _beside(graph, corners, said)
     usual = footprint(categories, sizes)
     if usual > CROWDED * area:
-        return (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways",)
-    return ()
+        out = (f"{said} is small for furniture that covers about {usual:.1f} m²: expect tight ways", *out)
+    return out
+
+
+def _beside(graph: SceneGraph, corners: np.ndarray, said: str) -> tuple[str, ...]:
+    """A sentence for each object whose stated place is not on the floor."""
+    import shapely
+
+    floor = shapely.Polygon(corners).buffer(1e-3)
+    there = [(n.name, *n.position) for n in graph.nodes if n.position is not None]
+    return tuple(
+        f"{name} is stated to stand at ({x:.2f}, {z:.2f}) m, beside {said}"
+        for name, x, _, z in there
+        if not floor.covers(shapely.Point(x, z))
+    )
 
 
 def _generator(seed: int, what: str) -> np.random.Generator:

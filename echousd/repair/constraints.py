@@ -9,7 +9,7 @@ import numpy as np
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows, spread
 from echousd.repair.placements import placement_rows
-from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem
+from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem, wall_gaps
 from echousd.repair.relations import relation_margins
 
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
@@ -90,13 +90,6 @@ def linearise(
     )
 
 
-def wall_gaps(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """(n,) float: distance between the back of each leaning piece and its wall, metres; NaN for the others."""
-    normal = problem.wall[:, 1]
-    reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw), normal)) * size[:, [0, 2]]
-    return ((position[:, [0, 2]] - problem.wall[:, 0]) * normal).sum(1) - reach.sum(1)
-
-
 def _wall_rows(
     problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -107,7 +100,8 @@ def _wall_rows(
     gradient[r, leaning, 0], gradient[r, leaning, 2] = normal[:, 0], normal[:, 1]
     reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw[leaning]), normal)) * size[leaning][:, [0, 2]]
     gradient[r, leaning, 3], gradient[r, leaning, 5] = -reach[:, 0], -reach[:, 1]
-    return wall_gaps(problem, size, position, yaw)[leaning] - 0.01, gradient
+    gap = wall_gaps(problem.wall[leaning], size[leaning], position[leaning], yaw[leaning])
+    return gap - problem.behind[leaning], gradient
 
 
 def _support_rows(

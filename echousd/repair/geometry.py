@@ -148,6 +148,19 @@ class Floor:
         """(k, 2) float: from each corner to the following one, metres."""
         return np.roll(self.polygon, -1, 0) - self.polygon
 
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """(k,) float: how far each wall goes along x for a metre along z; 0 for walls along x."""
+        x, z = self.edge.T
+        return np.divide(x, z, out=np.zeros(len(x)), where=z != 0)
+
+    @cached_property
+    def rectangle(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Middle (2,) and half extents (2,), metres, of a floor that is a rectangle along x and z, else None."""
+        low, high = self.polygon.min(0), self.polygon.max(0)
+        at_corners = ((self.polygon == low) | (self.polygon == high)).all()
+        return ((low + high) / 2, (high - low) / 2) if len(self.polygon) == 4 and at_corners else None
+
 
 def floor_from_polygon(polygon: np.ndarray) -> Floor:
     """The floor with its walls' normals; raises ValueError for fewer than three corners or no area."""
@@ -187,7 +200,16 @@ def inside(floor: Floor, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def depth_inside(floor: Floor, points: np.ndarray) -> np.ndarray:
     """(m,) float: the distance of `inside` alone."""
-    depth, _, _ = _border(floor, points)
+    if floor.rectangle is not None:
+        middle, half = floor.rectangle
+        out = np.abs(points - middle) - half
+        return -np.where((out <= 0).all(1), out.max(1), np.linalg.norm(np.maximum(out, 0.0), axis=1))
+    (x0, z0), (ex, ez) = floor.polygon.T, floor.edge.T
+    x, z = points[:, :1] - x0, points[:, 1:] - z0
+    t = np.clip((x * ex + z * ez) / (ex * ex + ez * ez), 0.0, 1.0)
+    x -= t * ex
+    z -= t * ez
+    depth = np.sqrt((x * x + z * z).min(1))
     return np.where(_within(floor, points), depth, -depth)
 
 
@@ -205,13 +227,9 @@ def _border(floor: Floor, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
 
 def _within(floor: Floor, points: np.ndarray) -> np.ndarray:
     """(m,) bool: which points lie in the polygon (even-odd rule)."""
-    start, edge = floor.polygon, floor.edge
-    end = start + edge
-    above = start[:, 1] > points[:, 1:]
-    crosses = above != (end[:, 1] > points[:, 1:])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        x = start[:, 0] + (points[:, 1:] - start[:, 1]) / edge[:, 1] * edge[:, 0]
-    return (crosses & (points[:, :1] < x)).sum(1) % 2 == 1
+    x, z = points[:, :1] - floor.polygon[:, 0], points[:, 1:] - floor.polygon[:, 1]
+    above = (z < 0) != (z < floor.edge[:, 1])
+    return (above & (x < z * floor.slope)).sum(1) % 2 == 1
 
 
 def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[Rows, np.ndarray]:

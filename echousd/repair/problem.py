@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
+BEHIND = (0.01, 0.08)  # metres between a back and its wall: as drawn, within what skirtings take in real rooms
+USUALLY_BEHIND = 0.03  # the median of real rooms, for what was drawn further off
 NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
 
@@ -35,6 +37,7 @@ class Problem:
         height: height of the ceiling in metres, or None.
         carrier: (n,) int, the object that each one stands on, or `ON_FLOOR`, `ON_CEILING`, `FREE`.
         wall: (n, 2, 2) float, point and inward normal (x, z) of the wall that each one leans on; NaN = none.
+        behind: (n,) float, metres that each one keeps between its back and a wall that it leans on.
         pairs: (p, 2) int, pairs that must not collide.
         order: (p, 2) float, sign that the relations ask of (second - first) in x and z; 0 = none.
         handicap: (p, 5) float, metres by which a separating axis must be better to be chosen.
@@ -49,6 +52,7 @@ class Problem:
     height: float | None
     carrier: np.ndarray
     wall: np.ndarray
+    behind: np.ndarray
     pairs: np.ndarray
     order: np.ndarray
     handicap: np.ndarray
@@ -100,6 +104,7 @@ def pose(
         wall = lean(words, size, position, yaw, floor, carrier, told)
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
+    behind = kept_behind(words, wall_gaps(wall, size, position, yaw))
     pairs = pair_indices(n)
     i, j = pairs[:, 0], pairs[:, 1]
     apart = ~(fixed[i] & fixed[j]) & (carrier[i] != j) & (carrier[j] != i)
@@ -113,12 +118,27 @@ def pose(
         height,
         carrier,
         wall,
+        behind,
         pairs,
         required_order(n, triplets)[pairs[:, 0], pairs[:, 1]],
         axis_handicap(size, position, yaw, pairs, wall),
         stated,
     )
     return problem, position, yaw
+
+
+def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """(n,) float: metres between the back of each leaning piece and its wall (`Problem.wall`); NaN for the others."""
+    normal = wall[:, 1]
+    reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw), normal)) * size[:, [0, 2]]
+    return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(1) - reach.sum(1)
+
+
+def kept_behind(categories: Sequence[str], drawn: np.ndarray) -> np.ndarray:
+    """(n,) float: `Problem.behind` of pieces drawn so far from their walls (NaN = from none); pictures hang close."""
+    kept = np.where(drawn <= BEHIND[1], np.maximum(drawn, BEHIND[0]), USUALLY_BEHIND)
+    hung = np.array([vocabulary().category(word).support == "wall" for word in categories], bool)
+    return np.where(hung, BEHIND[0], kept)
 
 
 def axis_handicap(

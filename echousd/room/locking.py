@@ -10,7 +10,7 @@ STAGES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
-    """The graph with size, position and yaw of locked objects that lack one, and a sentence for each that has none.
+    """The graph with size, position and yaw of locked objects that lack one, and a sentence for each without a place.
 
     Arguments:
         files: stages or folders of rooms in which the objects may stand, the first that holds one counts.
@@ -23,9 +23,8 @@ def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGra
         if wanted and stage is not None:
             graph, found = _filled(graph, stage, wanted)
             wanted -= found
-    return graph, tuple(
-        f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in sorted(wanted)
-    )
+    lost = sorted(name for name in wanted if graph.node(name).position is None)
+    return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
 
 
 def _stage_of(file: Path) -> Path | None:

@@ -12,6 +12,7 @@ from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
 from echousd.assets.choose import AssetWishes, wishes_of
 from echousd.graph import SceneGraph
+from echousd.graph.consistency import faults_of
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_plan, with_wider_floor
 from echousd.room.clearing import cleared_layouts
@@ -138,9 +139,10 @@ def generate(
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     given = given_pieces(graph, shapes, wishes, timer=timer)
     sizes = dict(given.sizes)
-    check_doors(graph)
-    graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
-    crowded = check_space(graph)
+    with faults_of(file):
+        check_doors(graph)
+        graph, left_out = with_space(graph) if fit == "drop" else (graph, ())
+        crowded = check_space(graph)
     stated, graph = graph, with_plan(graph, seed)
     drafts = drafts or most_drafts(echo, len(graph.nodes))
 

@@ -15,7 +15,6 @@ from echousd.repair.problem import ON_CEILING
 
 Row = tuple[float, float, float, float]  # x, z, yaw, price
 HALF_PI = math.pi / 2
-GAP = 0.01  # metres between a back and its wall
 STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
 LONELY = 2.5  # for a piece that does not stand at what it attends though that is there
@@ -168,7 +167,7 @@ def along_walls(setting: Setting, i: int, price: float) -> list[Row]:
     if key in setting.rows:
         return setting.rows[key]
     width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
-    gap = 0.0 if setting.kinds[i].support == "wall" else GAP
+    gap = 0.0 if setting.kinds[i].support == "wall" else float(setting.behind[i])
     rows = []
     for start, along, length, yaw in setting.walls:
         free = length - width

@@ -51,7 +51,7 @@ class Setting:
         triplets: (e, 3) int, what must hold; rules: their rule set; centre: (2,) float, x and z of the room's centre.
         fixed, turned: (n,) bool, boxes that must not move, must not turn.
         floor: the floor polygon; height: of the ceiling, metres.
-        carrier: (n,) int, as `Problem.carrier`. anchor: (n,) int, whom each attends, -1 = nobody.
+        carrier, behind: (n,) int and float, as in `Problem`. anchor: (n,) int, whom each attends, -1 = nobody.
         stances: how each stands to that (`Plan.stance`). group: (n,) int, the box that its group is about.
         stated: where single objects must stand in the room; surroundings: the walls that this is measured to.
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
@@ -69,6 +69,7 @@ class Setting:
     floor: Floor
     height: float
     carrier: np.ndarray
+    behind: np.ndarray
     anchor: np.ndarray
     stances: tuple[str, ...]
     group: np.ndarray
@@ -255,8 +256,8 @@ def setting_of(
     top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
     return Setting(
         problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
-        problem.floor, problem.height or top, problem.carrier, plan.anchor.numpy(), plan.stance, plan.group.numpy(),
-        openings, outline, problem.stated, problem.surroundings,
+        problem.floor, problem.height or top, problem.carrier, problem.behind, plan.anchor.numpy(), plan.stance,
+        plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
     )  # fmt: skip
 
 
@@ -300,6 +301,11 @@ class Poses:
     def axes(self) -> np.ndarray:
         """(K, 2, 2) float: unit vectors of the width axis and of the front, as `geometry.axes`."""
         return axes(self.yaw)
+
+    @cached_property
+    def turns(self) -> tuple[np.ndarray, np.ndarray]:
+        """(K, 1) and (K, 1) float: cosine and sine of the headings."""
+        return np.cos(self.yaw)[:, None], np.sin(self.yaw)[:, None]
 
     @classmethod
     def of(cls, rows: Sequence[tuple[float, float, float, float]], height: float) -> Poses:

@@ -86,6 +86,11 @@ def test_a_door_into_what_is_locked() -> None:
         GraphError, match=r"^door 'door' opens into the locked object 'wardrobe' \(0\.\d\d m² of its swing\)"
     ):
         check_doors(graph)
+    turned = graph.update_node("wardrobe", yaw=None)  # in the way however it is turned
+    assert turned.node("wardrobe").yaw is None
+    with pytest.raises(GraphError, match=r"opens into the locked object 'wardrobe'"):
+        check_doors(turned)
+    check_doors(turned.update_node("wardrobe", position=(-0.5, 0.0, 1.0)))  # lengthwise it is not
     check_doors(graph.lock("wardrobe", False))
     check_doors(graph.replaced(room=room.replaced(openings=(opening_from_words("south 0.1 swing=out", "door", ROOM),))))
 

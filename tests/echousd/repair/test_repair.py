@@ -11,7 +11,7 @@ from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.repair import RepairConfig, allowed_overlap, repair, repair_boxes
-from echousd.repair.geometry import floor_from_polygon, inside, separation, spread
+from echousd.repair.geometry import depth_inside, floor_from_polygon, inside, separation, spread
 from echousd.repair.relations import relation_margins
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
@@ -78,11 +78,24 @@ def test_everything_that_was_asked_for_holds_afterwards() -> None:
         assert found[name][1] == 0.0
     assert found["tv"][1] == pytest.approx(sizes["bench"][1], abs=1e-5)
     assert found["lamp"][1] + sizes["lamp"][1] == pytest.approx(2.7, abs=0.01)
-    # Backs against their walls: bed and nightstands at x = -2, wardrobe at z = 1.8, bench at x = 2.
-    assert found["bed"][0] - sizes["bed"][2] / 2 == pytest.approx(-2.0, abs=0.03)
-    assert found["right_stand"][0] - sizes["right_stand"][2] / 2 == pytest.approx(-2.0, abs=0.03)
-    assert found["wardrobe"][2] + sizes["wardrobe"][2] / 2 == pytest.approx(1.8, abs=0.03)
+    # Backs at their walls but for a skirting: bed and nightstands at x = -2, wardrobe at z = 1.8, bench at x = 2.
+    assert found["bed"][0] - sizes["bed"][2] / 2 == pytest.approx(-2.0, abs=0.04)
+    assert found["right_stand"][0] - sizes["right_stand"][2] / 2 == pytest.approx(-2.0, abs=0.04)
+    assert found["wardrobe"][2] + sizes["wardrobe"][2] / 2 == pytest.approx(1.8, abs=0.04)
     assert result.boxes.yaw[2].item() == pytest.approx(np.pi / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize(("drawn", "kept"), [(-0.1, 0.01), (0.0, 0.01), (0.045, 0.045), (0.3, 0.03)])
+def test_backs_keep_the_distance_to_their_wall_that_was_drawn_within_what_is_usual(drawn: float, kept: float) -> None:
+    floor = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
+    size = np.array([[1.2, 2.2, 0.6]])
+    position = np.array([[0.3, 0.0, -1.8 + 0.3 + drawn]])
+    for arrange in (True, False):
+        done = repair_boxes(
+            ["wardrobe"], size, position, np.zeros(1), np.zeros((0, 3)), floor_polygon=floor, height=2.7,
+            rigid=np.ones(1, bool), config=RepairConfig(arrange=arrange),
+        )  # fmt: skip
+        assert done.position[0, 2] - 0.3 + 1.8 == pytest.approx(kept, abs=0.012)  # a wall gives way a little
 
 
 def test_a_good_room_stays_as_it_is() -> None:
@@ -289,3 +302,16 @@ def test_two_beds_that_mirror_each_other_are_turned_alike() -> None:
     images = (-turn[0], np.pi - turn[0])
     alike = [abs(np.exp(1j * turn[1]) - np.exp(1j * image)) for image in images]
     assert min(alike) < 0.3
+
+
+@pytest.mark.parametrize("corners", [FLOOR, np.array([(0, 0), (4, 0), (4, 2), (2, 2), (2, 3.5), (0, 3)], float)])
+def test_the_depth_of_points_is_their_distance_to_the_border(corners: np.ndarray) -> None:
+    import shapely
+
+    floor, polygon = floor_from_polygon(corners), shapely.Polygon(corners)
+    points = np.random.default_rng(0).uniform(-3, 6, (200, 2))
+    there = shapely.points(points)
+    away = shapely.distance(there, polygon.exterior)
+    expected = np.where(shapely.contains(polygon, there), away, -away)
+    np.testing.assert_allclose(depth_inside(floor, points), expected, atol=1e-9)
+    np.testing.assert_allclose(inside(floor, points)[0], expected, atol=1e-9)

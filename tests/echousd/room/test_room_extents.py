@@ -26,12 +26,15 @@ def test_a_hall_of_twenty_and_more_is_furnished_without_a_collision():
     assert len(living_faults(room.graph, room.boxes)) <= 0.08 * len(graph.nodes)
 
 
-def test_in_six_square_metres_what_has_no_place_is_left_out_and_said():
+def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
     words = ("double_bed", "wardrobe", "desk", "office_chair", "nightstand", "multi_seat_sofa", "dining_table")
     nodes = tuple(Node(word, word) for word in words)
     graph = SceneGraph(nodes=nodes, relations=(), room=RoomSpec(type="bedroom", size=(3.0, 2.0)))
     with pytest.raises(ValueError, match="too small for its furniture"):
         echousd.generate(graph, shapes="boxes", seed=2)
+    (tmp_path / "flat.yaml").write_text(graph.to_yaml(), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"^flat\.yaml: the floor of 3\.00 x 2\.00 m .* is too small"):
+        echousd.generate(tmp_path / "flat.yaml", shapes="boxes", seed=2)
     room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=2)
     gone = set(words) - set(room.graph.names)
     assert gone

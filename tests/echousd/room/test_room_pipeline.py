@@ -177,6 +177,7 @@ def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -
     assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
     homeless = echousd.generate(locked, seed=9, shapes="boxes")
     assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes
+    assert with_locked_places(locked.update_node("wardrobe", position=(0.5, 0.0, 0.5)))[1] == ()
 
 
 def test_what_cannot_fit_is_said_or_left_out() -> None:
