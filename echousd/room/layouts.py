@@ -11,7 +11,9 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
+from echomodel.openings import free_area
 from echomodel.roomboxes import footprints
+from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_placed_openings
 from echousd.room.progress import StageTimer
@@ -28,6 +30,7 @@ DRAFTS, MOST_DRAFTS = 8, 64  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 400  # of one room: repair grows faster than their number
+TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 
 
@@ -243,20 +246,42 @@ def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
 
 
 def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
-    """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way."""
+    """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way.
+
+    A screen is in the way of a window, too: who watches it would look into the light.
+    """
     from echousd.repair.living import living_faults
 
     def faults(graph: SceneGraph) -> int:
-        return sum(len(living_faults(graph, boxes)) for boxes in layouts)
+        return sum(len(living_faults(graph, boxes)) + backlit(graph, boxes) for boxes in layouts)
 
+    size, position, yaw = plan_boxes(layouts)
+    size[np.tile(screens(graph), len(layouts)), 1] += TALL
     bare = graph.replaced(room=graph.room.replaced(openings=()))
-    if not graph.room.openings:
-        return with_placed_openings(bare, plan_boxes(layouts), seed)
     before = faults(graph)
-    if not before or before <= faults(bare):
+    if graph.room.openings and (not before or before <= faults(bare)):
         return graph
-    moved = with_placed_openings(bare, plan_boxes(layouts), seed)
-    return moved if faults(moved) < before else graph
+    moved = with_placed_openings(bare, (size, position, yaw), seed)
+    return moved if not graph.room.openings or faults(moved) < before else graph
+
+
+def screens(graph: SceneGraph) -> np.ndarray:
+    """(n,) bool, televisions and what they stand on."""
+    kinds = [vocabulary().category(node.category) for node in graph.nodes]
+    return np.array([kind.role == "screen" or kind.stands == "opposite" for kind in kinds], bool)
+
+
+def backlit(graph: SceneGraph, boxes: Boxes) -> int:
+    """How many windows have a screen before them."""
+    import shapely
+
+    corners, here = graph.room.corners, screens(graph)
+    if corners is None or not here.any():
+        return 0
+    plan = footprints(*(np.asarray(v, float)[here] for v in (boxes.size, boxes.position, boxes.yaw)))
+    there = shapely.union_all(shapely.polygons(plan))
+    windows = [opening for opening in graph.room.openings if opening.kind == "window"]
+    return sum(shapely.Polygon(free_area(corners, one)).intersection(there).area > GLARE for one in windows)
 
 
 def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:

@@ -102,6 +102,7 @@ FAULTS = [
     (SET.moved("chair_1_1", at=(1.05, 0.0), yaw=-HALF), ("table", "chairs_even"), "the chairs of table are uneven"),
     (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
     (LIVING.moved("armchair", at=(1.9, -0.3), yaw=HALF), ("armchair", "knees_free"), "m before it, then a wall"),
+    (SOFAS.moved("other", yaw=np.pi, at=(0.0, 0.6)), ("stand", "view_free"), "other stands between"),
     (SOFAS.moved("other", yaw=-HALF, at=(-2.0, -0.1)), ("other", "sofas_in_circle"), "turns its back on the group"),
 ]
 
@@ -169,6 +170,14 @@ def test_what_the_graph_states_decides_whom_a_seat_attends():
     close = np.array([(names.index("chair"), 5, names.index("desk"))])
     assert ("chair", "seat_in_reach") not in two.found()
     assert ("chair", "seat_in_reach") in two.found(relations=close)
+
+
+def test_a_bench_counts_as_the_chairs_that_it_stands_for():
+    bench = {"kind": "bench", "size": (1.3, 0.45, 0.4), "at": (0.0, -0.6)}
+    chairs = {name: thing for name, thing in SET.things.items() if name not in ("chair_-1_-1", "chair_1_-1")}
+    table = {"table": {**SET.things["table"], "kind": "table"}}
+    assert ("table", "chairs_even") not in Room({**chairs, **table, "bench": bench}).found()
+    assert ("table", "chairs_even") in Room({**chairs, **table}).found()
 
 
 def test_what_was_given_is_not_blamed():

@@ -110,6 +110,9 @@ def _built(
     state.regrets = {}  # what others paid in earlier rounds is no part of what this one costs
     slide_groups(setting, state, own)
     seat_evenly(setting, state, own)
+    for i in order:  # lamps follow what they light
+        if setting.kinds[i].support == "ceiling":
+            own[i], _ = _put(setting, state, int(i))
     for i in order:
         paid[i] = paid_by(setting, state, int(i), own)
     return Arranged(state.position, state.yaw, paid)

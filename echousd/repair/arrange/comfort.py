@@ -12,6 +12,7 @@ PULLED, AT_WALL = 1.6, 0.9  # for a chair that cannot be pulled out before furni
 PULL, PULL_WALL = 0.4, 0.25  # metres behind a chair
 HIDDEN = 2.5  # for something high between a screen and its viewer
 HIGH = 0.65  # metres
+BESIDE = 0.2  # metres beside the line of sight
 ON_SIGHT = np.linspace(0.15, 0.85, 7)[:, None]  # places on the line of sight
 SOLID = ("sofa", "board", "bed", "storage")
 
@@ -27,6 +28,8 @@ def uncomfortable(
     wish, dear = setting.wishes[0][i, others], setting.wishes[1][i, others]
     near = wish > 0
     out = (dear[near] * (1 - gap[:, near] / wish[near]).clip(0.0, 1.0)).sum(1)
+    if setting.stances[i] == "foot" and setting.seats[i]:  # a bench
+        out = out + _uneven(setting, state, i, poses)
     if setting.stances[i] == "at":
         out = out + _uneven(setting, state, i, poses) + _boxed_in(setting, state, i, poses, others)
     return out + _hiding(setting, state, i, poses)
@@ -42,7 +45,8 @@ def _uneven(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     half = setting.size[table, [0, 2]] / 2 + 0.3
     own = _local(state.position[table], float(state.yaw[table]), poses.position) / half
     there = _local(state.position[table], float(state.yaw[table]), state.position[mates]).reshape(-1, 2) / half
-    return UNEVEN * np.abs(own + there.sum(0)).sum(1)
+    places = setting.sitting
+    return UNEVEN * np.abs(own * places[i] + (there * places[mates, None]).sum(0)).sum(1)
 
 
 def _local(position: np.ndarray, yaw: float, points: np.ndarray) -> np.ndarray:
@@ -78,25 +82,25 @@ def _hiding(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
             ends = poses.position[:, None, [0, 2]], state.position[seat, [0, 2]]
             points = ends[0] + ON_SIGHT * (ends[1] - ends[0])
             for j in np.flatnonzero(state.placed & high).tolist():
-                if j not in (seat, k) and setting.standing(j) and setting.anchor[j] != seat:
+                if j not in (seat, k) and setting.standing(j):
                     inside = _within(points, state.position[j], state.yaw[j], setting.size[j])
                     out += HIDDEN * inside.any(1)
-        elif i not in (k, seat) and high[i] and state.placed[k] and state.placed[seat] and setting.anchor[i] != seat:
+        elif i not in (k, seat) and high[i] and state.placed[k] and state.placed[seat]:
             if not setting.standing(i):
                 continue
             start, end = state.position[k, [0, 2]], state.position[seat, [0, 2]]
             points = (start + ON_SIGHT * (end - start))[None]
             away = points - poses.position[:, None, [0, 2]]
             c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
-            lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < setting.size[i, 0] / 2 + 0.05
-            forward = np.abs(s * away[..., 0] + c * away[..., 1]) < setting.size[i, 2] / 2 + 0.05
+            lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < setting.size[i, 0] / 2 + BESIDE
+            forward = np.abs(s * away[..., 0] + c * away[..., 1]) < setting.size[i, 2] / 2 + BESIDE
             out += HIDDEN * (lateral & forward).any(1)
     return out
 
 
 def _within(points: np.ndarray, position: np.ndarray, yaw: float, size: np.ndarray) -> np.ndarray:
-    """(K, P) bool: which points (K, P, 2) lie in a footprint that is grown by 5 cm."""
+    """(K, P) bool: which points (K, P, 2) lie in a footprint that is grown by `BESIDE`."""
     away = points - position[[0, 2]]
     c, s = np.cos(yaw), np.sin(yaw)
-    lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < size[0] / 2 + 0.05
-    return lateral & (np.abs(s * away[..., 0] + c * away[..., 1]) < size[2] / 2 + 0.05)
+    lateral = np.abs(c * away[..., 0] - s * away[..., 1]) < size[0] / 2 + BESIDE
+    return lateral & (np.abs(s * away[..., 0] + c * away[..., 1]) < size[2] / 2 + BESIDE)

@@ -18,6 +18,7 @@ HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
 BROKEN, FAR = 12.0, 6.0  # for a broken relation at all, and per metre or ratio that it is missed by
 GRAZE = 0.01  # metres
 PULL, TURN = 0.35, 0.25  # per metre from the draft, and for looking the other way than the draft
+FOLLOWS = 0.3  # share of that pull of chairs at their table: they go where it goes
 FARTHEST = 4.0  # metres that the pull counts
 UNPLACED = 0.15  # weight of relations to what is not placed yet, whose draft counts
 BLOCKED = 3.0  # for a front that cannot be opened
@@ -26,6 +27,7 @@ CROWDED = 0.7  # for a chair in the way of a front
 SEATED, ENDS = 0.75, 4  # metres from a table to behind its chairs; more chairs than that sit at its ends, too
 FOOT = 0.4  # metres at the foot of a bed
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
+GLARE = 0.2  # metres of a stand before a window
 SLACK = 0.01  # metres or ratio by which relations are to hold
 
 
@@ -33,7 +35,8 @@ def least(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     """(K,) float: what box i pays at each pose at the least, whatever else there is: the pose itself and its way."""
     off = np.linalg.norm((poses.position - setting.draft[i])[:, [0, 2]], axis=1)
     turned = 0.5 * (1 - np.cos(poses.yaw - setting.heading[i]))
-    out = poses.price + PULL * np.minimum(off, FARTHEST) + TURN * turned
+    pull = PULL * (FOLLOWS if setting.stances[i] == "at" and setting.anchor[i] >= 0 else 1.0)
+    out = poses.price + pull * np.minimum(off, FARTHEST) + TURN * turned
     for x, z, yaw, paid in state.regrets.get(i, ()):
         near = np.hypot(poses.position[:, 0] - x, poses.position[:, 2] - z) < ALIKE
         out = out + paid * (near & (np.cos(poses.yaw - yaw) > 0.9))
@@ -113,6 +116,9 @@ def price(
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
     doors = setting.doors
     out = (np.maximum(depths(setting.size[i], poses, doors.size, doors.position, doors.yaw), 0) > 0.04) @ doors.price
+    if setting.stances[i] == "opposite":  # a screen
+        light = setting.windows
+        out += (depths(setting.size[i], poses, light.size, light.position, light.yaw) > GLARE) @ light.price
     strangers = [j for j in others if not setting.at_home[i, j]]
     zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)

@@ -17,7 +17,8 @@ Row = tuple[float, float, float, float]  # x, z, yaw, price
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
-LONELY = 2.5  # for a piece that does not stand at what it attends though that is there
+LONELY = 2.5  # for a piece that does not stand at what it attends though that is there; chairs pay twice
+HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -32,7 +33,8 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     rows: list[Row] = []
     if anchor >= 0 and state.placed[anchor]:
         rows = at_anchor(setting, state, i, anchor)
-    lonely = LONELY if anchor >= 0 and rows else 0.0
+    seated = setting.stances[i] == "at" and not kind.solid
+    lonely = LONELY * (1 + seated) if anchor >= 0 and rows else 0.0
     if kind.support == "ceiling":
         rows += overhead(setting, state, i)
     elif setting.carrier[i] >= 0:
@@ -131,7 +133,7 @@ def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
     stands = stance(setting, i, anchor)
     if stands not in STANDS:
         return []
-    count = int(((setting.anchor == anchor) & setting.seats).sum())
+    count = int(setting.sitting[(setting.anchor == anchor) & setting.seats].sum())
     found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
     setting.slots[i, anchor] = found
     return found
@@ -231,15 +233,16 @@ def overhead(setting: Setting, state: State, i: int) -> list[Row]:
     """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
     above = vocabulary().predicate_id("above")
     told = setting.triplets[(setting.triplets[:, 0] == i) & (setting.triplets[:, 1] == above)][:, 2].tolist()
+    low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
     rows: list[Row] = []
     for j, kind in enumerate(setting.kinds):
         lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
         if not state.placed[j] or not (j in told or (lit and setting.standing(j))):
             continue
-        price = 0.0 if j in told else 0.8 * _hanging_over(setting, state, i, j) + 0.4 * (kind.stands == "beside")
+        taste = 0.8 * _hanging_over(setting, state, i, j) + 0.4 * (kind.stands == "beside") + HIGH_UP * (not low)
+        price = 0.0 if j in told else taste
         rows.append((float(state.position[j, 0]), float(state.position[j, 2]), float(state.yaw[j]), price))
     middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
-    low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
     rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.9 if low and rows else 0.0))
     return rows
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
 from echomodel.rules.living.access import TALL
+from echomodel.rules.living.company import PLACE
 from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 MASSIVE = ("sofa", "board", "bed", "storage")
 TOGETHER = {"sofa", "board", "bed", "seat"}
+BACKLIT = 1.2  # for a screen before a window
 CIRCLE = ("company", "with", "beside", "foot")  # who stands so sits in one circle with its group
 
 
@@ -125,6 +127,11 @@ class Setting:
         return np.array([kind.role == "seat" for kind in self.kinds], bool)
 
     @cached_property
+    def sitting(self) -> np.ndarray:
+        """(n,) float: how many sit on each piece that is a seat."""
+        return np.maximum(np.round(self.size[:, 0] / PLACE), 1.0)
+
+    @cached_property
     def at_home(self) -> np.ndarray:
         """(n, n) bool: fronts are open to each other, as one attends the other or both sit in one circle."""
         n = len(self.kinds)
@@ -223,6 +230,15 @@ class Setting:
             rows.append((opening.width, tall, depth, middle[0], low, middle[1], np.arctan2(*normal), price))
         table = np.array(rows).reshape(-1, 8)
         return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], np.full(len(table), -1))
+
+    @cached_property
+    def windows(self) -> Zones:
+        """Where a screen would have the light behind it: all the way down before windows."""
+        doors = self.doors
+        rows = np.array([opening.kind == "window" for opening in self.openings], bool)
+        size, position = doors.size[rows].copy(), doors.position[rows].copy()
+        size[:, 1], position[:, 1] = size[:, 1] + position[:, 1], 0.0
+        return Zones(size, position, doors.yaw[rows], np.full(len(size), BACKLIT), doors.owner[rows])
 
     def standing(self, i: int) -> bool:
         """Whether a box stands on the floor itself."""

@@ -68,7 +68,7 @@ def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
                 out.append((lateral, -forward, 0.0, price))
                 out.append((lateral, forward, math.pi, price))
     at_ends = (0.9 if count <= 2 * wanted else 0.1) + (1.5 if own[0] > depth + 0.1 else 0.0)  # no bench across an end
-    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5)):
+    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5), (-0.1, 0.7)):
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
     return out

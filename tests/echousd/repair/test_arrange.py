@@ -132,3 +132,40 @@ def test_a_piece_whose_places_are_all_far_fetched() -> None:
     told = np.array([[4, 3, 5], [2, 6, 0], [1, 9, 0], [5, 8, 3]])
     done = repair_boxes(words, np.array(size), np.array(position), np.array(yaw), told, floor_polygon=floor, height=2.7)
     assert (done.verdict != 0).all()
+
+
+def arranged(words, size, position, yaw, told=(), half=2.4, **options):
+    """Position and yaw of each piece of a square room after repair."""
+    floor = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    triplets = np.array(told, int).reshape(-1, 3)
+    sizes, places = np.array(size, float), np.array(position, float)
+    done = repair_boxes(
+        words, sizes, places, np.array(yaw, float), triplets, floor_polygon=floor, height=2.7, **options
+    )
+    return done.position, done.yaw
+
+
+def test_a_stool_comes_to_the_desk_that_has_no_other_seat():
+    size = [(1.2, 0.75, 0.6), (0.4, 0.45, 0.4)]
+    (desk, stool), (yaw, _) = arranged(["desk", "stool"], size, [(0.4, 0, -2.0), (-1.8, 0, 1.6)], [0.0, 0.0])
+    away = stool[[0, 2]] - desk[[0, 2]]
+    assert away @ [np.sin(yaw), np.cos(yaw)] == pytest.approx(0.45, abs=0.15)
+    assert abs(away @ [np.cos(yaw), -np.sin(yaw)]) < 0.35
+
+
+def test_a_pendant_follows_its_table_and_a_flush_lamp_hangs_in_the_middle():
+    words = ["dining_table", "pendant_lamp", "double_bed", "ceiling_lamp"]
+    size = [(1.6, 0.75, 0.9), (0.5, 0.8, 0.5), (1.8, 1.0, 2.1), (0.5, 0.15, 0.5)]
+    drawn = [(1.2, 0, 1.1), (0.5, 1.8, 0.7), (-1.0, 0, -1.3), (-0.9, 2.5, -1.0)]
+    (table, pendant, _, lamp), _ = arranged(words, size, drawn, [0.0] * 4)
+    np.testing.assert_allclose(pendant[[0, 2]], table[[0, 2]], atol=0.05)
+    np.testing.assert_allclose(lamp[[0, 2]], 0.0, atol=0.05)
+
+
+def test_a_second_sofa_leaves_the_view_to_the_screen_that_the_first_is_told_to_watch():
+    words = ["multi_seat_sofa", "loveseat_sofa", "coffee_table", "tv_stand"]
+    size = [(2.0, 0.85, 0.9), (1.5, 0.85, 0.9), (1.0, 0.4, 0.6), (1.6, 0.5, 0.4)]
+    drawn = [(0, 0, -1.9), (0, 0, 0.6), (0, 0, -0.8), (0, 0, 2.1)]
+    position, _ = arranged(words, size, drawn, [0, np.pi, 0, np.pi], [(3, ID["opposite"], 0)])
+    sight = position[0] + np.linspace(0, 1, 40)[:, None] * (position[3] - position[0])
+    assert np.abs(sight - position[1])[:, [0, 2]].max(1).min() > 0.45

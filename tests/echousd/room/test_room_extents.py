@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+import torch
 
 import echousd
+from echomodel.boxes import Boxes
 from echomodel.data.rooms import generate_rooms
+from echomodel.openings import Opening
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.repair.living import living_faults
+from echousd.room.layouts import backlit, with_free_openings
 from echousd.room.verdicts import colliding
 
 
@@ -42,3 +46,20 @@ def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
     assert "double_bed" in room.graph.names
     assert colliding(room.graph, room.boxes) == ()
     assert (np.abs(np.asarray(room.boxes.position)[:, 1]) < 1e-6).all()  # nothing is stacked
+
+
+def test_windows_that_nobody_stated_are_not_put_behind_the_television():
+    room = RoomSpec("living_room", size=(4.6, 4.4))
+    nodes = (Node("sofa", "multi_seat_sofa"), Node("stand", "tv_stand"))
+    graph = SceneGraph(room, nodes)
+    boxes = Boxes(
+        torch.tensor([(2.0, 0.85, 0.9), (1.8, 0.5, 0.4)]),
+        torch.tensor([(0.0, 0.0, -1.7), (0.0, 0.0, 1.97)]),
+        torch.tensor([0.0, np.pi]),
+    )
+    window = Opening("window", "window", 2, 1.4, 1.8, 1.3, sill=0.9)
+    stated = graph.replaced(room=room.replaced(openings=(window,)))
+    assert backlit(stated, boxes) == 1
+    moved = with_free_openings(stated, [boxes], seed=0)
+    assert any(opening.kind == "window" for opening in moved.room.openings)
+    assert backlit(moved, boxes) == 0

@@ -12,6 +12,7 @@ from echomodel.rules.living.found import Found, found, worst
 from echomodel.rules.living.plan import FAR, Plan
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
+PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
 ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
 AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
@@ -26,14 +27,16 @@ VIEW_HEIGHT = 0.65  # metres: one looks over what is lower
 
 
 def chairs_even(plan: Plan) -> Found:
-    """The chairs of a table stand evenly around it."""
-    i, j = plan.attended("at")
+    """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
+    i, j = plan.attended("at", "foot")
     tables = plan.which(lambda kind: kind.role == "board" and not kind.access)
     keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
     i, j = i[keep], j[keep]
-    count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, torch.ones(len(j), dtype=plan.size.dtype))
+    places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
+    count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, places)
     lateral, forward = plan.local(i, j)
-    sums = torch.zeros(len(plan), 2, dtype=plan.size.dtype).index_add(0, j, torch.stack([lateral, forward], -1))
+    away = torch.stack([lateral, forward], -1) * places[:, None]
+    sums = torch.zeros(len(plan), 2, dtype=plan.size.dtype).index_add(0, j, away)
     who = (count > 1).nonzero()[:, 0]
     n = count[who]
     shift = (sums[who] / n[:, None]).abs()
@@ -90,7 +93,8 @@ def view_free(plan: Plan) -> Found:
     high = plan.standing & (plan.position[:, 1] + plan.size[:, 1] > VIEW_HEIGHT).detach()
     who, block = plan.pairs(_mask(i, len(plan)), high)
     watched = plan.anchor[who]
-    keep = (block != watched) & (plan.anchor[block] != watched) & ~plan.which(lambda kind: kind.access == 0.3)[block]
+    company = (plan.anchor[block] == watched) & ~plan.stands("with")[block]  # they stand at its sides
+    keep = (block != watched) & ~company & ~plan.which(lambda kind: kind.access == 0.3)[block]
     who, block, watched = who[keep], block[keep], watched[keep]
     if not len(who):
         return found(i, torch.full_like(plan.size[i, 0], FAR), other=j)

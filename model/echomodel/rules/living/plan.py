@@ -16,7 +16,8 @@ from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
 from echomodel.vocabulary import Category, vocabulary
 
-NEARNESS = ("close_by", "standing_on", "above")  # predicates that say which anchor an object attends
+# Predicates that say which anchor an object attends.
+NEARNESS = ("close_by", "standing_on", "above", "facing", "opposite")
 FACING = np.cos(np.radians(30.0))  # a back turned further from a wall's normal does not lean on it
 FAR = 9.0  # metres, in place of the distance to something that is not there
 CLEAR_HEIGHT = 0.05  # metres: a rug is in nobody's way
@@ -152,7 +153,7 @@ class Plan:
             centre = (self.position[i] - self.position[j])[:, [0, 2]].norm(dim=1)
             cost[i, j] = (self.gap(i, j) + 0.05 * centre).to(cost)
         joining = self.joins >= 0
-        cost[:, joining] += torch.where(self.stands("before"), torch.inf, 0.0)[:, None].to(cost)
+        cost[:, joining] += torch.where(self.stands("before", "opposite"), torch.inf, 0.0)[:, None].to(cost)
         for predicate in NEARNESS:
             chosen = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
             for a, b in ((0, 2), (2, 0)):

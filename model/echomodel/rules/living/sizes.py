@@ -14,6 +14,7 @@ from echomodel.sizes import size_statistics
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
 SHORTER = 0.85  # times the least usual side, where the row of a category names usual sizes
+LARGER = 1.3  # times the largest one, for what is told to be larger or smaller than something
 USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 
 ELBOWS = 0.05  # metres between two chairs
@@ -43,8 +44,10 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
         if not kind_of(word).name:
             continue
         low, high = (np.array(side) for side in size_range(word))
-        if not lenient[number]:
-            table, usual = size_statistics(word), kind_of(word).usual
+        table, usual = size_statistics(word), kind_of(word).usual
+        if lenient[number]:  # told to be larger or smaller than something: no lamp becomes two metres wide for that
+            high = np.minimum(high, np.array([side[1] for side in usual]) * LARGER) if usual else high
+        else:
             ends = zip(*usual, strict=True) if usual else (table.low, table.high)
             middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
             low, high = (middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends)
