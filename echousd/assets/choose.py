@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
 from echousd.assets.licences import allowed
 from echousd.assets.record import AssetRecord
@@ -25,6 +26,7 @@ STRETCH = 1.15  # largest factor by which a model may be made longer or shorter 
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
 AGAIN, BEYOND, UNSURE, UNLIKE = 0.6, 3.0, 0.5, 0.25
+SMALL, LARGE = 0.8, 1.2  # times the 5th and 95th percentile of a category: what is beyond looks like something else
 TEXT = 3.0  # of the distance of a model's words from the wanted ones, as a cosine
 
 
@@ -116,6 +118,13 @@ class Shelf:
         """(n,) float, what is not known for sure of category and front."""
         return np.array([2 - record.confidence - record.front_confidence for record in self.records])
 
+    def oddness(self, category: str) -> np.ndarray:
+        """(n,) float, how far a model is out of the sizes of a category (logarithm, along its worst axis); 0 within."""
+        table = size_statistics(category)
+        low, high = np.log(table.low * SMALL), np.log(table.high * LARGE)
+        turned = [np.log(self.sizes[:, axes]) for axes in ((0, 1, 2), (2, 1, 0))]
+        return np.minimum(*(np.maximum(0.0, np.maximum(low - side, side - high)).max(1) for side in turned))
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -197,8 +206,13 @@ def _best(
         shelf = wishes.shelves[category]
         ratio = np.abs(np.log(np.array(one.size) / shelf.sizes))
         costs = cost + ratio.mean(1) + BEYOND * np.maximum(ratio - math.log(wishes.stretch), 0).sum(1)
-        costs += UNSURE * shelf.doubts
+        odd = shelf.oddness(one.category)
+        costs += UNSURE * shelf.doubts + BEYOND * odd
+        if category != one.category:  # nobody dines at a coffee table, however near it is of kin
+            costs[odd > 0] = np.inf
         for number in np.argsort(costs, kind="stable")[:64]:
+            if not np.isfinite(costs[number]):
+                break
             record = shelf.records[number]
             total = float(costs[number]) + (AGAIN if record.id in used else 0.0) + UNLIKE * _unlike(record, company)
             total += (nearness or {}).get(record.id, 0.0) + wishes.unlikeness.get(record.id, 0.0)
@@ -222,6 +236,8 @@ def _shelves_for(word: str, wishes: AssetWishes) -> list[tuple[str, float]]:
 
 
 def _same_word(one: Category, other: Category) -> bool:
+    if one.support != other.support:  # a table lamp does not hang from a ceiling
+        return False
     near = {one.name, other.name}
     general = {"chair", "dining_chair", "dressing_chair"}, {"sofa", "multi_seat_sofa"}, {"table", "dining_table"}
     return one.sgfront == other.sgfront or any(near <= words for words in general)

@@ -259,6 +259,22 @@ def test_objects_of_a_set_share_a_model_and_others_do_not_repeat(tmp_path):
     assert choose(wishes, [Asked("seat", "lounge_chair", "room", (0.8, 0.9, 0.8))], 0).chosen  # kin of an armchair
 
 
+def test_a_lamp_for_tables_does_not_hang_and_nobody_dines_at_a_coffee_table(tmp_path):
+    write_obj(tmp_path / "models", "table_lamp", chest(0.25, 0.5, 0.25))
+    write_obj(tmp_path / "models", "coffee_table", chest(2.0, 0.4, 1.5))
+    write_obj(tmp_path / "models", "chair", seat(0.45, 0.9, 0.5))
+    write_obj(tmp_path / "models", "folding_chair", seat(0.37, 0.4, 0.39))
+    wishes = AssetWishes(read_library(index([tmp_path / "models"], tmp_path / "lib.parquet").file))
+    asked = [
+        Asked("pendant", "pendant_lamp", "room", (0.3, 0.5, 0.3)),
+        Asked("board", "dining_table", "room", (1.8, 0.5, 1.2)),
+        Asked("seat", "chair", "room", (0.42, 0.6, 0.45)),
+    ]
+    choice = choose(wishes, asked, 0)
+    assert choice.missing == ["pendant", "board"]  # the project's own programs make them
+    assert choice.chosen["seat"].id == "chair.obj"  # though the box is nearer to the folded one
+
+
 def test_words_say_what_models_shall_be_like(tmp_path):
     import torch
 
