@@ -78,7 +78,7 @@ class StandIn:
 
     def sample_shapes(self, graph, boxes, *, generator, steps=None, edit=None, progress=None):
         self.edits.append(edit)
-        return np.stack([ball_tsdf() if c % 2 else table_tsdf() for c in graph.category.tolist()])
+        return torch.from_numpy(np.stack([ball_tsdf() if c % 2 else table_tsdf() for c in graph.category.tolist()]))
 
 
 @cache

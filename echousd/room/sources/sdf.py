@@ -75,7 +75,7 @@ def sampled_grids(request: ShapeRequest) -> np.ndarray:
             graph_batch(graph), centred,
             generator=seeded(request.seed, "shapes"), steps=request.steps, progress=tell, **extra,
         )  # fmt: skip
-        return rounded_grids(np.asarray(grids.cpu()))
+        return rounded_grids(grids.numpy(force=True))
 
 
 SOURCE = SignedDistances()

@@ -139,7 +139,7 @@ class NoShapes(StandIn):
 
 class Empty(StandIn):
     def sample_shapes(self, graph, boxes, **kwargs):
-        return np.ones((graph.num_nodes, 64, 64, 64), np.float32)
+        return torch.ones(graph.num_nodes, 64, 64, 64)
 
 
 @pytest.mark.parametrize(
