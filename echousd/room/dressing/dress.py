@@ -11,7 +11,7 @@ from echomodel.data.dressing import KINDS
 from echomodel.data.dressing import thing as solids_of
 from echousd.naming import free_name
 from echousd.room.colliders import standing_hull
-from echousd.room.dressing import corners, floors, hangings, tabletops, upholstery, walls
+from echousd.room.dressing import bareness, corners, floors, hangings, tabletops, upholstery, walls
 from echousd.room.dressing.setting import Setting, Thing, standing
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import mass_of, part_of, within_budget
@@ -26,6 +26,7 @@ RULES = (
     walls.pictures,
     upholstery.throws,
     upholstery.cushions,
+    upholstery.bed_cushions,
     upholstery.folded,
     tabletops.tabletops,
     floors.by_doors,
@@ -38,6 +39,8 @@ RULES = (
     corners.slippers,
     corners.corner_plants,
     corners.poufs,
+    bareness.bare_walls,
+    bareness.bare_corners,
 )
 
 

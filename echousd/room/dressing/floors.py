@@ -12,6 +12,8 @@ from echousd.room.dressing.setting import Setting, Standing, Thing, rectangle
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 LARGEST = (4.0, 3.0)
+SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
+SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -share[0] * share[1])
 
 
 def rugs(setting: Setting) -> None:
@@ -22,11 +24,11 @@ def rugs(setting: Setting) -> None:
         if host.row.name in ("lazy_sofa",):
             continue
         rng = setting.rng(host.name, "rug")
-        variant, shrink = int(rng.integers(1 << 30)), (1.0, 0.9, 0.8, 0.7, 0.6)
+        variant = int(rng.integers(1 << 30))
         group, centre, size = _under(setting, host)
         if np.prod(size) < 1.2:
             continue
-        for share in shrink:
+        for share in SHRUNK:
             extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
             spot = host.on_floor(*centre)
             plan = rectangle(spot[[0, 2]], extents, host.yaw)

@@ -1,4 +1,4 @@
-"""Cushions on sofas and armchairs, throws over the foot of beds."""
+"""Cushions on sofas, armchairs and beds, throws over the foot of beds."""
 
 from __future__ import annotations
 
@@ -12,18 +12,16 @@ from echousd.room.dressing.setting import Setting, Standing, Thing
 ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
 PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
+WIDE_BED = 1.3  # metres
 
 
 def cushions(setting: Setting) -> None:
-    """Cushions in the corners of sofas, one on an armchair; in full rooms before the pillows of beds, too."""
-    beds = setting.of("bed") if setting.full else []
-    for host in [*setting.of("sofa", "armchair", "lounge_chair"), *beds]:
+    """Cushions in the corners of sofas, one on an armchair."""
+    for host in setting.of("sofa", "armchair", "lounge_chair"):
         rng = setting.rng(host.name, "cushion")
         size = usual_size("cushion", rng)
         wide = float(host.size[0])
         ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
-        if host in beds:
-            ends = [-0.3, 0.3] if wide > 1.3 else [0.0]
         if setting.full and wide > 1.7:
             ends.append(-0.62)
         variant = int(rng.integers(3))
@@ -41,6 +39,23 @@ def cushions(setting: Setting) -> None:
             place, yaw = host.to_room(spot[None])[0], host.yaw + turn
             thing = Thing("cushion", size, place, yaw, host.name, variant)
             setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+
+
+def bed_cushions(setting: Setting) -> None:
+    """Two cushions before the pillows of a wide bed; in full rooms one on a narrow bed, too."""
+    for host in setting.of("bed"):
+        rng = setting.rng(host.name, "bed cushion")
+        size, variant, seat = usual_size("cushion", rng), int(rng.integers(3)), _Seat.of(host)
+        wide = float(host.size[0])
+        if seat is None or not (setting.full or wide > WIDE_BED):
+            continue
+        for side in (-1.0, 1.0) if wide > WIDE_BED else (0.0,):
+            turn = float(rng.uniform(-0.12, 0.12))
+            spot = seat.before_pillows(side * 0.21 * wide, size)
+            spot = None if spot is None else _clear_of(host, spot, turn, size)
+            if spot is not None:
+                thing = Thing("cushion", size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+                setting.put_first([thing], host=host.name, margin=0.0, floor=False)
 
 
 def folded(setting: Setting) -> None:
@@ -101,6 +116,18 @@ class _Seat:
         x = np.arange(-half[0], half[0], STEP) + STEP / 2
         z = np.arange(-half[1], half[1], STEP) + STEP / 2
         return cls(x, z, _heights(corners[normal[:, 1] > 0.05 * double], x, z), level)
+
+    def before_pillows(self, x: float, size: np.ndarray) -> np.ndarray | None:
+        """(3,) a place at `x` right before what lies at the head; None where it would not lie flat."""
+        rows = np.abs(self.x - x) < size[0] / 2
+        deep = int(np.ceil(size[2] / STEP))
+        head = self.z < 0.1 * self.z[0]  # the half of the head and a little more
+        raised = np.flatnonzero(head & (self.height[rows].max(0) > self.level + 0.08))
+        first = int(raised[-1]) + 1 if len(raised) else len(self.z)
+        under = self.height[rows, first : first + deep]
+        if under.shape[1] < deep or np.ptp(under) > 0.05:
+            return None
+        return np.array([x, float(under.max()), self.z[first] + (deep - 1) * STEP / 2])
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""

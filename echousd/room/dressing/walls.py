@@ -125,7 +125,7 @@ def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.r
             if rows == 2:
                 least = host.top + OVER + row * (h + 0.08)
             spot = along + column * (float(size[0]) + 0.08)
-            one = _at(setting, wall, spot, "picture", size, least, int(rng.integers(12)), host.name)
+            one = hung_at(setting, wall, spot, "picture", size, least, int(rng.integers(12)), host.name)
             if one is None:
                 del setting.placed[before:]
                 return False
@@ -171,10 +171,10 @@ def _hung(
     low = min(low, setting.height - 0.2 - size[1])
     if low < least - 0.1 or low < 0.4:
         return None
-    return _at(setting, wall, along, kind, size, low, variant, on)
+    return hung_at(setting, wall, along, kind, size, low, variant, on)
 
 
-def _at(
+def hung_at(
     setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str
 ) -> Thing | None:
     """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way."""

@@ -5,18 +5,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdValidation
 from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.data.dressing import KINDS, SMALL
+from echomodel.openings import Opening
 from echousd.check import check_room
+from echousd.graph import RoomSpec
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
+from echousd.room.dressing import upholstery
 from echousd.room.dressing.dress import RULES, dress, placed, setting_of
 from echousd.room.dressing.setting import reaches
 from echousd.room.dressing.surfaces import surfaces
+from echousd.room.geometry import Collider
+from echousd.room.sources.boxes import ORIGIN
+from echousd.room.sources.solid import solid_geometry
 from echousd.stage import read_graph
 
 
@@ -179,3 +186,61 @@ def test_layouts_have_dressings_of_their_own(tmp_path):
 def test_unknown_amount():
     with pytest.raises(ValueError, match="dress is 'lots', allowed: none, some, full"):
         RoomOptions(dress="lots")
+
+
+def large_room(**options):
+    """A large square room with little in it, and a window in one wall."""
+    window = Opening("window", "window", 0, 2.2, 1.4, 1.3, 0.9)
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(6.4, 6.0), openings=(window,)))
+    made = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    return replace(made, options=RoomOptions(walls=True, dress="some", **options))
+
+
+def test_long_bare_walls_get_pictures_and_large_floors_plants():
+    room = large_room()
+    setting = setting_of(room)
+    things = placed(room)
+    alone = [thing for thing in things if thing.kind == "picture" and not thing.on]
+    yaws = {round(thing.yaw, 3) for thing in alone}
+    assert 1 <= len(yaws) <= 2  # the two barest walls
+    for yaw in yaws:
+        row = [thing for thing in alone if round(thing.yaw, 3) == yaw]
+        assert len(row) in (1, 3)
+        assert len({thing.size.tobytes() for thing in row}) == 1
+        assert all(1.4 < thing.position[1] + thing.size[1] / 2 < 1.65 for thing in row)
+    green = [thing for thing in things if thing.kind in ("floor_plant", "floor_vase")]
+    assert 1 <= len(green) <= 3
+    for thing in green:  # in corners where nothing stands
+        assert min(np.linalg.norm(setting.floor - thing.position[[0, 2]], axis=1)) < 0.75
+        assert all(thing.footprint.distance(o.footprint) > 0.15 for o in setting.objects.values() if o.top > 0.1)
+
+
+def test_rugs_are_as_large_as_fits_each_way():
+    room = large_room()
+    rug = next(thing for thing in placed(room) if thing.kind.startswith("rug"))
+    wide, _, deep = room.boxes.size[room.names.index("bed")].tolist()
+    assert rug.size[0] < wide + 1.2  # the wardrobe stands there
+    assert rug.size[2] == pytest.approx(min(0.75 * deep + 0.5, 2.4), abs=0.01)
+
+
+def test_cushions_lie_before_the_pillows_of_wide_beds():
+    room = large_room()
+    number = room.names.index("bed")
+    wide, tall, deep = room.boxes.size[number].tolist()
+    mattress = trimesh.creation.box((wide, 0.45, deep))
+    mattress.apply_translation((0, 0.225, 0))
+    pillow = trimesh.creation.box((0.6, 0.16, 0.4))
+    pillow.apply_translation((0, 0.53, -deep / 2 + 0.3))
+    board = trimesh.creation.box((wide, tall, 0.04))
+    board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
+    whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", ORIGIN)
+    geometry = {**room.geometry, "bed": replace(whole, colliders=(Collider("collider", board, "convexHull"),))}
+    setting = setting_of(replace(room, geometry=geometry))
+    upholstery.bed_cushions(setting)
+    assert [thing.kind for thing in setting.placed] == ["cushion", "cushion"]
+    bed = setting.objects["bed"]
+    for thing in setting.placed:
+        x, y, z = (thing.position - bed.position).tolist()
+        assert abs(abs(x) - 0.21 * wide) < 0.16
+        assert y == pytest.approx(0.45, abs=0.01)
+        assert z > -deep / 2 + 0.5  # not in the pillow
