@@ -15,6 +15,7 @@ from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
 from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
+from echousd.batches.remote import SCHEME, Remote, complete
 from echousd.batches.run import Run, RunOptions
 from echousd.naming import free_name
 from echousd.room.folder import check_writable
@@ -89,10 +90,15 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
+    if SCHEME.match(out.as_posix()) or (how.to and not SCHEME.match(how.to)):
+        what = out if SCHEME.match(out.as_posix()) else how.to
+        raise ValueError(f"{what}: allowed: -o a folder on a disk, --to a URL such as s3://bucket/night, or none")
+    if how.to:
+        Remote(how.to).sizes(STATE)  # who cannot reach it is told before the first room
     device = request.options.device
     if not how.ray and how.executor is None:
         network_processes(device)
-    plan = make_plan(request, weights_hash(request.options.weights))
+    plan = make_plan(request, weights_hash(request.options.weights), how.to)
     place = shard_folder(out, how.shard)
     with locked(place):
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
@@ -206,6 +212,9 @@ def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:
 
 def _valid(plan: Plan, out: Path, shard: tuple[int, int]) -> frozenset[str]:
     """Ids of the shard's rooms that are there as the journal says; a damaged one is set aside."""
+    if plan.to:
+        paths = {entry.id: entry.path for pack in plan.packs(shard) for entry in pack}
+        return frozenset(complete(plan.to, read_journals(out), paths))
     rows, stored = read_journals(out), whole_keys(out, mend=True)
     valid = set()
     for entry in (entry for pack in plan.packs(shard) for entry in pack):

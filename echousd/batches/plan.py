@@ -70,6 +70,11 @@ class Plan:
     entries: tuple[Entry, ...]
     graphs: dict[str, str]
 
+    @property
+    def to(self) -> str:
+        """URL that the rooms go to, "" = the run's folder."""
+        return str(self.head.get("to", ""))
+
     @cached_property
     def digest(self) -> str:
         """Hash of all of it."""
@@ -91,8 +96,12 @@ class Plan:
         return groups[shard[0] :: shard[1]]
 
 
-def make_plan(request: BatchRequest, weights: str) -> Plan:
-    """The plan of a request; the same for the same request, files and weights."""
+def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
+    """The plan of a request; the same for the same request, files and weights.
+
+    Arguments:
+        weights: hash of the weights. to: URL that the rooms go to (`echousd.batches.remote`), "" = the run's folder.
+    """
     sets: dict[BatchOptions, int] = {}
     entries: list[Entry] = []
     graphs: dict[str, str] = {}
@@ -119,6 +128,7 @@ def make_plan(request: BatchRequest, weights: str) -> Plan:
         "pack": PACK,
         "rooms": len(entries),
         "request": request.model_dump(),
+        **({"to": to} if to else {}),
     }
     return Plan(head, tuple(sets), tuple(entries), graphs)
 

@@ -61,6 +61,7 @@ class RunOptions:
         max_failures: failed rooms after which the run stops. timeout: seconds a room. until: `time.time()` to stop at.
         memory: MiB a worker; a room that needs more fails.
         ray: `auto` or the address of a Ray cluster, whose nodes see the folder under one path; "" = local processes.
+        to: URL of a file system of fsspec that rooms and store go to, "" = the run's folder, which keeps the rest.
         executor: runs the tasks in place of either.
         progress: called after every room.
 
@@ -75,6 +76,7 @@ class RunOptions:
     until: float | None = None
     memory: int | None = MEMORY
     ray: str = ""
+    to: str = ""
     executor: Executor | None = None
     progress: Callable[[BatchProgress], None] | None = None
 
@@ -286,13 +288,10 @@ class Run:
 
     def _job(self, entry: Entry, text: str = "", rounds: tuple[tuple[work.Rows, ...], ...] = ()) -> work.Job:
         options = self.plan.options[entry.options]
+        folder, store = str(entry.folder(self.folder)), str(self.folder / STORE)
+        if self.plan.to:
+            folder, store = entry.path, STORE
         return work.Job(
-            entry.id,
-            str(entry.folder(self.folder)),
-            entry.seed,
-            options,
-            text or self.plan.graphs.get(entry.graph, ""),
-            entry.draw,
-            rounds,
-            "" if options.self_contained else str(self.folder / STORE),
-        )
+            entry.id, folder, entry.seed, options, text or self.plan.graphs.get(entry.graph, ""), entry.draw, rounds,
+            "" if options.self_contained else store, to=self.plan.to,
+        )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +21,19 @@ a.hidden=(type.value&&a.dataset.type!==type.value)||(bad.checked&&!a.classList.c
 type.onchange=bad.onchange=show"""
 
 
-def write_sheet(folder: Path, rows: Iterable[dict[str, Any]], title: str) -> Path:
+def write_sheet(
+    folder: Path, rows: Iterable[dict[str, Any]], title: str, pictures: Collection[str] | None = None
+) -> Path:
     """Write `index.html`; its pictures are those of the rooms, by relative paths.
 
     Arguments:
-        rows: of the manifest. title: what stands above.
+        rows: of the manifest. title: what stands above. pictures: paths of those that there are, None = look.
     """
     cards: list[tuple[int, str, str]] = []
     kinds = set()
     for row in rows:
         kinds.add(row["type"])
-        worst, card = _card(row, folder)
+        worst, card = _card(row, folder, pictures)
         cards.append((worst, row["id"], card))
     cards.sort(key=lambda card: (-card[0], card[1]))
     options = "".join(f"<option>{html.escape(kind)}</option>" for kind in sorted(kinds - {""}))
@@ -47,7 +49,7 @@ def write_sheet(folder: Path, rows: Iterable[dict[str, Any]], title: str) -> Pat
     return folder / SHEET
 
 
-def _card(row: dict[str, Any], folder: Path) -> tuple[int, str]:
+def _card(row: dict[str, Any], folder: Path, pictures: Collection[str] | None) -> tuple[int, str]:
     """How bad a room is, and its card."""
     told = []
     if row["state"] != "done":
@@ -61,7 +63,7 @@ def _card(row: dict[str, Any], folder: Path) -> tuple[int, str]:
     worst = (1000 if row["state"] != "done" else 100 * (not row["check"])) + len(told) * (row["state"] == "done")
     picture = Path(row["root"]).with_suffix(".png") if row["root"] else None
     image = ""
-    if picture is not None and (folder / picture).is_file():
+    if picture and ((folder / picture).is_file() if pictures is None else picture.as_posix() in pictures):
         image = f'<img loading="lazy" alt="" src="{html.escape(picture.as_posix())}">'
     kept = f"{row['objects']} objects, {row['relations_kept']} of {row['relations_asked']} relations"
     faults = "".join(f'<p class="fault">{html.escape(text[:300])}</p>' for text in told)

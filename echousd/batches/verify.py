@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from echousd.batches.index import write_index
+from echousd.batches.index import INDEX, write_index
 from echousd.batches.journal import fault_of, read_journals, whole_keys
-from echousd.batches.manifest import manifest_rows, summary, write_manifest
+from echousd.batches.manifest import MANIFEST, SUMMARY, TABLE, manifest_rows, summary, write_manifest
 from echousd.batches.plan import load_plan
-from echousd.batches.sheet import write_sheet
+from echousd.batches.remote import Remote, fetched
+from echousd.batches.sheet import SHEET, write_sheet
 from echousd.batches.webdataset import write_webdataset
+
+ARTEFACTS = (MANIFEST, TABLE, SUMMARY, SHEET, INDEX)
 
 
 @dataclass(frozen=True)
@@ -40,29 +43,42 @@ def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
             yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
         elif row["state"] != "done":
             yield Wrong(entry.id, f"failed: {row['error']}")
-        elif fault := fault_of(place, row, stored):
+        elif plan.to:
+            with fetched(plan.to, entry.path) as copy:
+                fault = _fault(copy / entry.path, row, whole_keys(copy), check=check)
+        else:
+            fault = _fault(place, row, stored, check=check)
+        if row is not None and row["state"] == "done" and fault:
             yield Wrong(entry.id, fault)
-        elif check:
-            from echousd.check import check_room
 
-            report = check_room(place / row["root"])
-            if not report.ok:
-                counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
-                yield Wrong(entry.id, "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts))
+
+def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: bool) -> str:
+    fault = fault_of(place, row, stored)
+    if fault or not check:
+        return fault
+    from echousd.check import check_room
+
+    report = check_room(place / row["root"])
+    counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
+    return "" if report.ok else "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
 
 
 def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
     """Write manifest, summary, contact sheet and index stage from plan and journals; returns the summary.
 
     Arguments:
-        webdataset: write tars of previews and JSON, too.
+        webdataset: write tars of previews and JSON, too; raises ValueError where the rooms are not in the folder.
     """
     plan = load_plan(folder)
+    if plan.to and webdataset:
+        raise ValueError(f"--webdataset: the rooms are at {plan.to}, allowed: rooms in the run's own folder")
     found = write_manifest(plan, folder)
-    write_sheet(
-        folder, manifest_rows(plan, folder), f"{folder.resolve().name}: {found['done']} of {found['rooms']} rooms"
-    )
+    pictures = Remote(plan.to).sizes("rooms") if plan.to else None
+    title = f"{folder.resolve().name}: {found['done']} of {found['rooms']} rooms"
+    write_sheet(folder, manifest_rows(plan, folder), title, pictures)
     write_index(folder, manifest_rows(plan, folder))
     if webdataset:
         write_webdataset(folder, manifest_rows(plan, folder))
+    if plan.to:  # the sheet and the index name rooms beside them
+        Remote(plan.to).put(folder, [name for name in ARTEFACTS if (folder / name).is_file()])
     return found

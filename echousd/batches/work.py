@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import tempfile
 import time
 import warnings
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from echousd.batches.devices import CPU
 from echousd.batches.elsewhere import ElsewhereModel, SamplesWanted, sampled
 from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
+from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
 from echousd.room.layouts import DraftsWanted, Drawn, Judged, most_drafts
@@ -48,6 +50,7 @@ class Job:
         seed, options: as in the plan. rounds: drafts of its first layout, round by round; none = sampled alone.
         best: of all rounds but the last, None = nobody has judged them.
         answers: samples of the process that has the device.
+        to: URL that `folder` and `store` are below, "" = they lie on a disk.
     """
 
     id: str
@@ -60,6 +63,7 @@ class Job:
     store: str = ""
     best: Best | None = None
     answers: tuple[bytes, ...] = ()
+    to: str = ""
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,13 @@ def room(job: Job) -> dict[str, Any] | Best | Wanted:
 
     Raises ValueError as `generate` and `Room.save` do.
     """
+    if job.to:
+        with tempfile.TemporaryDirectory(prefix="echousd-") as name:
+            store = f"{name}/{job.store}" if job.store else ""
+            made = room(replace(job, folder=f"{name}/{job.folder}", store=store, to=""))
+            if isinstance(made, dict):
+                deliver(Path(name), job.folder, job.to)
+            return made
     started = time.perf_counter()
     folder = Path(job.folder)
     with warnings.catch_warnings(record=True) as told:

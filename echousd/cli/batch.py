@@ -69,6 +69,7 @@ def run(
     dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
     ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.")] = "",
+    to: Annotated[str, typer.Option(help="URL that rooms and store go to (fsspec), such as s3://bucket/night.")] = "",
     self_contained: Annotated[
         bool | None, typer.Option("--self-contained/--store", help="Assets in every room, or once in a store.")
     ] = None,
@@ -100,15 +101,18 @@ def run(
     told |= {"drafts": drafts, "dress": dress, "self_contained": self_contained}
     raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
     request = request_of(raw, files[0] if files else "batch")
+    if to and webdataset:
+        raise ValueError("--webdataset takes rooms in the run's own folder; leave out --to")
     with _shown(json) as tell:
         how = RunOptions(
             workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,
-            until=_clock(until), memory=memory, ray=ray, progress=tell,
+            until=_clock(until), memory=memory, ray=ray, to=to, progress=tell,
         )  # fmt: skip
         result = run_batch(request, output, how)
     found = finish(output, webdataset=webdataset)
     say(f"rooms    {result.done} of {result.rooms}, {result.failed} failed, in {result.seconds:.0f} s", err=json)
-    say(f"run      {output}: {found['done']} of {found['rooms']} rooms; see {output / 'index.html'}", err=json)
+    sheet = f"{to.rstrip('/')}/index.html" if to else output / "index.html"
+    say(f"run      {to or output}: {found['done']} of {found['rooms']} rooms; see {sheet}", err=json)
     if result.stopped:
         say(f"stopped  {result.stopped}", err=json)
     if result.failed or result.stopped:
