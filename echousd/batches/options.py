@@ -23,6 +23,7 @@ class BatchOptions(BaseModel):
         weights: weights file or folder, "" for those that ship. assets: index of a library, "" for none.
         device: what the network runs on, `cpu`, `cuda` or `mps`; it is part of the plan, as sums round by it.
         palette: harmony of the room, "" = the seed chooses.
+        merge: what of a piece is one mesh, `parts`, `bodies` or `closed`, see `RoomOptions`.
         openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
     """
@@ -45,6 +46,7 @@ class BatchOptions(BaseModel):
     atlas: bool = False
     dress: str = "none"
     palette: str = ""
+    merge: Literal["parts", "bodies", "closed"] = "parts"
     openings: Literal["kept", "drawn"] = "kept"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5
@@ -53,7 +55,7 @@ class BatchOptions(BaseModel):
     @property
     def look(self) -> RoomOptions:
         """How a room is written; raises ValueError for a word that is not allowed."""
-        return RoomOptions(self.up_axis, self.walls, self.atlas, self.ceiling, self.dress, self.palette)
+        return RoomOptions(self.up_axis, self.walls, self.atlas, self.ceiling, self.dress, self.palette, self.merge)
 
 
 class BatchRequest(BaseModel):

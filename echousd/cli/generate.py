@@ -89,6 +89,10 @@ def generate(
     ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
     dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "some",
     atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="One mesh for what moves together, not one for legs, top, back ...")
+    ] = False,
+    closed: Annotated[bool, typer.Option("--closed", help="The same as one closed surface, without insides.")] = False,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
     ] = True,
@@ -141,7 +145,8 @@ def generate(
             from echousd.room.written import write_room, write_rooms
         finally:
             gc.enable()
-        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress)
+        meshes = "closed" if closed else "bodies" if merge else "parts"
+        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes)
         wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []

@@ -22,6 +22,7 @@ from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
 from echousd.room.manifest import check_seed
+from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.room import Provenance, RoomOptions
@@ -137,7 +138,8 @@ def edit(
             graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer, models
         )
         made = mixed_shapes(request, shapes)
-        geometry |= {name: made.geometry[owner] for name, owner in made.owners.items()}
+        own = {name: made.geometry[owner] for name, owner in made.owners.items()}
+        geometry |= merged(own, saved.manifest.get("merge", "parts"), faces)
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
@@ -164,6 +166,7 @@ def edit(
             manifest.get("ceiling", False),
             manifest.get("dress", "none"),
             manifest.get("palette", ""),
+            manifest.get("merge", "parts"),
         ),
         timings=timer.seconds,
         edited=Path(root),

@@ -138,11 +138,13 @@ class Geometry:
 
     @property
     def watertight(self) -> bool:
-        """Whether every part is closed once vertices at one place are one, as trimesh says."""
+        """Whether every part is closed as it is, or once vertices at one place are one, as trimesh says."""
         return all(_closed(part.mesh) for part in self.parts)
 
 
 def _closed(mesh: trimesh.Trimesh) -> bool:
+    if mesh.is_watertight:
+        return True
     merged = mesh.copy()
     merged.merge_vertices(merge_tex=True, merge_norm=True)
     return bool(merged.is_watertight)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
+from scipy.spatial import ConvexHull, QhullError
 
 from echomodel.data.furniture.assembly import Piece, pieces_of
 from echomodel.data.furniture.solids import FINEST, Solid
@@ -23,6 +24,12 @@ DENSITY = {
     "paper": 700.0, "book_a": 650.0, "book_b": 650.0, "book_c": 650.0, "book_d": 650.0, "petal": 120.0, "fruit": 800.0,
     "wax": 900.0, "wicker": 150.0, "leather": 300.0,
 }  # fmt: skip
+# role of a solid -> name of the part that all of its kind are in, where they differ
+GROUPS = {
+    "leg": "legs", "rail": "rails", "arm": "arms", "side": "case", "bottom": "case", "shelf": "shelves",
+    "handle": "handles", "leaf": "leaves", "book": "books", "bottle": "bottles", "pillow": "pillows",
+    "cushion": "cushions", "caster": "casters", "seam": "seams", "cord": "cords", "shade": "shades", "bulb": "bulbs",
+}  # fmt: skip
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
 COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
 COLLIDERS = 24  # convex pieces of one body at most
@@ -32,7 +39,7 @@ SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 def assembled(
     solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin, description: tuple[float, ...] = ()
 ) -> Geometry:
-    """The geometry of one piece of furniture: what is fixed in one part, every drawer and door in a part of its own.
+    """The geometry of one piece of furniture: a part for each role (legs, top, back), drawers and doors in bodies.
 
     Arguments:
         solids: of a furniture program.
@@ -49,7 +56,7 @@ def assembled(
     masses: dict[str, Mass] = {}
     for body, members in _bodies(pieces, fixed).items():
         prefix = f"{body}_" if body != fixed else ""
-        parts.append(part_of(f"{prefix}mesh", members, body))
+        parts += _parts(prefix, members, body)
         own = _bodies(plain, fixed)[body]
         hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
@@ -57,8 +64,9 @@ def assembled(
         masses[body] = mass_of(own)
     joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
     fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
-    names = {part.body: part.name for part in parts}
-    coarse = [part_of(names[body], members, body) for body, members in _bodies(low, fixed).items()] if fewer else []
+    coarse: list[Part] = []
+    for body, members in _bodies(low, fixed).items() if fewer else ():
+        coarse += _parts(f"{body}_" if body != fixed else "", members, body)
     whole = ballasted(mass_of(plain), [piece.vertices for piece in plain])
     return Geometry(
         tuple(parts), tuple(colliders), origin, mass=whole, joints=tuple(joints.values()),
@@ -72,6 +80,16 @@ def _bodies(pieces: Sequence[Piece], fixed: str) -> dict[str, list[Piece]]:
     for piece in pieces:
         out.setdefault(piece.joint.body if piece.joint else fixed, []).append(piece)
     return {body: members for body, members in out.items() if members}
+
+
+def _parts(prefix: str, pieces: Sequence[Piece], body: str) -> list[Part]:
+    """A part for each role among the solids of a body; what is the body itself, a drawer or a door, is its `mesh`."""
+    kind = body.rsplit("_", 1)[0]
+    groups: dict[str, list[Piece]] = {}
+    for piece in pieces:
+        role = piece.solid.role
+        groups.setdefault("mesh" if role == kind else GROUPS.get(role, role), []).append(piece)
+    return [part_of(f"{prefix}{role}", members, body) for role, members in groups.items()]
 
 
 def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list[Piece]:
@@ -133,17 +151,33 @@ def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _hull(points: np.ndarray) -> trimesh.Trimesh:
-    """The convex hull with exact corners and as few faces as may be."""
-    hull = trimesh.convex.convex_hull(points)
-    return trimesh.Trimesh(hull.vertices, hull.faces, process=False)
+    """The convex hull with exact corners, facing outwards; of points in one plane their box, a tenth of a mm thick."""
+    try:
+        hull = ConvexHull(points, qhull_options="QbB Pp Qt")
+    except QhullError:
+        extent = np.maximum(np.ptp(points, axis=0), 1e-4)
+        flat = trimesh.creation.box(extent)
+        flat.apply_translation((points.max(0) + points.min(0)) / 2)
+        return flat
+    corner = points[hull.simplices]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    inwards = (normal * hull.equations[:, :3]).sum(1) < 0
+    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    used, index = np.unique(faces, return_inverse=True)
+    return trimesh.Trimesh(points[used], index.reshape(-1, 3), process=False)
+
+
+def _enclosed(piece: Piece) -> float:
+    """The volume inside a closed mesh, m³."""
+    one, two, three = (piece.vertices - piece.vertices[0])[piece.faces].transpose(1, 0, 2)
+    return float((one * np.cross(two, three)).sum() / 6)
 
 
 def mass_of(pieces: Sequence[Piece]) -> Mass:
     """Mass, centre of mass and moments of inertia from volumes and densities; overlaps count twice."""
     weight, centre, inertia = [], [], []
     for piece in pieces:
-        mesh = trimesh.Trimesh(piece.vertices, piece.faces, process=False)
-        volume, extent = abs(float(mesh.volume)), np.ptp(piece.vertices, axis=0)
+        volume, extent = abs(_enclosed(piece)), np.ptp(piece.vertices, axis=0)
         kg = max(volume, 1e-7) * DENSITY[piece.solid.material]
         weight.append(kg)
         centre.append((piece.vertices.max(0) + piece.vertices.min(0)) / 2)

@@ -50,6 +50,7 @@ class Manifest(BaseModel):
     ceiling: bool = False
     dress: Literal["none", "some", "full"] = "none"
     palette: str = ""
+    merge: Literal["parts", "bodies", "closed"] = "parts"
     meshes: dict[str, dict[str, Any]] = {}
     history: list[Step] = []
     store: Annotated[str, Field(max_length=4096)] = ""

@@ -31,6 +31,7 @@ from echousd.room.layouts import (
 )
 from echousd.room.locking import with_locked_places
 from echousd.room.manifest import check_seed
+from echousd.room.merging import merged
 from echousd.room.owned import with_own_boxes, with_own_pieces
 from echousd.room.progress import StageTimer
 from echousd.room.room import Provenance, RoomOptions
@@ -184,8 +185,9 @@ def generate(
         graph = with_free_openings(graph, layouts, seed)
     request = ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer, retrieved=models)
     made = mixed_shapes(request, shapes)
-    geometry = {name: made.geometry[owner] for name, owner in made.owners.items()}
     options, floor = options or RoomOptions(), room_floor(graph, layouts)
+    own = {name: made.geometry[owner] for name, owner in made.owners.items()}
+    geometry = merged(own, options.merge, faces)
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)
     if repair:
         with timer.stage("repair"):

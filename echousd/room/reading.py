@@ -177,6 +177,7 @@ def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
     subsets = [UsdGeom.Subset(child) for child in mesh.GetPrim().GetChildren() if child.IsA(UsdGeom.Subset)]
     if subsets:
         return {subset.GetPrim().GetName(): np.asarray(subset.GetIndicesAttr().Get()) for subset in subsets}
-    # one slot is bound on the mesh itself, under the name of its only look
-    bound = mesh.GetPrim().GetRelationship("material:binding").GetTargets()
-    return {bound[0].name.rsplit("_", 1)[-1] if bound else "wood": np.arange(faces)}
+    # one slot is bound on the mesh itself: the asset, the weakest that speaks of it, calls its look by the slot
+    told = mesh.GetPrim().GetRelationship("material:binding").GetPropertyStack()
+    bound = told[-1].targetPathList.GetAddedOrExplicitItems() if told else ()
+    return {bound[0].name if bound else "wood": np.arange(faces)}

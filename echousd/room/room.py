@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 DRESS = ("none", "some", "full")
+MERGES = ("parts", "bodies", "closed")
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class RoomOptions:
         ceiling: add a ceiling.
         dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`.
         atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
+        merge: `parts`, a mesh for every part (legs, top, drawers), `bodies`, one for all that moves together,
+            or `closed`, likewise, as a single closed surface without insides (`echousd.room.merging`).
         palette: harmony that is selected at first, one of `echousd.room.finishes.harmonies`; "" = the seed chooses.
     """
 
@@ -43,12 +46,15 @@ class RoomOptions:
     ceiling: bool = False
     dress: str = "none"
     palette: str = ""
+    merge: str = "parts"
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):
             raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
         if self.dress not in DRESS:
             raise ValueError(f"dress is {self.dress!r}, allowed: {', '.join(DRESS)}")
+        if self.merge not in MERGES:
+            raise ValueError(f"merge is {self.merge!r}, allowed: {', '.join(MERGES)}")
         if self.palette and self.palette not in PALETTES:
             raise ValueError(f"palette is {self.palette!r}, allowed: {', '.join(PALETTES)}")
 

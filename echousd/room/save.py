@@ -238,6 +238,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "ceiling": room.options.ceiling,
         "dress": room.options.dress,
         **({"palette": room.options.palette} if room.options.palette else {}),
+        **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

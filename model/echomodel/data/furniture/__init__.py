@@ -9,7 +9,19 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from echomodel.data.furniture import armchairs, beds, chairs, decor, lamps, shelving, sofas, stools, storage, tables
+from echomodel.data.furniture import (
+    armchairs,
+    beds,
+    bunks,
+    chairs,
+    decor,
+    lamps,
+    shelving,
+    sofas,
+    stools,
+    storage,
+    tables,
+)
 from echomodel.data.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.sizes import sample_size
@@ -20,8 +32,10 @@ from echomodel.vocabulary import vocabulary
 __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
-MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, lamps, decor)
+MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor)
 SAME_AS = {"table": "dining_table"}
+UNSAID = ("", "board")
+BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
 
 
 def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> list[Solid]:
@@ -54,7 +68,10 @@ def furniture(category: str, style: Style, rng: np.random.Generator, size: np.nd
 
 
 def _named(parts: list[Solid]) -> list[Solid]:
-    """The parts with their moving bodies numbered: drawer_1, drawer_2, door_1 ... in the order of the program."""
+    """The parts with their moving bodies numbered: drawer_1, drawer_2, door_1 ... in the order of the program.
+
+    Those that the program gave no role have one by what they are made of.
+    """
     names: dict[int, Joint] = {}
     counts: Counter[str] = Counter()
     out = []
@@ -64,7 +81,7 @@ def _named(parts: list[Solid]) -> list[Solid]:
                 counts[part.joint.body] += 1
                 names[id(part.joint)] = replace(part.joint, body=f"{part.joint.body}_{counts[part.joint.body]}")
             part = replace(part, joint=names[id(part.joint)])
-        out.append(part)
+        out.append(part if part.role not in UNSAID else replace(part, role=BY_MATERIAL.get(part.material, "body")))
     return out
 
 

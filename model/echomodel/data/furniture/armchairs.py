@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.data.furniture.backs import chair_legs, leaning, slim_arms
-from echomodel.data.furniture.carpentry import Size, base, box, cushion
+from echomodel.data.furniture.carpentry import Size, base, box, cushion, of_role
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.solids import Shell, Solid, Turned, rotation
 from echomodel.data.furniture.style import Style
@@ -36,6 +36,7 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 power=power,
                 ease=2.5,
                 material="fabric",
+                role="back",
             )
         )
         low = Turned(
@@ -45,6 +46,7 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             height=(seat - foot) * 0.62,
             power=power + 1,
             material="fabric",
+            role="base",
         )
         disc = Turned(
             centre=np.array([0, foot + (seat - foot) * 0.6, d * 0.04]),
@@ -54,6 +56,7 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             power=power + 1,
             rounding=0.05 * style.softness,
             material="fabric",
+            role="seat",
         )
         return [*parts, low, disc]
     if style.arms in ("slim", "none"):
@@ -75,7 +78,8 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
     arm = w * (0.13 + 0.06 * style.softness)
     y_arm = seat + (h - seat) * (0.2 + 0.5 * style.arm_height)
-    parts.append(box((-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02), "fabric", 0.02))
+    low, high = (-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02)
+    parts.append(box(low, high, "fabric", 0.02, "base"))
     parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     back = leaning(
         (-w / 2 + arm * 0.5, foot + 0.05, -d / 2),
@@ -118,7 +122,7 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
                     (x0, foot, -d / 2 + 0.01), (x1, y, d / 2 - 0.01), replace(style, softness=min(style.softness, 0.8))
                 )
             )
-    return parts
+    return of_role("arm", parts)
 
 
 def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -160,6 +164,7 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             power=2.6 + style.corner,
             ease=2.6,
             material="fabric",
+            role="back",
         ),
         Turned(
             centre=np.array([0, foot, d * 0.02]),
@@ -169,11 +174,12 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             power=2.6,
             rounding=0.05,
             material="fabric",
+            role="seat",
         ),
     ]
     if kind == "swivel":
         stem = Turned(low=(0.03, 0.03), high=(0.03, 0.03), height=foot, material="metal")
         disc = Turned(low=(w * 0.34, w * 0.34), high=(w * 0.3, w * 0.3), height=0.025, material="metal")
-        return [*body, stem, disc]
+        return [*body, *of_role("leg", [stem, disc])]
     legs = style.legs if style.legs in ("tapered", "splayed", "straight", "hairpin") else "splayed"
     return [*body, *base(style, w * 0.72, d * 0.7, foot + 0.02, 0.035 * style.bulk, legs)]

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import base, box, cushion, leg, top
-from echomodel.data.furniture.choices import Choices
+from echomodel.data.furniture.carpentry import base, box, cushion, leg, of_role, top
 from echomodel.data.furniture.solids import Ball, Block, Solid, rotation
 from echomodel.data.furniture.style import Style
 
@@ -21,12 +20,13 @@ def seat_of(
     if soft:
         return cushion(low, high, style, material or "fabric")
     shape = "corners" if style.corner > 0.35 else "square"
-    return replace(top(shape, w, d, y, thick, style, material or "wood"), centre=np.array([0, y - thick, z]))
+    board = top(shape, w, d, y, thick, style, material or "wood")
+    return replace(board, centre=np.array([0, y - thick, z]), role="seat")
 
 
 def leaning(low: tuple, high: tuple, rake: float, pivot_y: float, pivot_z: float, **kwargs) -> Block:
     """A block that leans back by `rake` about the horizontal line through (pivot_y, pivot_z)."""
-    block = box(low, high, kwargs.get("material", "wood"), kwargs.get("radius", 0.0))
+    block = box(low, high, kwargs.get("material", "wood"), kwargs.get("radius", 0.0), "back")
     turn = rotation(x=-rake)
     pivot = np.array([0, pivot_y, pivot_z])
     return replace(block, centre=turn @ (block.centre - pivot) + pivot, turn=turn)
@@ -41,9 +41,12 @@ def back_rest(
     z: float,
     thick: float,
     rake: float,
-    choices: Choices,
 ) -> list[Solid]:
     """The back of a chair from the seat's height y0 up to y1, its foot on the plane z, leaning back by `rake`."""
+    return of_role("back", _back(style, kind, w, y0, y1, z, thick, rake))
+
+
+def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thick: float, rake: float) -> list[Solid]:
     length = (y1 - y0) / np.cos(rake)
     a = w / 2
 
@@ -82,7 +85,8 @@ def back_rest(
     rail = 0.1 + 0.12 * style.contrast
     if kind == "frame":
         posts += [lean(-a, a, 1 - rail, 1, post * 0.8), lean(-a, a, 0.2, 0.2 + rail * 0.6, post * 0.8)]
-        return [*posts, lean(-a * 0.82, a * 0.82, 0.24, 1 - rail * 0.7, post * 0.9, material="fabric", radius=0.01)]
+        inner, pad = a - post * 0.6, post * 1.3  # padded on both faces of the frame
+        return [*posts, lean(-inner, inner, 0.2 + rail * 0.3, 1 - rail * 0.5, pad, material="fabric", radius=0.012)]
     if kind == "rails":
         count = int(2 + 2.99 * style.tufting)
         for i in range(count):
@@ -109,4 +113,4 @@ def slim_arms(w: float, d: float, seat: float, h: float, style: Style, thick: fl
         x = s * (w / 2 - thick)
         parts.append(box((x - thick * 0.8, y - thick, z0), (x + thick * 0.8, y, z1), "wood", 0.008))
         parts.append(leg((x, seat - 0.08, z1 - thick), (x, y - thick * 0.5, z1 - thick), thick, style))
-    return parts
+    return of_role("arm", parts)

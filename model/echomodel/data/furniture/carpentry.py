@@ -29,14 +29,16 @@ def of_role(role: str, parts: list[Solid], **changes: Any) -> list[Solid]:
     return [replace(part, role=role, **changes) for part in parts]
 
 
-def cushion(low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY) -> Solid:
+def cushion(
+    low: tuple, high: tuple, style: Style, material: str = "fabric", turn: np.ndarray = IDENTITY, role: str = "seat"
+) -> Solid:
     """An upholstered body between two corners: its edges rounded as far as the style is soft, bulging at most."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     centre, half = (a + b) / 2, np.maximum((b - a) / 2, 1e-3)
     if style.softness > 0.85 and half.min() / half.max() > 0.12:
-        return Ball(centre=centre, half=half * 1.02, power=5.0, turn=turn, material=material)
+        return Ball(centre=centre, half=half * 1.02, power=5.0, turn=turn, material=material, role=role)
     radius = float(half.min() * (0.25 + 0.7 * style.softness))
-    return Block(centre=centre, half=half, radius=radius, turn=turn, material=material)
+    return Block(centre=centre, half=half, radius=radius, turn=turn, material=material, role=role)
 
 
 def corner_power(style: Style) -> float:
@@ -46,7 +48,7 @@ def corner_power(style: Style) -> float:
 
 def within(shape: str, style: Style) -> float:
     """Share of a top's width and depth inside which legs at the four corners stay below it."""
-    return {"square": 0.97, "corners": 2 ** (-1 / corner_power(style)), "round": 0.71}[shape]
+    return {"square": 0.97, "corners": 0.98 * 2 ** (-1 / corner_power(style)), "round": 0.68}[shape]
 
 
 def top(shape: str, width: float, depth: float, y: float, thick: float, style: Style, material: str = "wood") -> Turned:
@@ -62,6 +64,7 @@ def top(shape: str, width: float, depth: float, y: float, thick: float, style: S
         power=power,
         rounding=rounding,
         material=material,
+        role="top",
     )
 
 
@@ -121,7 +124,8 @@ def between_legs(
     spread = min(np.tan(style.splay) * height, 0.3 * min(width, depth)) if kind == "splayed" else 0.0
     x, z = width / 2 - leg / 2 - spread * y / height, depth / 2 - leg / 2 - spread * y / height
     wider = 2**0.5 if shape == "round" else 1.0
-    return top("round" if shape == "round" else "square", 2 * x * wider, 2 * z * wider, y, thick, style, "accent")
+    board = top("round" if shape == "round" else "square", 2 * x * wider, 2 * z * wider, y, thick, style, "accent")
+    return replace(board, role="shelf")
 
 
 def _stand(
@@ -207,6 +211,10 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
 
 def pedestal(width: float, depth: float, height: float, style: Style) -> list[Solid]:
     """A column on a disc or a cross of feet, from the floor to `height`."""
+    return of_role("leg", _column(width, depth, height, style))
+
+
+def _column(width: float, depth: float, height: float, style: Style) -> list[Solid]:
     r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
     material = "metal" if style.family in ("modern", "industrial") else "wood"
     spread = min(width, depth) * 0.32

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.data.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
-from echomodel.data.furniture.carpentry import Size, base, box, top
+from echomodel.data.furniture.carpentry import Size, base, box, of_role, top
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.solids import Ball, Shell, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.stools import stool
@@ -36,9 +36,10 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             power=2.4 + style.corner,
             ease=2.5,
             material="fabric",
+            role="back",
         )
         return [*parts, shell]
-    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake, choices)
+    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake)
 
 
 def chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -56,11 +57,14 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     r = 0.016 * (0.9 + 0.3 * style.bulk)
     seat = min(0.5, h * 0.52)
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
-    parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01)]
+    parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
     corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
-    parts += [Tube(points=np.array([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]]), radius=r) for cx, cz in corners]
-    parts += [Tube(points=np.array([[-x, y, cz], [x, y, cz]]), radius=r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
-    parts += [Tube(points=np.array([[cx, 0.13, -z], [cx, 0.13, z]]), radius=r * 0.7) for cx in (-x, x)]
+    legs: list[Solid] = [
+        Tube(points=np.array([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]]), radius=r) for cx, cz in corners
+    ]
+    legs += [Tube(points=np.array([[-x, y, cz], [x, y, cz]]), radius=r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
+    legs += [Tube(points=np.array([[cx, 0.13, -z], [cx, 0.13, z]]), radius=r * 0.7) for cx in (-x, x)]
+    parts += of_role("leg", legs)
     splat = w * choices.between("share", 0.14, 0.24)
     parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
     arm = seat + (h - seat) * 0.48
@@ -68,18 +72,18 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         t = np.linspace(-np.pi / 2, np.pi / 2, 13)
         fall = np.abs(t) / (np.pi / 2)
         bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
-        parts.append(Tube(points=bow, radius=r * 1.1))
-        parts += [
+        arms: list[Solid] = [Tube(points=bow, radius=r * 1.1)]
+        arms += [
             Tube(points=np.array([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]]), radius=r * 0.8) for s in (-1, 1)
         ]
-        parts += [
+        arms += [
             Tube(
                 points=np.array([[s * x, seat, -z * 0.5], [s * x * 0.93, arm + (h - arm) * 0.45, -z * 0.5]]),
                 radius=r * 0.8,
             )
             for s in (-1, 1)
         ]
-        return parts
+        return parts + of_role("arm", arms)
     yoke = np.array(
         [
             [-w * 0.5, h - 0.03, -z - 0.07],
@@ -88,8 +92,9 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             [w * 0.5, h - 0.03, -z - 0.07],
         ]
     )
-    parts.append(Tube(points=yoke, radius=r * 1.2))
-    parts += [Tube(points=np.array([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]]), radius=r) for s in (-1, 1)]
+    parts.append(Tube(points=yoke, radius=r * 1.2, role="back"))
+    posts = [Tube(points=np.array([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]]), radius=r) for s in (-1, 1)]
+    parts += of_role("back", [*posts])
     for s in (-1, 1):
         parts.append(
             Tube(
@@ -97,9 +102,11 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                     [[s * x, arm + 0.03, -z - 0.03], [s * x, arm, z * 0.7], [s * x * 1.02, arm - 0.02, z * 0.8]]
                 ),
                 radius=r * 0.9,
+                role="arm",
             )
         )
-        parts.append(Tube(points=np.array([[s * x, seat, z * 0.75], [s * x, arm, z * 0.75]]), radius=r * 0.8))
+        post = np.array([[s * x, seat, z * 0.75], [s * x, arm, z * 0.75]])
+        parts.append(Tube(points=post, radius=r * 0.8, role="arm"))
     return parts
 
 
@@ -123,9 +130,10 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 front=(h - seat) * 0.6,
                 ease=2.0,
                 material="fabric",
+                role="back",
             ),
         ]
-    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5, choices)
+    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5)
 
 
 def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -148,6 +156,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 material="metal",
             ),
         ]
+        parts = of_role("leg", parts)
     else:
         legs = style.legs if style.legs in ("tapered", "splayed", "straight", "sled") else "splayed"
         upright_legs = legs != "splayed"
@@ -156,10 +165,12 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
         spread = min(np.tan(style.splay) * (seat - thick * 0.6), 0.3 * min(w, d * 0.96) * share)
         lean = 0.0 if upright_legs else spread * 0.35
         x, z, y, t = w * share / 2 - 0.02 - lean, d * share * 0.48 - 0.02 - lean, seat * 0.35, 0.011
-        parts += [box((-x, y - t, s * z - t), (x, y + t, s * z + t), "metal") for s in (-1, 1)]
-        parts += [box((s * x - t, y - t, -z), (s * x + t, y + t, z), "metal") for s in (-1, 1)]
+        parts += [box((-x, y - t, s * z - t), (x, y + t, s * z + t), "metal", 0.0, "rail") for s in (-1, 1)]
+        parts += [box((s * x - t, y - t, -z), (s * x + t, y + t, z), "metal", 0.0, "rail") for s in (-1, 1)]
     shape = "round" if style.round_tops > 0.5 else "corners"
-    parts.append(replace(top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric"), rounding=thick * 0.4))
+    parts.append(
+        replace(top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric"), rounding=thick * 0.4, role="seat")
+    )
     if not backed:
         return parts
     wide = w * (0.5 if shape == "round" else 0.8)
@@ -173,9 +184,10 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 back=h - seat,
                 front=(h - seat) * 0.4,
                 material="fabric",
+                role="back",
             ),
         ]
-    return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5, choices)
+    return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5)
 
 
 def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -186,13 +198,16 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 2:
         x, z = reach * np.cos(angle), reach * np.sin(angle)
-        parts.append(Tube(points=np.array([[0, 0.1, 0], [x, wheel * 2 + 0.01, z]]), radius=0.018, material="metal"))
-        parts.append(Ball(centre=np.array([x, wheel, z]), half=np.full(3, wheel), material="metal"))
+        parts.append(
+            Tube(points=np.array([[0, 0.1, 0], [x, wheel * 2 + 0.01, z]]), radius=0.018, material="metal", role="leg")
+        )
+        parts.append(Ball(centre=np.array([x, wheel, z]), half=np.full(3, wheel), material="metal", role="caster"))
     parts.append(
         Turned(
-            centre=np.array([0, 0.08, 0]), low=(0.03, 0.03), high=(0.026, 0.026), height=seat - 0.1, material="metal"
+            centre=np.array([0, 0.08, 0]), low=(0.03, 0.03), high=(0.026, 0.026), height=seat - 0.1, material="metal",
+            role="stem",
         )
-    )
+    )  # fmt: skip
     sw, sd = w * 0.86, d * 0.8
     parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), sw, sd, seat, 0.08, d * 0.04))
     rake = 0.1 + style.rake * 0.5
@@ -206,6 +221,7 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 back=h - seat + 0.05,
                 front=0.12 + 0.1 * style.arm_height,
                 material="fabric",
+                role="back",
             )
         )
         return parts
@@ -220,6 +236,7 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 power=2.6 + 2 * style.contrast,
                 turn=turn,
                 material="fabric",
+                role="back",
             )
         )
     elif style.tufting > 0.6:
@@ -253,11 +270,14 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 radius=0.028,
             )
         )
+    rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
+    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
     parts.append(
         Tube(
-            points=np.array([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], [0, y0 + 0.15, -d * 0.46]]),
-            radius=0.02,
+            points=np.array([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest]),
+            radius=0.016,
             material="metal",
+            role="stem",
         )
     )
     if choices.chance("extra", 0.75):
@@ -269,7 +289,9 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                     points=np.array([[s * sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]]),
                     radius=0.016,
                     material="metal",
+                    role="arm",
                 )
             )
-            parts.append(box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012))
+            pad = box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012, "arm")
+            parts.append(pad)
     return parts

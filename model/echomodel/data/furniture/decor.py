@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, box
+from echomodel.data.furniture.carpentry import Size, box, of_role
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.lathe import Blade
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
@@ -24,7 +24,9 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
         foot = min(0.2, h * 0.15)
         for a in np.arange(4) * np.pi / 2 + np.pi / 4:
             x, z = pot_r * 1.05 * np.cos(a), pot_r * 1.05 * np.sin(a)
-            parts.append(Tube(points=np.array([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]]), radius=0.014))
+            parts.append(
+                Tube(points=np.array([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]]), radius=0.014, role="leg")
+            )
     waist = 0.6 + 0.35 * style.taper
     parts.append(
         Turned(
@@ -34,6 +36,7 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
             height=pot_h,
             power=power,
             material="ceramic",
+            role="pot",
         )
     )
     parts.append(
@@ -44,6 +47,7 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
             height=pot_h * 0.04,
             power=power,
             material="soil",
+            role="soil",
         )
     )
     y0 = foot + pot_h
@@ -53,28 +57,28 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Solid]:
-    """A trunk that forks, clumps of foliage at its ends, and leaves that stand out of them."""
+    """A trunk that forks into bent branches with leaves along them, a round crown altogether."""
     rng = choices.stream("detail")
-    crown = (h - y0) * choices.between("split", 0.45, 0.65)
-    middle, fork = h - crown / 2, max(y0 + 0.05, h - crown * 1.05)
-    parts: list[Solid] = [
-        Tube(points=np.array([[0, y0, 0], [0.015, (y0 + fork) / 2, 0.01], [0, fork, 0]]), radius=0.016, material="stem")
-    ]
-    count = choices.whole("count", 6, 10)
+    crown = (h - y0) * choices.between("split", 0.5, 0.7)
+    middle, fork = h - crown / 2, max(y0 + 0.05, h - crown * 1.02)
+    trunk = np.array([[0, y0 - 0.02, 0], [0.015, (y0 + fork) / 2, 0.01], [0, fork, 0]])
+    parts: list[Solid] = [Tube(points=trunk, radius=0.016, material="stem", role="stem")]
+    count, reach = choices.whole("count", 8, 11), np.array([a, crown / 2, b])
     for i in range(count):
-        around, level = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05)), 2 * (i + 0.5) / count - 1
-        flat = np.sqrt(1 - level**2)
-        direction = np.array([np.sin(around) * flat, level, np.cos(around) * flat])
-        half = np.array([a, crown / 2, b]) * rng.uniform(0.36, 0.48)
-        centre = np.array([0, middle, 0]) + direction * (np.array([a, crown / 2, b]) - half) * rng.uniform(0.82, 1.0)
-        parts.append(Ball(centre=centre, half=half * 0.82, material="leaf", role="leaf"))
-        parts.append(Tube(points=np.array([[0, fork - 0.02, 0], centre]), radius=0.008, material="stem"))
-        for _ in range(7):
-            out = direction + 0.9 * rng.normal(size=3)
-            out /= np.linalg.norm(out)
-            yaw, lift = np.arctan2(out[0], out[2]), np.arcsin(out[1])
-            length = float(half.min()) * rng.uniform(0.65, 0.95)
-            parts.append(_leaf(centre + out * half * 0.6, yaw, lift + 0.2, length, 0.45 * length, bend=0.5))
+        around, level = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05)), 2 * (i + 0.5) / count - 0.9
+        flat = np.sqrt(max(1 - level**2, 0.05))
+        out = np.array([np.sin(around) * flat, min(level, 1.0), np.cos(around) * flat])
+        start, tip = np.array([0, fork - 0.02, 0]), np.array([0, middle, 0]) + out * reach * rng.uniform(0.6, 0.75)
+        bend = (start + tip) / 2 + np.array([out[0], -0.3, out[2]]) * 0.12 * crown
+        branch = np.array([start, bend, tip])
+        parts.append(Tube(points=branch, radius=0.006, material="stem", role="stem"))
+        length = float(np.clip(0.42 * min(a, b, crown / 2), 0.05, 0.16))
+        for k in range(8):
+            share = 0.35 + 0.65 * k / 7
+            place = bend + (tip - bend) * (2 * share - 1) if share > 0.5 else start + (bend - start) * 2 * share
+            yaw = around + (-1) ** k * rng.uniform(0.5, 1.5)
+            parts.append(_leaf(place, yaw, rng.uniform(-0.3, 0.7), length, 0.5 * length, bend=0.7))
+        parts.append(_leaf(tip, around, 0.4 + 0.6 * level, length, 0.5 * length, bend=0.7))
     return parts
 
 
@@ -132,46 +136,48 @@ def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[S
     rng = choices.stream("detail")
     r = min(a, b) * 0.26
     parts: list[Solid] = [
-        Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf"),
-        Ball(centre=np.array([0, h - r, 0]), half=np.full(3, r), material="leaf"),
+        Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf", role="stem"),
+        Ball(centre=np.array([0, h - r, 0]), half=np.full(3, r), material="leaf", role="stem"),
     ]
     for s in (-1, 1):
         y = y0 + (h - y0) * rng.uniform(0.3, 0.5)
         tip = y + (h - y0) * rng.uniform(0.2, 0.4)
         x = s * (a - r * 0.6)
-        parts.append(
-            Tube(points=np.array([[0, y, 0], [x, y + r * 0.5, 0], [x, tip, 0]]), radius=r * 0.6, material="leaf")
-        )
+        arm = np.array([[0, y, 0], [x * 0.75, y + r * 0.1, 0], [x, y + r * 0.8, 0], [x, tip, 0]])
+        parts.append(Tube(points=arm, radius=r * 0.6, material="leaf", role="stem"))
+        parts.append(Ball(centre=arm[-1], half=np.full(3, r * 0.6), material="leaf", role="stem"))
     return parts
 
 
 def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A flat screen with a bezel on two feet, a foot plate, or none."""
+    """A thin panel with a bezel, its electronics in a lower box behind, on two feet, a foot plate, or none."""
     w, h, d = size
-    kind = (
-        choices.pick("kind", ["feet", "plate", "wall"], [0.45, 0.35, 0.2])
-        if d < 0.1
-        else choices.pick("kind", ["feet", "plate"])
-    )
-    low = 0.0 if kind == "wall" else h * 0.08
-    t = min(d, 0.05) if kind != "wall" else d
-    parts: list[Solid] = [
-        box((-w / 2, low, -t / 2), (w / 2, h, t / 2), "metal", min(0.008, t * 0.2)),
-        box((-w / 2 + 0.015, low + 0.02, t * 0.3), (w / 2 - 0.015, h - 0.015, t / 2 + 0.002), "screen"),
+    kinds, odds = ["feet", "plate", "arc", "wall"], [0.4, 0.25, 0.15, 0.2]
+    kind = choices.pick("kind", kinds, odds) if d < 0.1 else choices.pick("kind", kinds[:3], odds[:3])
+    low = 0.0 if kind == "wall" else float(np.clip(0.08 * h, 0.03, 0.09))
+    back, face = (-d / 2, d / 2) if kind == "wall" else (-min(d, 0.07) / 2, min(d, 0.07) / 2)
+    thin = max(face - 0.022, (back + face) / 2)  # the panel; what is behind it is lower and narrower
+    edge, chin = 0.012, 0.02 + 0.02 * style.contrast
+    body: list[Solid] = [
+        box((-w / 2, low, thin), (w / 2, h, face), "metal", 0.004),
+        box((-w * 0.38, low + 0.04 * h, back), (w * 0.38, low + 0.52 * (h - low), thin + 0.004), "metal", 0.012),
     ]
+    glass = box((-w / 2 + edge, low + chin, thin + 0.004), (w / 2 - edge, h - edge, face + 0.0015), "screen")
+    parts = [*of_role("housing", body), *of_role("screen", [glass])]
+    feet: list[Solid] = []
     if kind == "feet":
-        parts += [
-            box((s * w * 0.36 - 0.015, 0, -d / 2), (s * w * 0.36 + 0.015, 0.015, d / 2), "metal") for s in (-1, 1)
-        ]
-        parts += [
-            box((s * w * 0.36 - 0.012, 0, -t * 0.3), (s * w * 0.36 + 0.012, low + 0.02, t * 0.3), "metal")
-            for s in (-1, 1)
-        ]
+        for s in (-1, 1):
+            for reach in (-d / 2 + 0.006, d / 2 - 0.006):
+                top, toe = np.array([s * w * 0.34, low + 0.03, (back + thin) / 2]), [s * w * 0.37, 0.008, reach]
+                feet.append(Tube(points=np.array([top, [s * w * 0.35, low * 0.6, reach * 0.4], toe]), radius=0.008))
     elif kind == "plate":
-        parts += [
-            box((-w * 0.2, 0, -d / 2), (w * 0.2, 0.015, d / 2), "metal"),
-            box((-w * 0.06, 0, -t * 0.4), (w * 0.06, low + 0.05, t * 0.4), "metal"),
+        feet = [
+            box((-w * 0.17, 0, -d / 2), (w * 0.17, 0.012, d / 2), radius=0.005),
+            box((-w * 0.05, 0, back), (w * 0.05, low + 0.1 * h, back + 0.014)),
         ]
-    elif d > 0.07:
-        parts.append(box((-w * 0.3, h * 0.25, -d / 2), (w * 0.3, h * 0.7, 0), "metal", 0.01))
-    return parts
+    elif kind == "arc":
+        turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
+        bow = np.stack([0.24 * w * np.sin(turn), 0 * turn + 0.009, d / 2 - 0.009 - (d - 0.018) * np.cos(turn)], 1)
+        feet = [Tube(points=bow, radius=0.009), box((-0.03, 0, back - 0.004), (0.03, low + 0.1 * h, back + 0.012))]
+        feet.append(box((-0.03, 0, -d / 2), (0.03, 0.012, back + 0.008)))
+    return parts + of_role("foot", feet, material="metal")

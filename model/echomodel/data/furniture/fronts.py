@@ -71,7 +71,9 @@ def sliding(low: Point, high: Point, z: float, count: int, style: Style, materia
         ]
         for x in (xs[i] + 0.02, xs[i + 1] - 0.02):
             if i % 2 or material != "accent":
-                panel.append(box((x - 0.035, low[1], near + 0.012), (x + 0.015, high[1], near + 0.0235), "metal"))
+                panel.append(
+                    box((x - 0.035, low[1], near + 0.012), (x + 0.015, high[1], near + 0.0235), "metal", 0.0, "handle")
+                )
         parts += [replace(part, joint=joint) for part in panel]
     return parts
 

@@ -16,10 +16,12 @@ DOWN = rotation(x=np.pi)
 
 
 def _disc(
-    x: float, y: float, z: float, a: float, b: float, h: float, material: str = "metal", high: float = 1.0
-) -> Turned:
+    x: float, y: float, z: float, a: float, b: float, h: float, material: str = "metal", high: float = 1.0,
+    role: str = "stem",
+) -> Turned:  # fmt: skip
     """A disc or cone with its lower face at y: half widths a and b, `high` times that above."""
-    return Turned(centre=np.array([x, y, z]), low=(a, b), high=(a * high, b * high), height=h, material=material)
+    low, up = (a, b), (a * high, b * high)
+    return Turned(centre=np.array([x, y, z]), low=low, high=up, height=h, material=material, role=role)
 
 
 def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float, style: Style) -> list[Solid]:
@@ -46,7 +48,8 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     skin = Lathe(centre=place, profile=wall(outline, thick), squash=squash, hollow=True, material="shade", role="shade")
     body = replace(skin, profile=np.array(outline), hollow=False, core=True)  # a coarse grid sees a full shade
     light = Ball(centre=np.array([x, y + 0.45 * h, z]), half=np.full(3, bulb), material="shade", role="bulb")
-    socket = _disc(x, y + 0.45 * h + 0.7 * bulb, z, 0.45 * bulb, 0.45 * bulb, high * h - 0.45 * h - 0.7 * bulb)
+    low = y + 0.45 * h + 0.7 * bulb
+    socket = _disc(x, low, z, 0.45 * bulb, 0.45 * bulb, y + high * h - low, role="bulb")
     arms: list[Solid] = []
     if kind != "dome":
         arms = [
@@ -63,11 +66,15 @@ def _kind(style: Style, *without: str) -> str:
 def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A canopy, a cord and a shade; a row of shades; a ring; or a chandelier with arms. The top is the ceiling."""
     w, h, d = size
+    if d / w > 1.6:  # a long one along the depth
+        about = rotation(y=np.pi / 2)
+        along = pendant_lamp(np.array([d, h, w]), style, choices)
+        return [replace(part, centre=about @ part.centre, turn=about @ part.turn) for part in along]
     canopy = min(0.06, w * 0.2, d * 0.3) if min(w, d) > 0.14 else min(w, d) * 0.35
     parts: list[Solid] = []
     if w / d > 1.6:
         return _row(size, style, choices)
-    parts.append(_disc(0, h - 0.025, 0, canopy, canopy, 0.025))
+    parts.append(_disc(0, h - 0.025, 0, canopy, canopy, 0.025, role="canopy"))
     if w > 0.45 and (style.shade == "arms" or choices.chance("kind", 0.25)):
         return parts + _chandelier(size, style, choices)
     if style.shade == "ring" and w > 0.4:
@@ -77,9 +84,9 @@ def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "sphere":
         tall = min(h * 0.7, w)
     r = max(0.006, 0.012 * w)
-    parts.append(Tube(points=np.array([[0, tall * 0.9, 0], [0, h, 0]]), radius=r, material="metal"))
+    parts.append(Tube(points=np.array([[0, tall * 0.9, 0], [0, h, 0]]), radius=r, material="metal", role="cord"))
     if kind == "drum" and style.tufting > 0.6:
-        inner = _disc(0, tall * 0.15, 0, w * 0.34, d * 0.34, tall * 0.5, "shade")
+        inner = _disc(0, tall * 0.15, 0, w * 0.34, d * 0.34, tall * 0.5, "shade", role="shade")
         return [*parts, *shade(kind, 0, tall * 0.35, 0, w / 2, d / 2, tall * 0.65, style), inner]
     return parts + shade(kind, 0, 0, 0, w / 2, d / 2, tall, style)
 
@@ -87,9 +94,9 @@ def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Several shades under one bar."""
     w, h, d = size
-    bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal")
+    bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal", 0.0, "canopy")
     if d < 0.25 and (style.shade == "ring" or choices.chance("form", 0.3)):
-        beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01)
+        beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01, "shade")
         return [
             bar,
             beam,
@@ -218,27 +225,7 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     r = 0.012 * (0.8 + 0.4 * style.bulk)
     if w / d > 1.6 or w > 0.8:
-        head = min(d * 0.5, w * 0.2, 0.22)
-        x0, x1 = -w / 2 + min(0.15, d * 0.45), w / 2 - head
-        t = np.linspace(0, 1, 13)
-        sweep = np.stack(
-            [
-                x0 + (x1 - x0) * t,
-                0.03 + (h - 0.03) * np.sin(np.pi * (0.5 * t**0.6 + 0.12 * t)) / np.sin(np.pi * 0.5),
-                0 * t,
-            ],
-            1,
-        )
-        sweep[:, 1] = np.minimum(sweep[:, 1], h)
-        end = sweep[-1, 1]
-        tall = min(0.3, head * 1.3)
-        foot = _disc(x0, 0, 0, min(0.15, d * 0.45), min(0.15, d / 2), 0.03)
-        return [
-            foot,
-            Tube(points=sweep, radius=r, material="metal"),
-            Tube(points=np.array([[x1, end, 0], [x1, end - 0.5 * tall, 0]]), radius=r, material="metal"),
-            *shade(_kind(style, "cylinder"), x1, end - tall, 0, head, min(head, d / 2), tall, style),
-        ]
+        return _arc(size, style, r)
     tall = h * (0.16 + 0.12 * style.taper)
     a, b = w / 2, d / 2
     kind = _kind(style)
@@ -254,6 +241,25 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.contrast > 0.75:
         parts.append(_disc(0, h * 0.32, 0, a * 0.7, b * 0.7, 0.02, "wood"))
     return [*parts, pole]
+
+
+def _arc(size: Size, style: Style, r: float) -> list[Solid]:
+    """A bow from a heavy foot to a hanging shade, from corner to corner of a deep box."""
+    w, h, d = size
+    head, foot = min(d * 0.5, w * 0.2, 0.22), min(0.15, d * 0.45, w * 0.3)
+    start, end = np.array([-w / 2 + foot, -d / 2 + foot]), np.array([w / 2 - head, d / 2 - head])
+    t = np.linspace(0, 1, 13)
+    rise = 0.03 + (h - 0.03) * np.sin(np.pi * (0.5 * t**0.6 + 0.12 * t)) / np.sin(np.pi * 0.5)
+    plan = start + (end - start) * t[:, None]
+    sweep = np.insert(plan, 1, np.minimum(rise, h), axis=1)
+    x, high, z = sweep[-1]
+    tall = min(0.3, head * 1.3)
+    return [
+        _disc(start[0], 0, start[1], foot, foot, 0.03, role="foot"),
+        Tube(points=sweep, radius=r, material="metal", role="stem"),
+        Tube(points=np.array([[x, high, z], [x, high - 0.5 * tall, z]]), radius=r, material="metal", role="stem"),
+        *shade(_kind(style, "cylinder"), x, high - tall, z, head, head, tall, style),
+    ]
 
 
 def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:

@@ -117,7 +117,7 @@ class Blade(Solid):
         return np.stack([0 * z, y, z], 1), normal, half
 
     def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
-        points, normal, half = self._spine((4, 4, 5, 7)[detail])
+        points, normal, half = self._spine((3, 4, 5, 7)[detail])
         side = np.array([1.0, 0.0, 0.0])
         rings = []
         for point, up, reach in zip(points, normal, np.maximum(half, 0.06 * self.width), strict=True):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, box, core
+from echomodel.data.furniture.carpentry import Size, base, box, core, of_role
 from echomodel.data.furniture.cases import BOARD, carcass, depth_of, foot_height, shelves
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.fronts import front
@@ -18,6 +18,7 @@ BOOKS = ("book", "cushion", "blanket", "linen", "accent")  # slots that books ta
 
 
 ROWS, COLUMNS = 9, 14  # at most, however large the box is
+CELLS = 18  # that are filled with books at most
 
 
 def _count(wished: float, most: int, least: int = 1) -> int:
@@ -41,35 +42,62 @@ def bookshelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts += shelves(rect, d, -d / 2, rows, columns, style)
     x0, y0, x1, y1, z = rect
     xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
-    if rows > 2 and choices.chance("front", 0.4):
+    closed = int(rows > 2 and choices.chance("front", 0.4))  # rows behind doors
+    if closed:
         parts.append(core((x0, y0, -d / 2), (x1, float(ys[1]), z)))
         parts += front((x0, y0), (x1, float(ys[1])), z, 1, max(1, columns), "door", style, depth_of(d, z))
     rng = choices.stream("pattern")
+    t = BOARD * (0.8 + 0.5 * style.bulk)
+    few = min(1.0, CELLS / (rows * columns))  # a library's wall would be all books and no faces left
     for i in range(columns):
-        for j in range(1, rows):
-            if rng.random() < 0.62:
-                parts += _books(
-                    float(xs[i]) + 0.02, float(xs[i + 1]) - 0.02, float(ys[j]) + 0.01, float(ys[j + 1]), d, rng
+        for j in range(closed, rows):
+            if rng.random() < 0.8 * few:
+                cell = (
+                    float(xs[i]) + 0.6 * t,
+                    float(xs[i + 1]) - 0.6 * t,
+                    float(ys[j]) + t / 2,
+                    float(ys[j + 1]) - t / 2,
                 )
+                parts += _books(*cell, -d / 2 + 0.02, z - 0.012, rng)
     return parts
 
 
-def _books(x0: float, x1: float, y0: float, y1: float, d: float, rng: np.random.Generator) -> list[Solid]:
-    """A row of books of different heights and colours, some leaning, that ends somewhere along the shelf."""
-    x, end = x0, x0 + (x1 - x0) * rng.uniform(0.35, 0.95)
-    deep = min(0.2, d * 0.75)
+def _books(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, rng: np.random.Generator) -> list[Solid]:
+    """What stands in a cell: books upright, the last one leaning, then a lying pile, or nothing.
+
+    Arguments:
+        x0, x1, y0, y1, z0, z1: the free space of the cell, metres.
+    """
+    x, end = x0, x0 + (x1 - x0) * rng.uniform(0.4, 0.8)
+    deep, most = min(0.21, z1 - z0), min(0.92 * (y1 - y0), 0.29)
+    if deep < 0.06 or most < 0.08:
+        return []
     parts: list[Solid] = []
-    colours = rng.choice(BOOKS, size=3)
+    colours, upper = rng.choice(BOOKS, size=3), 0.0
     while True:
-        wide, tall = rng.uniform(0.022, 0.05), min((y1 - y0) * 0.88, rng.uniform(0.18, 0.28))
+        wide, tall = rng.uniform(0.02, 0.05), most * rng.uniform(0.68, 1.0)
         if x + wide > end:
-            return parts
-        z = -d / 2 + 0.02
-        book = box(
-            (x, y0, z), (x + wide - 0.002, y0 + tall, z + deep * rng.uniform(0.75, 1.0)), str(rng.choice(colours))
-        )
-        parts.append(replace(book, role="book"))
-        x += wide
+            break
+        near = z0 + deep * rng.uniform(0.75, 1.0)
+        parts.append(box((x, y0, z0), (x + wide - 0.002, y0 + tall, near), str(rng.choice(colours)), 0.0, "book"))
+        x, upper = x + wide, tall
+    lean, thick = 0.24, 0.026
+    tall = min(0.78 * most, upper)
+    reach = tall * np.sin(lean) + thick * np.cos(lean)
+    if upper and x + reach < x1:  # one leans on the last of the row
+        middle = np.array([x + reach / 2, y0 + (tall * np.cos(lean) + thick * np.sin(lean)) / 2, z0 + 0.42 * deep])
+        leaning = box((-thick / 2, -tall / 2, -0.4 * deep), (thick / 2, tall / 2, 0.4 * deep), str(colours[0]))
+        parts.append(replace(leaning, centre=middle, turn=rotation(z=lean), role="book"))
+        x += reach
+    left, height = x + 0.02, y0
+    for _ in range(int(rng.integers(0, 4)) if x1 - left > 0.16 else 0):  # a lying pile
+        wide, thick = min(0.24, x1 - left) * rng.uniform(0.85, 1.0), rng.uniform(0.02, 0.045)
+        if height + thick > y0 + most:
+            break
+        corner = (left + wide, height + thick, z0 + deep * rng.uniform(0.7, 0.95))
+        parts.append(box((left, height, z0), corner, str(rng.choice(colours)), 0.0, "book"))
+        height += thick
+    return parts
 
 
 def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
@@ -80,8 +108,9 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
     parts: list[Solid] = [
         box((x - t, 0, s * (d / 2 - t) - t), (x + t, h, s * (d / 2 - t) + t), "metal") for x in xs for s in (-1, 1)
     ]
-    ys = np.linspace(0.12, h - 0.02, rows + 1)
-    return parts + [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
+    ys = np.linspace(min(0.12, 0.2 * h), h - 0.02, rows + 1)
+    boards: list[Solid] = [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
+    return of_role("side", parts) + of_role("shelf", boards)
 
 
 def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -89,16 +118,18 @@ def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     rows = _count(h / choices.between("rows", 0.3, 0.45), ROWS)
     kind = choices.pick("kind", ["rack", "boards", "ladder", "steps"])
+    if (kind == "ladder" and (h < 1.2 or d < 0.22)) or (kind == "steps" and rows < 3):
+        kind = "boards"  # too low to lean or to climb
     if kind == "rack" or style.family == "industrial":
         return _rack(size, rows, max(1, round(w / 0.9)))
     t = BOARD * (0.8 + 0.5 * style.bulk)
     ys = np.linspace(0.08 * min(1, h), h - t, rows + 1)
     if kind == "boards":
         parts: list[Solid] = [
-            box((s * w / 2 - (t if s > 0 else 0), 0, -d / 2), (s * w / 2 + (t if s < 0 else 0), h, d / 2))
+            box((s * w / 2 - (t if s > 0 else 0), 0, -d / 2), (s * w / 2 + (t if s < 0 else 0), h, d / 2), role="side")
             for s in (-1, 1)
         ]
-        return parts + [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2)) for y in ys]
+        return parts + [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
     if kind == "ladder":
         lean = np.arctan2(d * 0.6, h)
         rails: list[Solid] = [
@@ -113,18 +144,19 @@ def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for y in ys:
             z1 = d / 2 - (d * 0.6) * y / h
             boards.append(box((-w / 2, y, -d / 2), (w / 2, y + t, max(z1, -d / 2 + 0.12))))
-        return rails + boards
+        return of_role("side", rails) + of_role("shelf", boards)
     xs = np.linspace(-w / 2, w / 2, rows + 2)
-    parts = [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2)) for y in ys]
+    parts = [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
+    ends: list[Solid] = []
     for i in range(rows):
-        x = float(xs[1 + (i * 2) % rows]) if rows > 1 else 0.0
-        parts.append(box((x - t / 2, ys[i], -d / 2), (x + t / 2, ys[i + 1], d / 2)))
-        parts += [
+        x = float(xs[1 + (i * 2) % rows])
+        ends.append(box((x - t / 2, ys[i], -d / 2), (x + t / 2, ys[i + 1], d / 2)))
+        ends += [
             box((s * (w / 2 - t) - t / 2, ys[i], -d / 2), (s * (w / 2 - t) + t / 2, ys[i + 1], d / 2))
             for s in (-1, 1)
             if (i + (s > 0)) % 2
         ]
-    return [*parts, *base(style, w * 0.9, d * 0.9, float(ys[0]), 0.035, "straight")]
+    return [*parts, *of_role("side", ends), *base(style, w * 0.9, d * 0.9, float(ys[0]), 0.035, "straight")]
 
 
 def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -142,21 +174,24 @@ def wine_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     for i in range(columns):
         a, b = float(bays[i]), float(bays[i + 1])
         if i:
-            parts.append(box((a - 0.01, split, -d / 2), (a + 0.01, y1, z)))
+            parts.append(box((a - 0.01, split, -d / 2), (a + 0.01, y1, z), role="side"))
         if i == lattice or rng.random() < 0.3:
             top_y = min(y1, split + 1.2 * (b - a))
             cx, cy = (a + b) / 2, (split + top_y) / 2
             reach = np.hypot(b - a, top_y - split) / 2
             tilt = np.arctan2(top_y - split, b - a)
-            bar = box((-reach, -0.012, -d / 2), (reach, 0.012, d / 2 - 0.03))
-            parts += [replace(bar, centre=np.array([cx, cy, -0.015]), turn=rotation(z=s * tilt)) for s in (-1, 1)]
-            parts.append(box((a, top_y - 0.01, -d / 2), (b, top_y + 0.01, z - 0.01)))
+            near = z - 0.012  # behind the doors, where there are some
+            bar = box((-reach, -0.012, -d / 2), (reach, 0.012, near), role="shelf")
+            middle = np.array([cx, cy, (near - d / 2) / 2])
+            parts += [replace(bar, centre=middle, turn=rotation(z=s * tilt)) for s in (-1, 1)]
+            parts.append(box((a, top_y - 0.01, -d / 2), (b, top_y + 0.01, z - 0.01), role="shelf"))
             rest = top_y
             parts += _bottles(cx, cy, (b - a) / 2, (top_y - split) / 2, d, rng)
         else:
             rest = split
         cells = _count((y1 - rest) / 0.34, ROWS)
-        parts += [box((a, y - 0.01, -d / 2), (b, y + 0.01, z - 0.01)) for y in np.linspace(rest, y1, cells + 1)[1:-1]]
+        levels = np.linspace(rest, y1, cells + 1)[1:-1]
+        parts += [box((a, y - 0.01, -d / 2), (b, y + 0.01, z - 0.01), role="shelf") for y in levels]
     if glazed:
         parts += front((x0, split), (x1, y1), z, 1, columns, "door", style, glazed=True)
     return parts

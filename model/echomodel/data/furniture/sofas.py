@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.data.furniture.armchairs import upholstered_arms
-from echomodel.data.furniture.carpentry import Size, base, box, cushion
+from echomodel.data.furniture.carpentry import Size, base, box, cushion, of_role
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.lathe import Lathe
 from echomodel.data.furniture.solids import Ball, Block, Shell, Solid, Tube, Turned, rotation
@@ -22,7 +22,10 @@ def _foot(style: Style) -> float:
 def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
     kind = style.legs if style.legs not in ("trestle", "hairpin") else "straight"
     if kind == "sled":
-        return [box((s * w * 0.42 - 0.02, 0, -d * 0.4), (s * w * 0.42 + 0.02, foot, d * 0.4), "metal") for s in (-1, 1)]
+        return [
+            box((s * w * 0.42 - 0.02, 0, -d * 0.4), (s * w * 0.42 + 0.02, foot, d * 0.4), "metal", 0.0, "leg")
+            for s in (-1, 1)
+        ]
     return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
 
 
@@ -68,7 +71,7 @@ def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, st
     parts = []
     for a, b in pairwise(edges):
         low = (a + 0.004, y0, z0 - thick * 0.2)
-        parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn))
+        parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn, role="back"))
     return parts
 
 
@@ -87,9 +90,8 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     pad = 0.12 + 0.06 * style.softness
     z0, z1 = -d / 2, d / 2
     parts: list[Solid] = _legs(style, w, d, foot)
-    parts.append(
-        box((-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015), "fabric", 0.015)
-    )
+    low, high = (-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015)
+    parts.append(box(low, high, "fabric", 0.015, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
     lean = rotation(x=-0.5 * style.rake)
     backrest = box(
@@ -97,6 +99,7 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
         (w / 2 - arm * 0.4, tall, z0 + frame),
         "fabric",
         0.02 + 0.05 * style.softness,
+        "back",
     )
     pivot = np.array([0, seat, z0 + frame / 2])
     parts.append(replace(backrest, centre=lean @ (backrest.centre - pivot) + pivot, turn=lean))
@@ -104,7 +107,7 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
         inner = arm = 0.05
         for s in (-1, 1):
             x0, x1 = sorted((s * w / 2, s * (w / 2 - arm)))
-            parts.append(box((x0, foot, z0 + 0.02), (x1, y_arm, z1 - 0.02), "fabric", 0.015))
+            parts.append(box((x0, foot, z0 + 0.02), (x1, y_arm, z1 - 0.02), "fabric", 0.015, "arm"))
     elif not armless:
         parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     inner = w / 2 - arm
@@ -115,11 +118,12 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     if chaise:
         x0, x1 = (xs[0] - arm, xs[1]) if chaise < 0 else (xs[-2], xs[-1] + arm)
         reach = z0 + chaise_depth
-        parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015))
+        parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015, "base"))
         parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
         t = 0.05 * style.bulk
         parts += [
-            box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t)) for x in (x0 + 0.08, x1 - 0.08)
+            box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t), role="leg")
+            for x in (x0 + 0.08, x1 - 0.08)
         ]
     if style.tufting > 0.75:
         parts += _throw_pillows(inner, seat, h, z0 + frame + 0.14, style)
@@ -179,6 +183,7 @@ def _curved(size: Size, style: Style) -> list[Solid]:
             power=2.6 + 2 * style.corner,
             ease=3,
             material="fabric",
+            role="back",
         )
     )
     parts.append(
@@ -189,6 +194,7 @@ def _curved(size: Size, style: Style) -> list[Solid]:
             power=3.5,
             centre=np.array([0, foot, 0.02]),
             material="fabric",
+            role="base",
         )
     )
     pads = 2 if style.tufting > 0.4 else 1
@@ -209,7 +215,7 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         foot, seat, frame = _foot(style), 0.43, 0.14
         y1 = h - 0.06
         x0, x1 = sorted((side * w / 2, side * (w / 2 - frame)))
-        parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04))
+        parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04, "back"))
         inner = side * (w / 2 - frame - 0.07)
         z0, z1 = d * 0.05, -d / 2 + depth - 0.12
         tilt = rotation(z=-side * 0.15)
@@ -220,6 +226,7 @@ def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 radius=0.05,
                 turn=tilt,
                 material="fabric",
+                role="back",
             )
         )
     return parts
@@ -231,17 +238,18 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     foot = max(0.05, _foot(style))
     seat, pad = min(0.43, h * 0.55), 0.14
     parts: list[Solid] = _legs(style, w, d, foot)
-    parts.append(box((-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.015), "fabric", 0.02))
+    low, high = (-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.015)
+    parts.append(box(low, high, "fabric", 0.02, "base"))
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
     rake = 0.15 + style.rake
-    back = box((-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), "fabric", 0.05)
+    back = box((-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), "fabric", 0.05, "back")
     turn, pivot = rotation(x=-rake), np.array([0, seat - pad, -d / 2 + 0.08])
     parts.append(replace(back, centre=turn @ (back.centre - pivot) + pivot, turn=turn))
     if choices.chance("extra", 0.6):
         s = -1 if choices.chance("side", 0.5) else 1
         x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))
         reach = -d / 2 + d * choices.between("share", 0.35, 0.6)
-        parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style))
+        parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style, role="arm"))
     if style.arms == "rolled":
         parts.append(
             Turned(
@@ -252,6 +260,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
                 turn=rotation(z=-np.pi / 2),
                 rounding=0.02,
                 material="accent",
+                role="cushion",
             )
         )
     return parts
@@ -274,9 +283,14 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         ]
         profile = np.array(outline) * [w, h]
         bag = Lathe(profile=profile, squash=d / w, material="fabric", role="seat")
-        return [bag]
+        seams: list[Solid] = []
+        for turn in np.arange(6) * np.pi / 3 + 0.3:
+            around = np.array([np.cos(turn), np.sin(turn) * d / w])
+            line = np.insert(profile[1:, :1] * around, 1, profile[1:, 1], axis=1)
+            seams.append(Tube(points=line, radius=0.005, material="fabric", role="seam"))
+        return [bag, *seams]
     if kind == "lounger":
-        return [
+        lounger: list[Solid] = [
             Ball(
                 centre=np.array([0, h * 0.27, d * 0.05]),
                 half=np.array([w / 2, h * 0.27, d * 0.46]),
@@ -291,6 +305,7 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 material="fabric",
             ),
         ]
+        return of_role("seat", lounger)
     turn = rotation(x=-0.2 - style.rake)
     return [
         cushion((-w / 2, 0, -d * 0.4), (w / 2, h * 0.4, d / 2), replace(style, softness=0.8)),

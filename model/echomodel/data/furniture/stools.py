@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.data.furniture.backs import seat_of
-from echomodel.data.furniture.carpentry import Size, base, box, cushion, top
+from echomodel.data.furniture.carpentry import Size, base, box, cushion, top, within
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.solids import Ball, Solid, Turned
 from echomodel.data.furniture.style import Style
@@ -27,9 +27,11 @@ def stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     thick = min(0.03 + 0.07 * style.softness, h * 0.4)
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "tapered"
     seat = replace(
-        top(shape, w, d, h, thick, style, "fabric" if style.softness > 0.4 else "wood"), rounding=thick * 0.4
-    )
-    inner = 0.78 if shape == "round" else 0.92
+        top(shape, w, d, h, thick, style, "fabric" if style.softness > 0.4 else "wood"), rounding=thick * 0.4,
+        role="seat",
+    )  # fmt: skip
+    outside = legs == "splayed"  # feet may reach beyond the seat, their heads do not
+    inner = 0.8 if outside and shape == "round" else within(shape, style)
     return [
         seat,
         *base(style, w * inner, d * inner, h - thick * 0.8, 0.032 * style.bulk, legs, tie=style.contrast > 0.5),
@@ -42,12 +44,15 @@ def bench(size: Size, style: Style, choices: Choices) -> list[Solid]:
     thick = 0.035 + 0.09 * style.softness
     if choices.chance("kind", 0.2):
         return [
-            box((-w / 2 * 0.98, 0.03, -d / 2 * 0.96), (w / 2 * 0.98, h - 0.08, d / 2 * 0.96), "fabric", 0.01),
+            box((-w / 2 * 0.98, 0.03, -d / 2 * 0.96), (w / 2 * 0.98, h - 0.08, d / 2 * 0.96), "fabric", 0.01, "base"),
             cushion((-w / 2, h - 0.1, -d / 2), (w / 2, h, d / 2), style),
             *base(style, w * 0.9, d * 0.9, 0.03, 0.05, "plinth"),
         ]
     legs = style.legs if style.legs not in ("plinth", "bun") else "straight"
-    return [seat_of(style, w, d, h, thick), *base(style, w * 0.94, d * 0.92, h - thick * 0.8, 0.045 * style.bulk, legs)]
+    rounded = style.softness <= 0.4 and style.corner > 0.35
+    share = within("corners", style) if rounded else 0.94
+    stand = base(style, w * share, d * share * 0.98, h - thick * 0.8, 0.045 * style.bulk, legs)
+    return [seat_of(style, w, d, h, thick), *stand]
 
 
 def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -63,8 +68,9 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if alike and style.round_tops > 0.45:
         if foot == 0 and style.softness > 0.6:
             return [
-                Ball(centre=np.array([0, h / 2, 0]), half=np.array([w / 2, h / 2, d / 2]), power=2.6, material="fabric")
-            ]
+                Ball(centre=np.array([0, h / 2, 0]), half=np.array([w / 2, h / 2, d / 2]), power=2.6, material="fabric",
+                     role="seat")
+            ]  # fmt: skip
         return [
             *parts,
             Turned(
@@ -74,11 +80,12 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 height=h - foot,
                 rounding=0.1 * h + 0.15 * h * style.softness,
                 material="fabric",
+                role="seat",
             ),
         ]
     split = foot + (h - foot) * 0.5
     return [
         *parts,
-        box((-w / 2 * 0.97, foot, -d / 2 * 0.97), (w / 2 * 0.97, split + 0.02, d / 2 * 0.97), "fabric", 0.012),
+        box((-w / 2 * 0.97, foot, -d / 2 * 0.97), (w / 2 * 0.97, split + 0.02, d / 2 * 0.97), "fabric", 0.012, "base"),
         cushion((-w / 2, split, -d / 2), (w / 2, h, d / 2), style),
     ]

@@ -20,13 +20,16 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = foot_height(style, h, 0.4)
     kind = choices.pick("kind", ["drawers", "niche", "table", "drum"], [0.55, 0.27, 0.13, 0.05])
     if kind == "drum" and style.profile == "round":
-        body = Turned(centre=np.array([0, foot, 0]), low=(w / 2, d / 2), high=(w / 2, d / 2), height=h - foot)
+        body = Turned(
+            centre=np.array([0, foot, 0]), low=(w / 2, d / 2), high=(w / 2, d / 2), height=h - foot, role="side"
+        )
         lip = Turned(
             centre=np.array([0, foot + (h - foot) * 0.55, 0]),
             low=(w * 0.515, d * 0.515),
             high=(w * 0.515, d * 0.515),
             height=0.02,
             material="accent",
+            role="side",
         )
         return [body, lip, *base(style, w * 0.7, d * 0.7, foot, 0.04)]
     if kind == "niche":
@@ -42,7 +45,7 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         low = h - max(0.12, h * 0.25)
         legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
         parts = [
-            box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2)),
+            box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), role="top"),
             *case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44)),
         ]
         parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style, d * 0.85)
@@ -73,10 +76,13 @@ def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts = mixed(np.array([w, lower, d]), style, choices, foot_height(style, lower, 0.25), 0.5)
         inner = w * 0.92
         z1 = -d / 2 + d * 0.7
-        parts += [box((s * inner / 2 - t, lower, -d / 2), (s * inner / 2 + t, h, z1)) for s in (-1, 1)]
-        parts += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1)) for y in (lower + (h - lower) * 0.5, h - t)]
-        parts.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent"))
-        return parts
+        upper: list[Solid] = [
+            box((s * inner / 2 - t, lower, -d / 2), (s * inner / 2 + t, h, z1), role="side") for s in (-1, 1)
+        ]
+        levels = (lower + (h - lower) * 0.5, h - t)
+        upper += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1), role="shelf") for y in levels]
+        upper.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent", 0.0, "back"))
+        return parts + upper
     return mixed(size, style, choices, foot_height(style, h, 0.3), choices.between("columns", 0.38, 0.55))
 
 
@@ -124,7 +130,7 @@ def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         slope = np.arctan2(h - body, w / 2)
         length = np.hypot(h - body, w / 2)
         for s in (-1, 1):
-            panel = box((-length / 2, -0.015, -d / 2), (length / 2, 0.015, d / 2 - 0.02))
+            panel = box((-length / 2, -0.015, -d / 2), (length / 2, 0.015, d / 2 - 0.02), role="roof")
             parts.append(
                 replace(panel, centre=np.array([s * w / 4, (body + h) / 2 - 0.015, -0.01]), turn=rotation(z=-s * slope))
             )
@@ -165,8 +171,8 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if h > 0.8 and choices.chance("form", 0.5):
         low = np.array([w, 0.45, d])
         parts = mixed(low, style, choices, foot_height(style, 0.45, 0.3), 0.5)
-        panel = box((-w / 2, 0.45, -d / 2), (w / 2, h, -d / 2 + 0.03), "accent")
-        return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0))]
+        panel = box((-w / 2, 0.45, -d / 2), (w / 2, h, -d / 2 + 0.03), "accent", 0.0, "back")
+        return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0), role="shelf")]
     foot = foot_height(style, h, 0.45)
     parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
     count = int(np.clip(round(w / choices.between("columns", 0.42, 0.62)), 2, 6))
@@ -179,11 +185,11 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     for i, kind in enumerate(kinds):
         low_corner, high_corner = (float(xs[i]), y0), (float(xs[i + 1]), y1)
         if i:
-            parts.append(box((xs[i] - 0.01, y0, -d / 2), (xs[i] + 0.01, y1, z)))
+            parts.append(box((xs[i] - 0.01, y0, -d / 2), (xs[i] + 0.01, y1, z), role="side"))
         if kind == "open":
             if y1 - y0 > 0.25:
                 middle = (y0 + y1) / 2
-                parts.append(box((xs[i], middle - 0.01, -d / 2), (xs[i + 1], middle + 0.01, z)))
+                parts.append(box((xs[i], middle - 0.01, -d / 2), (xs[i + 1], middle + 0.01, z), role="shelf"))
             continue
         rows = 2 if kind == "drawer" and y1 - y0 > 0.28 else 1
         parts.append(core((*low_corner, -d / 2), (*high_corner, z)))

@@ -8,12 +8,16 @@ Array = np.ndarray
 
 
 def superellipse(power: float, corners: int = 32) -> Array:
-    """Outline (n, 2) of the unit superellipse, counted from +x towards -z so that lofts along +y face outward."""
+    """Outline (n, 2) of the unit superellipse, counted from +x towards -z so that lofts along +y face outward.
+
+    Its points crowd where it bends: the corners of a rounded table top are round, its sides straight.
+    """
     if np.isinf(power):
         return np.array([[1, -1], [-1, -1], [-1, 1], [1, 1]], float)
     angle = np.arange(corners) * (2 * np.pi / corners)
     points = np.stack([np.cos(angle), -np.sin(angle)], axis=1)
-    return points / (np.abs(points) ** power).sum(1, keepdims=True) ** (1 / power)
+    points[np.abs(points) < 1e-12] = 0.0
+    return np.sign(points) * np.abs(points) ** (2 / power)
 
 
 def loft(rings: list[Array]) -> tuple[Array, Array]:

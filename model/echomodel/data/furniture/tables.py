@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.data.furniture.carpentry import Size, base, between_legs, box, pedestal, top, within
+from echomodel.data.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, top, within
 from echomodel.data.furniture.choices import Choices
 from echomodel.data.furniture.fronts import case, front
-from echomodel.data.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.data.furniture.mirrors import mirror_of
+from echomodel.data.furniture.solids import Solid, Turned
 from echomodel.data.furniture.style import Style
 
 
@@ -29,7 +30,7 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     shape, thick = _outline(style, size, choices), max(style.top * 1.1, 0.022)
     parts: list[Solid] = [top(shape, w, d, h, thick, style)]
     if shape == "round":
-        inner = 0.71 if style.legs not in ("splayed", "hairpin") else 0.86
+        inner = within(shape, style) if style.legs not in ("splayed", "hairpin") else 0.86
         if w / d < 1.3 and choices.chance("form", 0.65):
             return parts + pedestal(w, d, h - thick, style)
         kind = None if style.legs not in ("plinth", "bun", "trestle", "sled") else "straight"
@@ -37,7 +38,7 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.legs == "plinth" and choices.chance("form", 0.5):
         panel = max(0.05, 0.06 * w)
         x, z = w / 2 * 0.72, d / 2 * 0.75
-        return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z)) for s in (-1, 1)]
+        return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z), role="leg") for s in (-1, 1)]
     kind = "straight" if style.legs in ("plinth", "bun") else None
     leg = _leg(style, w, h)
     share = within(shape, style)
@@ -46,8 +47,9 @@ def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.legs in ("straight", "tapered", "turned", "bun") and style.contrast < 0.7:
         a = 0.04 + 0.05 * style.contrast
         x, z = fw / 2 - leg * 0.6, fd / 2 - leg * 0.6
-        parts += [box((-x, h - thick - a, s * z - 0.01), (x, h - thick, s * z + 0.01)) for s in (-1, 1)]
-        parts += [box((s * x - 0.01, h - thick - a, -z), (s * x + 0.01, h - thick, z)) for s in (-1, 1)]
+        apron: list[Solid] = [box((-x, h - thick - a, s * z - 0.01), (x, h - thick, s * z + 0.01)) for s in (-1, 1)]
+        apron += [box((s * x - 0.01, h - thick - a, -z), (s * x + 0.01, h - thick, z)) for s in (-1, 1)]
+        parts += of_role("apron", apron)
     return parts
 
 
@@ -58,7 +60,7 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     kind = choices.pick("kind", ["legs", "shelf", "block", "drum", "nested"], [0.36, 0.24, 0.2, 0.12, 0.08])
     if kind == "drum" and shape == "round":
         drum = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
-        return [top(shape, w, d, h, thick, style), drum]
+        return [top(shape, w, d, h, thick, style), *of_role("leg", [drum])]
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
         body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
@@ -73,7 +75,7 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             d * 0.9,
         )
         return [
-            top(shape, w, d, h, thick, style),
+            top("square", w, d, h, thick, style),
             *body,
             *drawers,
             *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
@@ -85,16 +87,20 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             high=(w * 0.22, w * 0.22),
             height=thick,
             material="accent",
+            role="top",
         )
         post = Turned(
-            centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62
-        )
+            centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62,
+            role="leg",
+        )  # fmt: skip
         main = Turned(
-            centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2), height=thick
-        )
+            centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2), height=thick,
+            role="top",
+        )  # fmt: skip
         stem = Turned(
-            centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08), height=h - thick
-        )
+            centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08), height=h - thick,
+            role="leg",
+        )  # fmt: skip
         return [main, stem, low_top, post]
     parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
@@ -125,16 +131,16 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             height=h / 2 - thick,
             material="accent",
         )
-        return [*parts, lower, upper]
+        return [*parts, *of_role("leg", [lower, upper])]
     if kind == "cube" and shape != "round":
         t = 0.02
         return [
-            *parts,
-            box((-w / 2, 0, -d / 2), (-w / 2 + t, h - thick, d / 2)),
-            box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2)),
-            box((-w / 2, 0, -d / 2), (w / 2, t * 1.5, d / 2)),
-            box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + t, d / 2)),
-            box((-w / 2, 0, -d / 2), (w / 2, h - thick, -d / 2 + t)),
+            top("square", w, d, h, thick, style),
+            box((-w / 2, 0, -d / 2), (-w / 2 + t, h - thick, d / 2), role="side"),
+            box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2), role="side"),
+            box((-w / 2, 0, -d / 2), (w / 2, t * 1.5, d / 2), role="bottom"),
+            box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + t, d / 2), role="shelf"),
+            box((-w / 2, 0, -d / 2), (w / 2, h - thick, -d / 2 + t), role="back"),
         ]
     if kind == "c" and shape != "round":
         t = 0.014
@@ -145,7 +151,7 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             box((-w / 2 * 0.9 - t, 0, s * d * 0.4 - t), (-w / 2 * 0.9 + t, h, s * d * 0.4 + t), "metal")
             for s in (-1, 1)
         ]
-        return [*parts, *bars, *posts]
+        return [top("square", w, d, h, thick, style), *of_role("leg", [*bars, *posts])]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
     leg = _leg(style, w * 0.6, h) * 0.8
@@ -166,13 +172,16 @@ def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "drum":
         return [
             *parts,
-            Turned(low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent"),
+            Turned(
+                low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent", role="leg"
+            ),
         ]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
-    parts += base(style, w * 0.74, d * 0.74, h - thick, 0.035 * style.bulk, legs)
+    inner = 0.8 if legs == "splayed" else within("round", style)
+    parts += base(style, w * inner, d * inner, h - thick, 0.035 * style.bulk, legs)
     if choices.chance("extra", 0.5):
         leg = 0.035 * style.bulk
-        parts.append(between_legs("round", w * 0.74, d * 0.74, h - thick, h * 0.4, thick, leg, style, legs))
+        parts.append(between_legs("round", w * inner, d * inner, h - thick, h * 0.4, thick, leg, style, legs))
     return parts
 
 
@@ -185,7 +194,7 @@ def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     share = within(shape, style)
     parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
-    parts.append(top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent"))
+    parts += of_role("shelf", [top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent")])
     if choices.chance("extra", 0.6):
         edge, rear = w * share * 0.47, d * share * 0.47
         drawer = (-edge, h * 0.68), (edge, h - t)
@@ -208,7 +217,7 @@ def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts += case((*low, -d * 0.42), (*high, d * 0.42))
         parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style, d * 0.8)
     if choices.chance("extra", 0.5):
-        parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent"))
+        parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent", 0.0, "shelf"))
     return parts
 
 
@@ -235,13 +244,16 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
             rows = choices.whole("rows", 2, 4)
             parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
             parts += [
-                box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02))
+                box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02), role="leg")
                 for x in (x0 + 0.04, x1 - 0.04)
                 for z in (-d * 0.42, d * 0.42)
             ]
         if kind == "left":
             x = -sides[0] * w * 0.47
-            parts += [box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025)) for s in (-1, 1)]
+            parts += [
+                box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025), role="leg")
+                for s in (-1, 1)
+            ]
     else:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
@@ -258,9 +270,9 @@ def _hutch(w: float, low: float, high: float, d: float, choices: Choices) -> lis
     t, z0, z1 = 0.02, -d / 2, -d / 2 + min(0.28, d * 0.45)
     columns, rows = choices.whole("second", 1, 4), int(np.clip(round((high - low) / 0.38), 1, 6))
     xs, ys = np.linspace(-w / 2 + t, w / 2 - t, columns + 1), np.linspace(low, high - t, rows + 1)
-    parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1)) for x in xs]
-    parts += [box((-w / 2, y, z0), (w / 2, y + t, z1)) for y in ys[1:]]
-    parts.append(box((-w / 2 + t, low, z0), (w / 2 - t, high, z0 + 0.012), "accent"))
+    parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1), role="side") for x in xs]
+    parts += [box((-w / 2, y, z0), (w / 2, y + t, z1), role="shelf") for y in ys[1:]]
+    parts.append(box((-w / 2 + t, low, z0), (w / 2 - t, high, z0 + 0.012), "accent", 0.0, "back"))
     return parts
 
 
@@ -287,48 +299,7 @@ def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             parts += case((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45))
             rows = choices.whole("rows", 2, 4)
             parts += front((x0, 0.06), (x1, y1), d * 0.45, rows, 1, "drawer", style, d * 0.86)
-            parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent"))
+            parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent", 0.0, "leg"))
     if mirror:
-        parts += _mirror(w, table, h, d, style, choices)
+        parts += of_role("mirror", mirror_of(w, table, h, d, style, choices))
     return parts
-
-
-def _mirror(w: float, low: float, high: float, d: float, style: Style, choices: Choices) -> list[Solid]:
-    """A mirror at the rear of the table."""
-    tall, z = high - low, -d / 2 + 0.03
-    kind = choices.pick("form", ["round", "panel", "wings"])
-    foot = box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02))
-    if kind == "round":
-        half = min(w * 0.4, tall * 0.46)
-        face = Turned(
-            centre=np.array([0, high - tall * 0.46, z - 0.015]),
-            low=(half, tall * 0.46),
-            high=(half, tall * 0.46),
-            height=0.03,
-            turn=rotation(x=np.pi / 2),
-            material="mirror",
-        )
-        return [foot, face]
-    half = w * choices.between("spread", 0.28, 0.42)
-    radius = 0.012
-    panel = Block(
-        centre=np.array([0, (low + high) / 2, z]),
-        half=np.array([half, tall / 2, 0.015]),
-        radius=radius,
-        material="mirror",
-    )
-    if kind == "panel":
-        return [foot, panel]
-    wing = min(0.22, w / 2 - half * 0.6)
-    half *= 0.6
-    wings = [
-        Block(
-            centre=np.array([s * (half + wing * 0.47), low + tall * 0.46, z + wing * 0.16]),
-            half=np.array([wing / 2, tall * 0.46, 0.012]),
-            turn=rotation(y=-s * 0.35),
-            material="mirror",
-        )
-        for s in (-1, 1)
-    ]
-    knob = Ball(centre=np.array([0, high - 0.02, z]), half=np.full(3, 0.02))
-    return [box((-half, low, z - 0.012), (half, high - 0.02, z + 0.012), "mirror"), *wings, knob]
