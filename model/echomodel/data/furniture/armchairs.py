@@ -78,8 +78,8 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
     arm = w * (0.13 + 0.06 * style.softness)
     y_arm = seat + (h - seat) * (0.2 + 0.5 * style.arm_height)
-    low, high = (-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02)
-    parts.append(box(low, high, "fabric", 0.02, "base"))
+    one, other = (-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02)
+    parts.append(box(one, other, "fabric", 0.02, "base"))
     parts += upholstered_arms(w, foot, y_arm, d, arm, style)
     back = leaning(
         (-w / 2 + arm * 0.5, foot + 0.05, -d / 2),
