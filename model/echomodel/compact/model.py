@@ -8,11 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
+from torch.overrides import TorchFunctionMode
 
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.autoencoder import Autoencoder
@@ -91,6 +93,17 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half:
         save_file(tensors, beside, metadata=metadata)
 
 
+class _Undrawn(TorchFunctionMode):
+    """Leaves initial values undrawn: on the meta device torch would load its compiler for them, for seconds."""
+
+    def __torch_function__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        given = kwargs or {}
+        if func is torch.randn:
+            return torch.empty(*args)
+        drawn = func in (nn.init.normal_, torch.Tensor.mul, torch.Tensor.__mul__)
+        return (args[0] if args else given["tensor"]) if drawn else func(*args, **given)
+
+
 def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:
     """Build the model that the files hold together and return it with a short hash of their contents.
 
@@ -124,7 +137,7 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
         statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
         check_numbers(to_dict(config), len(tensors))
-        with torch.device("meta"):  # sizes that a bent configuration asks for cost nothing there
+        with torch.device("meta"), _Undrawn():  # sizes that a bent configuration asks for cost nothing there
             _check_fit(CompactModel(config, statistics, parts).state_dict(), tensors, where)
         model = CompactModel(config, statistics, parts)
     except WeightsError:
