@@ -104,7 +104,7 @@ def read_library(file: str | os.PathLike[str]) -> Library:
 def _read(file: Path, changed: int) -> Library:
     pa = arrow()
     try:
-        size = _unpacked(pa.parquet.read_metadata(file))
+        size = unpacked(pa.parquet.read_metadata(file))
         if size > LARGEST:
             raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
         table = pa.parquet.read_table(file)
@@ -148,7 +148,7 @@ def _fault(record: AssetRecord) -> str:
     return ""
 
 
-def _unpacked(metadata: Any) -> int:
+def unpacked(metadata: Any) -> int:
     """Bytes of all columns of a Parquet file as they are held in memory, as its own tables say."""
     groups = (metadata.row_group(number) for number in range(metadata.num_row_groups))
     return sum(max(group.total_byte_size, 8 * group.num_rows * group.num_columns) for group in groups)

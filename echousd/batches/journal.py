@@ -58,6 +58,8 @@ def read_journals(folder: Path) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder / STATE).glob(f"shard_*/{JOURNAL}")):
         check_links(folder, path, f"{folder}: the run has {path.relative_to(folder)}")
+        if not path.is_file():
+            raise ValueError(f"{path}: not a regular file, allowed: a journal")
         for row in _rows(path):
             before = found.get(row["room"])
             if before is None or before["when"] <= row["when"]:
@@ -73,7 +75,8 @@ def room_digest(folder: Path) -> str:
     for path in sorted(p for p in folder.rglob("*") if p.is_file()):
         name = path.relative_to(folder).as_posix()
         if name != LOCK and not name.startswith(f"{STAGING}/"):
-            total.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+            with path.open("rb") as file:
+                total.update(f"{name}\0{hashlib.file_digest(file, 'sha256').hexdigest()}\n".encode())
     return total.hexdigest()
 
 
@@ -108,7 +111,7 @@ def _rows(path: Path) -> Iterator[dict[str, Any]]:
         for line in file:
             try:
                 row = json.loads(line)
-            except ValueError:
+            except (ValueError, RecursionError):
                 continue  # torn by a kill or a power cut
             if is_row(row):
                 yield row

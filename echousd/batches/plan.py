@@ -150,11 +150,14 @@ def load_plan(folder: Path) -> Plan:
         raise ValueError(f"{folder}: no run of echousd batch (no {STATE}/{PLAN})")
     try:
         with path.open(encoding="utf-8") as file:
-            head = json.loads(next(file))
+            head = _head(json.loads(next(file)))
             sets = tuple(BatchOptions(**raw) for raw in head.pop("sets"))
             entries = tuple(_entry(json.loads(line), number, len(sets)) for number, line in enumerate(file))
-        with inside(folder, f"{STATE}/{GRAPHS}", f"{folder}: the run").open(encoding="utf-8") as file:
-            graphs = {row["graph"]: row["text"] for row in map(json.loads, file)}
+        texts = inside(folder, f"{STATE}/{GRAPHS}", f"{folder}: the run")
+        if not texts.is_file():
+            raise ValueError(f"no regular file {STATE}/{GRAPHS}")
+        with texts.open(encoding="utf-8") as file:
+            graphs = {str(row["graph"]): str(row["text"]) for row in map(json.loads, file)}
         if head["echousd_batch"] != 1 or head["rooms"] != len(entries):
             raise ValueError("it is not whole")
     except (OSError, StopIteration, KeyError, TypeError, ValueError, RecursionError) as error:
@@ -181,8 +184,18 @@ def _unequal(old: Any, new: Any, where: str = "") -> Iterator[tuple[str, Any, An
         yield where.removeprefix("request."), json.dumps(old), json.dumps(new)
 
 
-def _entry(raw: dict[str, Any], number: int, sets: int) -> Entry:
+def _head(raw: Any) -> dict[str, Any]:
+    """The first line of the plan; raises ValueError for one that is not as we write it."""
+    kinds = {"version": str, "weights": str, "rooms": int, "request": dict, "sets": list}
+    if not isinstance(raw, dict) or any(type(raw.get(key)) is not kind for key, kind in kinds.items()):
+        raise ValueError("line 1 is no head of a plan")
+    return raw
+
+
+def _entry(raw: Any, number: int, sets: int) -> Entry:
     """A line of the plan, which anybody may have sent; raises ValueError for one that is not as we write it."""
+    if not isinstance(raw, dict):
+        raise ValueError(f"line {number + 2} is no room of a plan")
     draw = raw.pop("draw")
     entry = Entry(**raw, draw=tuple(draw) if draw else None)
     if type(entry.number) is not int or entry.number != number:
@@ -190,6 +203,8 @@ def _entry(raw: dict[str, Any], number: int, sets: int) -> Entry:
     texts = (entry.id, entry.origin, entry.graph, entry.error)
     if not all(isinstance(text, str) for text in texts) or not ID.fullmatch(entry.id):
         raise ValueError(f"line {number + 2}: id is {entry.id!r:.80}, allowed: letters, digits and _")
+    if entry.draw and [type(part) for part in entry.draw] != [str, int, int]:
+        raise ValueError(f"line {number + 2}: draw is {entry.draw!r:.80}, allowed: room type, seed, number")
     if type(entry.seed) is not int or type(entry.options) is not int or not 0 <= entry.options < sets:
         raise ValueError(f"line {number + 2}: options is {entry.options!r:.40}, allowed: 0 to {sets - 1}")
     return entry

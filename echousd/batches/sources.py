@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from echousd.assets.table import LARGEST, unpacked
 from echousd.graph import GraphError, SceneGraph
-from echousd.graph.files import STAGE_FORMS, TEXT_FORMS, load_graph
+from echousd.graph.files import MAX_BYTES, STAGE_FORMS, TEXT_FORMS, load_graph
 
 MANY = (".jsonl", ".parquet")
 FORMS = (*TEXT_FORMS, *STAGE_FORMS)
@@ -128,7 +129,9 @@ def _rooms_of(path: Path) -> list[str]:
 def _lines(path: Path) -> Iterator[Found]:
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            for number, line in enumerate(file, 1):
+            for number, line in enumerate(iter(lambda: file.readline(MAX_BYTES + 1), ""), 1):
+                if len(line) > MAX_BYTES:
+                    raise ValueError(f"{path}:{number}: more than {MAX_BYTES} characters, allowed for a scene graph")
                 if line.strip():
                     yield _text(line, f"{path.as_posix()}:{number}", path.stem)
     except OSError as error:
@@ -138,14 +141,19 @@ def _lines(path: Path) -> Iterator[Found]:
 def _rows(path: Path) -> Iterator[Found]:
     try:
         import pyarrow.parquet as parquet
+        from pyarrow import ArrowException
     except ImportError:
         raise ValueError(f"{path}: reading Parquet needs pyarrow (pip install 'echousd[batch]')") from None
     try:
-        table = parquet.read_table(path, columns=["graph"])
-    except (OSError, ValueError, KeyError) as error:
-        raise ValueError(f"{path}: no Parquet file with a column 'graph' ({error})") from None
-    for number, text in enumerate(table.column("graph").to_pylist(), 1):
-        yield _text(text or "", f"{path.as_posix()}:{number}", path.stem)
+        with parquet.ParquetFile(path) as file:
+            size = unpacked(file.metadata)
+            if size > LARGEST:
+                raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
+            texts = file.read(columns=["graph"]).column("graph").to_pylist()
+    except (ArrowException, OSError, ValueError, KeyError) as error:
+        raise ValueError(f"{path}: no Parquet file with a column 'graph' ({str(error).splitlines()[0]:.160})") from None
+    for number, text in enumerate(texts, 1):
+        yield _text(text if isinstance(text, str) else "", f"{path.as_posix()}:{number}", path.stem)
 
 
 def _text(text: str, origin: str, name: str) -> Found:

@@ -1,0 +1,86 @@
+"""Folders of runs and sources that somebody sent: one line that names the file, never a wait or a fault of ours."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+
+import pytest
+
+from echousd.batches.options import BatchRequest
+from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.sources import find_graphs
+
+WRONG = (None, 5, -1, 1e300, "x", "\0", [], {}, [1], {"a": 1}, True)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    request = BatchRequest(sources=[], sample={"bedroom": 2})
+    save_plan(make_plan(request, "0" * 12), folder)
+    place = folder / ".batch/shard_0_of_1"
+    place.mkdir()
+    row = {"room": "bedroom_000000", "when": 1, "state": "done", "root": "bedroom_000000.usda", "bounds": [0.0] * 6,
+           "sha256": "12"}  # fmt: skip
+    (place / "journal.jsonl").write_text(json.dumps(row) + "\n")
+    return folder
+
+
+def mutants(raw):
+    """The data with each of its values replaced, and without it."""
+    yield from WRONG
+    for key in raw if isinstance(raw, dict) else ():
+        yield {name: value for name, value in raw.items() if name != key}
+        yield from ({**raw, key: value} for value in WRONG)
+
+
+@pytest.mark.parametrize("name", ["plan.jsonl", "plan.jsonl:2", "graphs.jsonl", "shard_0_of_1/journal.jsonl"])
+def test_any_value_in_the_files_of_a_run(made, name, tmp_path, echousd_command):
+    file, _, line = name.partition(":")
+    lines = (made / ".batch" / file).read_text().splitlines() or ['{"graph": "a", "text": "{}"}']
+    number = int(line or 1) - 1
+    shutil.copytree(made, tmp_path / "run")
+    for mutant in mutants(json.loads(lines[number])):
+        wrong = [*lines[:number], json.dumps(mutant), *lines[number + 1 :]]
+        (tmp_path / "run/.batch" / file).write_text("\n".join(wrong) + "\n")
+        for command in ("status", "verify"):
+            done = echousd_command("batch", command, tmp_path / "run")
+            assert done.code in (0, 1, 2), (mutant, done.err)
+            assert done.code != 2 or str(tmp_path / "run") in done.err, (mutant, done.err)
+
+
+@pytest.mark.parametrize("name", ["plan.jsonl", "graphs.jsonl", "shard_0_of_1/journal.jsonl"])
+@pytest.mark.parametrize("kind", ["pipe", "deep", "folder"])
+def test_files_of_a_run_that_are_none(made, name, kind, tmp_path, echousd_command):
+    shutil.copytree(made, tmp_path / "run")
+    path = tmp_path / "run/.batch" / name
+    path.unlink()
+    {"pipe": os.mkfifo, "deep": lambda p: p.write_text("[" * 100_000 + "\n"), "folder": os.mkdir}[kind](path)
+    for command in ("status", "verify"):
+        done = echousd_command("batch", command, tmp_path / "run")
+        assert done.code in ((1, 0) if "journal" in name and kind == "deep" else (2,))
+        assert done.code != 2 or str(tmp_path / "run") in done.err
+
+
+def test_tables_of_graphs_are_read_with_doubt(tmp_path, monkeypatch):
+    pyarrow = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as parquet
+
+    def graphs(column):
+        parquet.write_table(pyarrow.table({"graph": column}), tmp_path / "graphs.parquet")
+        return list(find_graphs([str(tmp_path / "graphs.parquet")]))
+
+    for column in ([1, 2], [[1]], [None, "[" * 100_000], pyarrow.array([b"\xff"]).cast(pyarrow.binary())):
+        assert all("graphs.parquet:" in found.error for found in graphs(column))
+    monkeypatch.setattr("echousd.batches.sources.LARGEST", 10)
+    with pytest.raises(ValueError, match="bytes when unpacked, allowed: 10"):
+        graphs(["x" * 100])
+    (tmp_path / "graphs.parquet").write_bytes(b"PAR1 no")
+    with pytest.raises(ValueError, match=r"graphs.parquet: no Parquet file with a column 'graph'"):
+        list(find_graphs([str(tmp_path / "graphs.parquet")]))
+    monkeypatch.setattr("echousd.batches.sources.MAX_BYTES", 100)
+    (tmp_path / "long.jsonl").write_text("[" * 1000)
+    with pytest.raises(ValueError, match=r"long.jsonl:1: more than 100 characters"):
+        list(find_graphs([str(tmp_path / "long.jsonl")]))
