@@ -18,6 +18,7 @@ from echousd.surfaces import DRESSING, Surfaces, read_surfaces
 FOLDER = "looks"
 VARIANTS, MADE = "looks", "made"  # the variant set of the room, and its variant without paint
 RECORD = "echousd_look"  # in customLayerData: which objects a look was painted for
+LONGEST = 64  # characters of a look's name
 UNFIT = "layers/unfit.usda"  # our layer that mutes what of a look fits no longer
 
 
@@ -81,11 +82,18 @@ def read_look(layer: Sdf.Layer, path: str) -> Look | None:
     if not isinstance(objects, dict) or not isinstance(meshes, Vt.StringArray):
         return None
     right = all(isinstance(digest, str) for digest in objects.values()) and Sdf.Path.IsValidIdentifier(name)
-    right = right and all(Sdf.Path.IsValidPathString(place) for place in (*objects, *meshes))
+    right = right and len(name) <= LONGEST and all(map(_is_prim_below, (*objects, *meshes)))
     dressing = record.get("dressing")
     return (
         Look(name, path, dressing if dressing in DRESSING else "none", dict(objects), tuple(meshes)) if right else None
     )
+
+
+def _is_prim_below(place: str) -> bool:
+    """Whether a text is the path of a prim inside a room."""
+    path = Sdf.Path(place) if Sdf.Path.IsValidPathString(place) else Sdf.Path.emptyPath
+    plain = path.IsAbsolutePath() and path.IsPrimPath() and not path.ContainsPrimVariantSelection()
+    return plain and path.pathElementCount > 1
 
 
 def unfitting(looks: Sequence[Look], stage: Usd.Stage) -> dict[str, list[str]]:

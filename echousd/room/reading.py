@@ -25,6 +25,7 @@ from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, component_file
 from echousd.room.stored import asset_from, shelf_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
+from echousd.stage.values import matrix, reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,10 @@ def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
     """Boxes of the objects as the stage places them now."""
     position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath("/Room")
     for name in graph.names:
-        pose, _ = cache.ComputeRelativeTransform(stage.GetPrimAtPath(f"{OBJECTS}/{name}"), room)
+        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
+        with reading(stage):
+            pose, _ = cache.ComputeRelativeTransform(prim, room)
+        matrix(pose, prim)
         front = pose.TransformDir((0, 0, 1))
         position.append(tuple(pose.ExtractTranslation()))
         yaw.append(np.arctan2(front[0], front[2]))

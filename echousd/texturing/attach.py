@@ -86,7 +86,7 @@ def import_look(
         stage = open_stage(room)
         with reading(stage):
             surfaces = read_surfaces(stage, dressing=task.dressing)
-            _compare(task, surfaces, skip)
+            _compare(task, surfaces, skip, folder)
             results = read_results(folder, task)
             for word in skip:
                 results.objects.pop(word, None)
@@ -107,8 +107,8 @@ def import_look(
     return ImportedLook(name, top / layer, painted, unpainted, tuple(skip))
 
 
-def _compare(job: Job, surfaces: Surfaces, skip: tuple[str, ...]) -> None:
-    """Raises ValueError that names every object of the job that the room does not hold as it was."""
+def _compare(job: Job, surfaces: Surfaces, skip: tuple[str, ...], folder: Path) -> None:
+    """Raises ValueError that names every object of the job in `folder` that the room does not hold as it was."""
     names = {thing.name for thing in job.objects}
     unknown = [word for word in skip if word not in names]
     if unknown:
@@ -125,7 +125,8 @@ def _compare(job: Job, surfaces: Surfaces, skip: tuple[str, ...]) -> None:
     told = [f"{', '.join(words)} {what}" for words, what in ((gone, "is gone"), (changed, "has other meshes")) if words]
     if told:
         raise ValueError(
-            f"not the room that the job was made of: {' and '.join(told)}; export again, or leave out with --skip"
+            f"{folder}: not the room that the job was made of: {' and '.join(told)}; export again, or leave out with "
+            "--skip"
         )
 
 

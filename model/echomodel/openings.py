@@ -19,6 +19,7 @@ USUAL = {  # metres, where nobody says otherwise
 }
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
+HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
 TOUCH = 1e-6  # metres: neighbouring openings may share a jamb
 ARC = 9  # points on the arc of a swing
 
@@ -65,6 +66,10 @@ class Opening:
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
                 raise ValueError(f"opening {self.name!r}: {field} is {value!r}, allowed: {least:g} or more, metres")
+            if field in ("height", "sill") and value > HIGHEST:  # the others end with the wall
+                raise ValueError(
+                    f"opening {self.name!r}: {field} is {value!r}, allowed: {least:g} to {HIGHEST:g}, metres"
+                )
             object.__setattr__(self, field, float(value))
         if self.kind != "window" and self.sill:
             raise ValueError(f"opening {self.name!r}: sill is {self.sill:g}, allowed: 0 for a {self.kind}")
