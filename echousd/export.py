@@ -14,6 +14,7 @@ from pxr import Sdf, Usd, UsdUtils
 from echousd.arkit import for_arkit
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.flattening import flat_layer
+from echousd.naming import free_name
 from echousd.packing import Package, Reach, images_beside, without_clock
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
@@ -35,6 +36,7 @@ def export(
     search: Sequence[str | Path] = (),
     layout: int | None = None,
     physics: bool | None = None,
+    pictures: bool = True,
 ) -> Path:
     """Write a room (any stage) as one file.
 
@@ -45,6 +47,8 @@ def export(
         force: replace a file that is in the way.
         physics: keep bodies, colliders, joints and the scene, or none of it; None = in flat USD alone.
         layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
+        pictures: take images along; without them materials have plain colours, for importers that read none (MuJoCo
+            4.0 refuses JPEG).
         search: folders besides the room's own whose layers and images may be taken along.
 
     Raises ValueError for other endings, a file in the way, a stage that does not open, one that names files outside its
@@ -57,6 +61,8 @@ def export(
         raise ValueError(f"{out}: --arkit makes a .usdz, found {out.suffix!r}")
     if physics and out.suffix == ".glb":
         raise ValueError(f"{out}: --physics: a .glb holds none, allowed: .usdz, .usda, .usdc")
+    if not pictures and out.suffix == ".glb":
+        raise ValueError(f"{out}: --no-pictures: a .glb holds its own, allowed: .usdz, .usda, .usdc")
     if out.exists() and not force:
         raise ValueError(f"{out}: exists; choose another file or use --force")
     stage = open_stage(room)
@@ -66,20 +72,22 @@ def export(
         if out.suffix == ".glb":
             content = glb(stage, reach)
         elif out.suffix == ".usdz":
-            content = usdz(stage, Package(reach), arkit=arkit, physics=bool(physics))
+            content = usdz(stage, Package(reach), arkit=arkit, physics=bool(physics), pictures=pictures)
         else:
             package = Package(reach, images_beside(out))
-            layer = flat_layer(stage, package=package, physics=physics is not False)
+            layer = flat_layer(stage, package=package if pictures else None, physics=physics is not False)
             content = layer_bytes(_marked(layer, stage), out.suffix)
             package.write(out.parent)
     write_whole(out, content)
     return out
 
 
-def usdz(stage: Usd.Stage, package: Package, *, arkit: bool = False, physics: bool = False) -> bytes:
+def usdz(
+    stage: Usd.Stage, package: Package, *, arkit: bool = False, physics: bool = False, pictures: bool = True
+) -> bytes:
     """A usdz package of one flat layer and its images."""
     root = package.reach.room
-    layer = _marked(flat_layer(stage, package=package, physics=physics), stage)
+    layer = _marked(flat_layer(stage, package=package if pictures else None, physics=physics), stage)
     if arkit:
         for_arkit(layer)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
@@ -108,6 +116,7 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
 
     scene = trimesh.Scene()
     materials: dict[Paint, Any] = {}
+    taken: set[str] = set()  # a second node of one name would take the first one's place
     for mesh in read_drawables(stage):
         for paint, faces in _own_faces(mesh):
             if paint not in materials:
@@ -115,7 +124,8 @@ def glb(stage: Usd.Stage, reach: Reach) -> bytes:
                     reach.check(paint.texture, f"<{paint.image}>")
                 materials[paint] = _pbr(paint)
             part = _part(mesh, faces, materials[paint])
-            name = f"{mesh.component}_{paint.name}"
+            name = free_name(f"{mesh.component}_{paint.name}", taken)
+            taken.add(name)
             scene.add_geometry(part, node_name=name, geom_name=name, parent_node_name=mesh.component)
         scene.graph.update(frame_from="world", frame_to=mesh.component, matrix=mesh.world)
     if not scene.geometry:
@@ -141,10 +151,11 @@ def _number(entry: tuple[Paint, int]) -> int:
 def _part(mesh: Drawable, faces: np.ndarray, material: Any) -> trimesh.Trimesh:
     import trimesh
 
-    st = np.zeros((len(faces), 3, 2)) if mesh.st is None else mesh.st[faces]
+    textured = material.baseColorTexture is not None  # coordinates that nothing reads are left out
+    st = mesh.st[faces] if textured and mesh.st is not None else np.zeros((len(faces), 3, 2))
     rows = np.concatenate([mesh.triangles[faces], mesh.normals[faces], st], axis=-1).reshape(-1, 8).astype(np.float32)
     unique, index = np.unique(rows, axis=0, return_inverse=True)
-    visual = trimesh.visual.TextureVisuals(uv=unique[:, 6:], material=material)
+    visual = trimesh.visual.TextureVisuals(uv=unique[:, 6:] if textured else None, material=material)
     normals = unique[:, 3:6]
     return trimesh.Trimesh(unique[:, :3], index.reshape(-1, 3), vertex_normals=normals, visual=visual, process=False)
 

@@ -56,15 +56,21 @@ def _is_image(prim: Usd.Prim) -> bool:
 
 
 def _paint_plain(image: Usd.Prim) -> None:
-    """Give the materials that an image without a file coloured its fallback colour instead."""
+    """Give the materials that an image without a file coloured (or roughened) its fallback instead, and take it out."""
     fallback = image.GetAttribute("inputs:fallback")
     color = rgb(fallback.Get() if fallback else None, (0.5, 0.5, 0.5))
     for shader in image.GetParent().GetChildren():
-        colored = shader.GetAttribute("inputs:diffuseColor")
-        if colored and any(c.GetPrimPath() == image.GetPath() for c in colored.GetConnections()):
-            colored.ClearConnections()
-            colored.Set(color)
-    image.SetActive(False)
+        for attribute in shader.GetAttributes():
+            if not any(c.GetPrimPath() == image.GetPath() for c in attribute.GetConnections()):
+                continue
+            attribute.ClearConnections()
+            if attribute.GetTypeName() == Sdf.ValueTypeNames.Color3f:
+                attribute.Set(color)
+            elif attribute.GetTypeName() == Sdf.ValueTypeNames.Float:
+                attribute.Set(color[0])
+            else:
+                shader.RemoveProperty(attribute.GetName())
+    image.GetStage().RemovePrim(image.GetPath())
 
 
 def _bind_directly(stage: Usd.Stage) -> None:

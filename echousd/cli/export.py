@@ -34,6 +34,9 @@ def export(
             "--physics/--no-physics", help="Bodies, colliders and scene, or none of it; default: in flat USD alone."
         ),
     ] = None,
+    pictures: Annotated[
+        bool, typer.Option("--pictures/--no-pictures", help="Images, or plain colours alone (MuJoCo reads no JPEG).")
+    ] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
@@ -41,7 +44,9 @@ def export(
     from echousd.export import export as write
 
     started = time.perf_counter()
-    path = write(room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics)
+    path = write(
+        room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
+    )
     if json:
         say_written([path], started)
     else:

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, Vt
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade, Vt
 
+from echousd.room.finishes.harmonies import HARMONIES
 from echousd.room.geometry import Geometry
 from echousd.room.joints import write_joints
 from echousd.room.looks import look, palette_for
-from echousd.room.materials import write_looks
-from echousd.room.paths import DESCRIPTION, coarse_name, payload_name, piece_name, piece_path
+from echousd.room.materials import write_looks, write_palettes
+from echousd.room.paths import DESCRIPTION, GEO, MTL, coarse_name, payload_name, piece_path
 from echousd.room.physics import write_asset_physics
 from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
 
 CLASSES = "_class_"  # the prim that an asset's class stands below
 
-LOD, LEVELS = "LOD", ("high", "low")  # a variant set and its variants, the default first
+LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
 
 def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
@@ -72,21 +74,25 @@ def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
     return mesh
 
 
-def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any]) -> Sdf.Layer:
-    """`<name>_geo`: a mesh for every part and, as guides, the colliders; what the furniture was made from.
+def geometry_layer(
+    name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any], style: str = ""
+) -> Sdf.Layer:
+    """`<name>_geo`: a mesh for every part and, as guides, the colliders; their looks; what the furniture was made from.
 
     Arguments:
         name: of the asset.
         forms: path of a part below the root -> its surface.
         geometry: whose parts these are, and whose colliders are written.
         data: customLayerData.
+        style: chooses the looks, which a room's materials layer overrides.
     """
     stage = new_stage(name, ".usdc", data)
     root = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
+    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
     if geometry.description:
         root.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
     for body in sorted({part.body for part in geometry.parts if part.body}):
-        UsdGeom.Xform.Define(stage, f"/{name}/{piece_name(name, body)}")
+        UsdGeom.Xform.Define(stage, piece_path(f"/{name}", name, body))
     for path, form in forms.items():
         write_mesh(stage, f"/{name}{path}", form)
     for collider in () if geometry.theirs_collides else geometry.colliders:
@@ -94,13 +100,26 @@ def geometry_layer(name: str, forms: Mapping[str, Surface], geometry: Geometry, 
         form = surface(collider.mesh, {"collider": every})
         guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
         guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    _write_looks(stage, name, style, {part: tuple(form.groups) for part, form in forms.items()})
     return stage.GetRootLayer()
+
+
+def _write_looks(stage: Usd.Stage, name: str, style: str, slots: Mapping[str, Sequence[str]]) -> None:
+    """The looks of an asset that stands for itself, in plain colours, and its variant set `palette`."""
+    bindings = slot_paths(f"/{name}", slots)
+    if not bindings:
+        return
+    used, chosen, scope = sorted(set(bindings.values())), palette_for(style), f"/{name}/{MTL}"
+    plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in HARMONIES}
+    write_looks(stage, plain[chosen], bindings, scope, tinted=True)
+    write_palettes(stage, chosen, plain, f"/{name}", scope)
 
 
 def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any]) -> Sdf.Layer:
     """`<name>_low`: the meshes once more with few faces; arguments as for `geometry_layer`."""
     stage = new_stage(name, ".usdc", data)
     UsdGeom.Xform.Define(stage, f"/{name}")
+    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
     for path, form in forms.items():
         write_mesh(stage, f"/{name}{path}", form)
     return stage.GetRootLayer()
@@ -109,18 +128,14 @@ def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any
 def component_layer(
     name: str,
     category: str,
-    style: str,
     extent: np.ndarray,
-    slots: Mapping[str, Sequence[str]],
     geometry: Geometry,
     data: Mapping[str, Any],
 ) -> Sdf.Layer:
-    """`<name>.usda`: kind, class, labels, extentsHint, looks, physics and the payload `./<name>_geo.usdc`.
+    """`<name>.usda`: kind, class, labels, extentsHint, physics, variants and the payload `./<name>_geo.usdc`.
 
     Arguments:
-        name, category, style: words; the style chooses the looks, which a room's materials layer overrides.
-        extent: (2, 3) float, metres.
-        slots: path of a part below the root -> its material slots.
+        name, category: words. extent: (2, 3) float, metres.
         geometry: whose joints, colliders and mass are told.
         data: customLayerData.
     """
@@ -134,18 +149,32 @@ def component_layer(
     prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
     if geometry.joints:
         write_joints(stage, name, geometry)
-    if geometry.coarse:
-        variants = prim.GetVariantSets().AddVariantSet(LOD)
-        for level in LEVELS:
-            variants.AddVariant(level)
-        variants.SetVariantSelection(LEVELS[0])
-    palette, bindings = palette_for(style), slot_paths(f"/{name}", slots)
-    if bindings:
-        write_looks(stage, {slot: look(palette, slot) for slot in bindings.values()}, bindings, f"/{name}/Looks")
+    if geometry.original is None:
+        _write_levels(stage, name, geometry)
     for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
         UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
     write_asset_physics(stage, name, category, geometry, most_used(geometry))
     return without_stage(stage, lambda layer: _add_arcs(layer, name, geometry))
+
+
+def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry) -> None:
+    """The variant set `LOD`: all faces, few faces where there are such meshes, or the colliders in place of them."""
+    variants = stage.GetPrimAtPath(f"/{name}").GetVariantSets().AddVariantSet(LOD)
+    for level in (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY):
+        variants.AddVariant(level)
+    variants.SetVariantSelection(PROXY)
+    with variants.GetVariantEditContext():
+        for part in geometry.parts:
+            mesh = stage.OverridePrim(piece_path(f"/{name}", name, part.name, part.body))
+            UsdGeom.Imageable(mesh).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+        for collider in geometry.colliders:
+            guide = stage.OverridePrim(piece_path(f"/{name}", name, collider.name, collider.body))
+            UsdGeom.Imageable(guide).CreatePurposeAttr(UsdGeom.Tokens.default_)
+            UsdShade.MaterialBindingAPI.Apply(guide)
+            guide.CreateRelationship("material:binding", False).SetTargets(
+                [Sdf.Path(f"/{name}/{MTL}/{most_used(geometry)[0]}")]
+            )
+    variants.SetVariantSelection(HIGH)
 
 
 def most_used(geometry: Geometry) -> list[str]:
@@ -180,7 +209,7 @@ def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
         return
     if geometry.coarse:
         # a payload inside a variant is stronger than the one beside it, so that its meshes win
-        variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LEVELS[1]].primSpec
+        variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LOW].primSpec
         variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))
     payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
     layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)

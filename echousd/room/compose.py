@@ -270,8 +270,8 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
     extents = np.stack([form.extent for form in forms.values()])
     extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
     data = _asset_data(room, name, geometry)
-    payload = assets.geometry_layer(name, forms, geometry, data)
-    layer = assets.component_layer(name, category, style, extent, slots, geometry, data)
+    payload = assets.geometry_layer(name, forms, geometry, data, style)
+    layer = assets.component_layer(name, category, extent, geometry, data)
     coarse = {
         piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
         for part in geometry.coarse

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade
 
 from echousd.room.finishes import baking
 from echousd.room.looks import Look
@@ -47,6 +47,8 @@ def define_material(
         tinted: leave colours to `tint_material`, which a variant calls.
     """
     material = UsdShade.Material.Define(stage, path)
+    slot = path.rpartition("/")[2].rpartition("_")[2]
+    UsdSemantics.LabelsAPI.Apply(material.GetPrim(), "material").CreateLabelsAttr([slot])
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
     images = _images(look, harmony) if harmony else {}
@@ -135,19 +137,22 @@ def write_looks(
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(UsdShade.Material(stage.GetPrimAtPath(f"{scope}/{name}")))
 
 
-def write_palettes(stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[str, Look]]) -> None:
-    """The variant set `palette` on `/Room`: what each harmony makes of the materials.
+def write_palettes(
+    stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[str, Look]], root: str = "/Room", scope: str = LOOKS
+) -> None:
+    """The variant set `palette` on a room or an asset: what each harmony makes of the materials.
 
     Arguments:
         stage: of the materials' layer, whose materials are defined and have no colours yet.
         chosen: the harmony that the images are in.
         looks: harmony -> material name -> look.
+        root: path of the prim that gets the set. scope: of the materials.
     """
-    variants = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("palette")
+    variants = stage.GetPrimAtPath(root).GetVariantSets().AddVariantSet("palette")
     for harmony, table in looks.items():
         variants.AddVariant(harmony)
         variants.SetVariantSelection(harmony)
         with variants.GetVariantEditContext():
             for name, look in sorted(table.items()):  # bytes must not show the order of a set
-                tint_material(stage, f"{LOOKS}/{name}", looks[chosen][name], look)
+                tint_material(stage, f"{scope}/{name}", looks[chosen][name], look)
     variants.SetVariantSelection(chosen)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
+GEO, MTL = "geo", "mtl"  # scopes of an asset: what is seen and what collides, and what it is made of
 DESCRIPTION = "echo:description"  # attribute of an asset's root: what the furniture branch said of it
 
 
@@ -18,10 +19,9 @@ def piece_name(asset: str, piece: str) -> str:
 
 
 def piece_path(root: str, asset: str, piece: str, body: str = "") -> str:
-    """Path of the prim of a part or collider below the root of its asset, or below the body that it moves with."""
-    return (
-        f"{root}/{piece_name(asset, body)}/{piece_name(asset, piece)}" if body else f"{root}/{piece_name(asset, piece)}"
-    )
+    """Path of the prim of a part or collider in the scope `geo` of its asset, or below the body that it moves with."""
+    above = f"{root}/{GEO}/{piece_name(asset, body)}" if body else f"{root}/{GEO}"
+    return f"{above}/{piece_name(asset, piece)}"
 
 
 def piece_of(asset: str, prim: str) -> str | None:

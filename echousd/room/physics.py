@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from pxr import Gf, Usd, UsdPhysics, UsdShade
+from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
 from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
@@ -12,7 +12,7 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.room.geometry import Geometry, Mass
 from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
 from echousd.room.masses import mass_of, write_mass
-from echousd.room.paths import SHELL, piece_path
+from echousd.room.paths import MTL, SHELL, piece_path
 
 GRAVITY = 9.81  # m/s²
 SCENE = "/Room/PhysicsScene"
@@ -51,7 +51,8 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
     mass = mass_of(geometry, category)
     volume = sum(max(float(collider.mesh.convex_hull.volume), 1e-6) for collider in geometry.colliders)
     slot = next(iter(slots), "wood")
-    bind_contact(stage, root, f"{root}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
+    UsdGeom.Scope.Define(stage, f"{root}/{MTL}")
+    bind_contact(stage, root, f"{root}/{MTL}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)
     theirs = geometry.original is not None and geometry.original.bodies
     if movable(category) and not theirs:
         _make_body(stage.GetPrimAtPath(root), mass, articulated=bool(geometry.joints))
@@ -82,6 +83,7 @@ def bind_contact(
         contact: static friction, dynamic friction, restitution. density: kg/m³.
     """
     made = UsdShade.Material.Define(stage, material)
+    UsdSemantics.LabelsAPI.Apply(made.GetPrim(), "material").CreateLabelsAttr(["contact"])
     api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
     api.CreateStaticFrictionAttr(contact[0])
     api.CreateDynamicFrictionAttr(contact[1])

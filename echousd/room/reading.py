@@ -21,7 +21,7 @@ from echousd.room.joints import read_joints
 from echousd.room.manifest import find_manifest
 from echousd.room.masses import read_mass
 from echousd.room.originals.reading import read_original
-from echousd.room.paths import DESCRIPTION, OBJECTS, asset_files, component_file, piece_of
+from echousd.room.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_of
 from echousd.room.stored import asset_from, shelf_of
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
@@ -158,7 +158,8 @@ def _description(root: Usd.Prim) -> tuple[float, ...]:
 
 def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:
     """Meshes of ours below an object's root, their names, and the body that they stand below, empty = the root."""
-    for prim in root.GetChildren():
+    geo = root.GetChild(GEO)
+    for prim in geo.GetChildren() if geo else ():
         name = piece_of(asset, prim.GetName())
         if name is None:
             continue

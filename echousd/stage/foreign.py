@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Gf, Sdf, Tf, Usd, UsdGeom
+from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import UnknownWord, vocabulary
@@ -158,6 +158,9 @@ def _read(stage: Usd.Stage, *, names: bool) -> _Found:
     obstacles: Counter[str] = Counter()
     prims = iter(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()))
     for prim in prims:
+        if prim.IsA(UsdShade.Material):
+            prims.PruneChildren()
+            continue
         words = list(labels(prim))
         found.words.extend((*words, prim.GetName()))
         category, told = next(filter(None, map(known_category, words)), None), {}

@@ -9,14 +9,20 @@ from pathlib import Path
 
 PYTHON_CLIENTS = {
     "blender": ("bpy==5.0.1",),
+    "blender42": ("bpy==4.2.0", "numpy<2"),
     "mujoco": ("mujoco-usd==4.0.0",),
+    "newton": ("newton==1.8.0", "warp-lang==1.19.0", "usd-core==26.11", "scipy", "trimesh", "mujoco", "mujoco-warp"),
+    "omni": ("omniverse-asset-validator==1.18.0", "usd-core==26.11"),
+    "simready": ("simready-validate==2026.8.0", "simready-foundation-tier-core==2026.8.0"),
+    "tinyusdz": ("tinyusdz==0.9.4", "numpy"),
+    "usd2403": ("usd-core==24.3",),
     "nvidia": ("usd-validation-nvidia==1.22.0", "usd-core==26.11", "numpy>=2"),
     "usd2411": ("usd-core==24.11",),
     "usd2551": ("usd-core==25.5.1",),
     "ray": ("ray==2.60.0",),
 }
 WITH_OURS = ("ray",)  # clients that see our own packages, too
-THREE = "three@0.187.0"
+NODE = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10")
 
 
 def cache() -> Path:
@@ -42,11 +48,14 @@ def python_of(client: str) -> Path:
 
 
 def three() -> Path:
-    """The folder whose `node_modules` holds three.js, installed with npm at first; raises CalledProcessError."""
+    """The folder whose `node_modules` holds three.js and Khronos' validator, installed at first with npm.
+
+    Raises CalledProcessError.
+    """
     folder = cache() / "three"
-    if not (folder / "node_modules" / "three").is_dir():
+    if not all((folder / "node_modules" / name.partition("@")[0]).is_dir() for name in NODE):
         folder.mkdir(parents=True, exist_ok=True)
-        install = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), THREE]
+        install = ["npm", "install", "--no-audit", "--no-fund", "--prefix", str(folder), *NODE]
         subprocess.run(install, check=True, capture_output=True)
     return folder
 

@@ -55,4 +55,4 @@ def test_use_meshes(monkeypatch, tmp_path, capsys):
     assert "closed: True" in capsys.readouterr().out
     stage = Usd.Stage.Open(str(tmp_path / "room/mine.usda"))
     assert stage.GetPrimAtPath("/Room/Ball")
-    assert stage.GetPrimAtPath("/Room/Objects/sofa/sofa_mesh")
+    assert stage.GetPrimAtPath("/Room/Objects/sofa/geo/sofa_mesh")

@@ -72,6 +72,9 @@ def cleared(
     scene = scene_of(graph, boxes, geometry, floor, walls=walls)
     holds = frozenset(_unbroken(graph, boxes))
     moves = np.zeros((len(graph.nodes), 2))
+    for one in range(len(graph.nodes)):
+        if scene.hangs_over(one, moves):
+            moves = _onto_top(scene, graph, boxes, moves, one, holds)
     stuck: set[tuple[int, int]] = set()
     for _ in range(ROUNDS * max(len(graph.nodes), 1)):
         hits = [(pair, deep) for pair, deep in scene.overlaps(moves, DEEP) if pair not in stuck]
@@ -93,6 +96,20 @@ def cleared(
     return Cleared(
         rounded_boxes(graph, _at(boxes, moves)), left, {names[i]: float(far[i]) for i in np.flatnonzero(far)}
     )
+
+
+def _onto_top(
+    scene: Scene, graph: SceneGraph, boxes: Boxes, moves: np.ndarray, one: int, holds: frozenset[int]
+) -> np.ndarray:
+    """The moves with a thing, and what stands on it, moved to where its carrier is as high as its box; as they are
+    where there is no such place, or where a relation would be broken."""
+    group = scene.carried(one)
+    for way in _ways(scene.onto(group, moves, GAP), scene.heading[one]):
+        trial = moves.copy()
+        trial[group] += way
+        if not holds - _unbroken(graph, _at(boxes, trial)):
+            return trial
+    return moves
 
 
 def _at(boxes: Boxes, moves: np.ndarray) -> Boxes:

@@ -17,7 +17,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
 from echousd.repair.problem import carriers
 from echousd.repair.repair import DEFAULT_HEIGHT
-from echousd.room.clearing.nofit import Solids, depth, forbidden_moves
+from echousd.room.clearing.nofit import FLUSH, Solids, depth, forbidden_moves
 from echousd.room.geometry import Geometry
 from echousd.room.surface import connected_pieces
 from echousd.room.walls import ShellPart
@@ -37,6 +37,7 @@ class Scene:
         fixed: (n,) bool, what must not move. carrier: (n,) int, as `Problem.carrier`.
         heading: (n,) float, yaw in radians. seat: (n,) bool. bulk: (n,) float, square root of the footprint, metres.
         outline: n polygons, footprints. floor: the floor, a little wider.
+        level: n polygons, where the top of each is: a desk with a shelf behind has it there alone.
         bounds: (s, 2, 3) float, boxes of everything.
         known: pair -> forbidden moves of its first against its second from where both stood at first.
     """
@@ -48,6 +49,7 @@ class Scene:
     seat: np.ndarray
     bulk: np.ndarray
     outline: Sequence[shapely.Polygon]
+    level: Sequence[BaseGeometry]
     floor: shapely.Polygon
     bounds: np.ndarray
     known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
@@ -119,6 +121,27 @@ class Scene:
         carrier = int(self.carrier[one])
         return translate(self.outline[carrier], *moves[carrier]).buffer(EDGE, join_style="mitre")
 
+    def hangs_over(self, one: int, moves: np.ndarray) -> bool:
+        """Whether the middle of a thing is above no level part of what it should stand on."""
+        carrier = int(self.carrier[one])
+        if carrier < 0 or self.fixed[one]:
+            return False
+        level = translate(self.level[carrier], *moves[carrier])
+        return not level.is_empty and not level.buffer(EDGE).contains(shapely.Point(self._corners(one, moves).mean(0)))
+
+    def onto(self, group: Sequence[int], moves: np.ndarray, gap: float) -> BaseGeometry:
+        """Further moves of a group at which its first thing stands on its carrier's level top, whole if possible."""
+        one = group[0]
+        level = translate(self.level[int(self.carrier[one])], *moves[int(self.carrier[one])]).buffer(EDGE)
+        corners, space = self._corners(one, moves), self.space(group, moves, gap)
+        for points in (corners, corners.mean(0, keepdims=True)):
+            found = space
+            for corner in points:
+                found = found.intersection(translate(level, *-corner))
+            if not found.is_empty:
+                break
+        return found
+
 
 def scene_of(
     graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
@@ -147,6 +170,7 @@ def scene_of(
         np.array([kind.role == "seat" for kind in kinds]),
         np.sqrt(size[:, 0] * size[:, 2]),
         [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
+        [_level(pieces) for pieces in solids],
         shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
         np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
     )
@@ -159,6 +183,13 @@ def shell_solids(parts: Sequence[ShellPart]) -> Iterator[Solids]:
             for piece in filled.pieces:
                 if piece.solid:
                     yield _boards(piece.mesh)
+
+
+def _level(solids: Solids) -> BaseGeometry:
+    """What lies at the height of a thing's top, in plan."""
+    top = max(float(solid[:, 1].max()) for solid in solids)
+    near = [solid[solid[:, 1] > top - FLUSH][:, [0, 2]] for solid in solids]
+    return shapely.union_all([shapely.convex_hull(shapely.multipoints(points)) for points in near if len(points) > 2])
 
 
 def _boards(mesh: trimesh.Trimesh) -> Solids:

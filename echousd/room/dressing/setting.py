@@ -168,9 +168,13 @@ def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polyg
 
 
 def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
-    """What an object covers in plan between two heights (the hull of it), metres."""
-    mesh = thing.geometry.mesh
-    corners = thing.to_room(mesh.vertices)[mesh.faces]
+    """What an object covers in plan between two heights: the hull of its mesh there, and its colliders; metres."""
+    pieces = [thing.geometry.mesh, *(collider.mesh for collider in thing.geometry.colliders)]
+    return shapely.union_all([_section(thing.to_room(mesh.vertices)[mesh.faces], low, high) for mesh in pieces])
+
+
+def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
+    """The hull in plan of triangles (n, 3, 3) between two heights."""
     y = corners[..., 1]
     corners = corners[(y.max(1) > low) & (y.min(1) < high)]
     points = corners.reshape(-1, 3)

@@ -29,7 +29,7 @@ def files(name: str, category: str, geometry: Geometry, data: Mapping[str, Any],
     original = geometry.original
     assert original is not None
     extent = np.asarray(geometry.mesh.bounds)
-    component = component_layer(name, category, "", extent, {}, geometry, data)
+    component = component_layer(name, category, extent, geometry, data)
     place(component, name, original, reference(name, original, folder))
     found = {component_file(name): layer_bytes(component, ".usda")}
     if not original.colliders:

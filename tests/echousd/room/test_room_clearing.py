@@ -100,6 +100,18 @@ def test_what_stands_on_a_piece_goes_with_it():
     assert found.boxes.position[2, 0] == pytest.approx(1.051, abs=1e-3)
 
 
+def test_a_lamp_stands_where_its_desk_is_as_high_as_its_box():
+    desk = piece(board((1.6, 0.05, 0.8), (0, 0.7, 0)), board((1.6, 1.2, 0.3), (0, 0, -0.25)))  # with a shelf behind
+    lamp = piece(board((0.2, 0.4, 0.2), (0, 0, 0)))
+    told = [Relation("lamp", "standing_on", "desk")]
+    for z, there in ((0.15, -0.198), (-0.22, -0.22)):
+        lamps = ("lamp", "table_lamp", lamp, (0.3, 1.2, z), 0.0, False)
+        graph, boxes, geometry = room(("desk", "desk", desk, (0, 0, 0), 0.0, False), lamps, relations=told)
+        found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+        assert found.boxes.position[1].tolist() == pytest.approx([0.3, 1.2, there], abs=2e-3)
+        assert verdicts_of(graph, found.boxes) == ["kept"]
+
+
 def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
     block = piece(board((1.0, 1.0, 1.0), (0, 0, 0)))
     small = piece(board((0.4, 0.5, 0.4), (0, 0, 0)))

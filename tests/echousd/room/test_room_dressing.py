@@ -76,7 +76,7 @@ def test_every_thing_is_a_proper_prim(root):
         if not words[word].fixed:
             assert prim.HasAPI(UsdPhysics.RigidBodyAPI)
             assert UsdPhysics.MassAPI(prim).GetMassAttr().Get() > 0
-            assert any(child.HasAPI(UsdPhysics.CollisionAPI) for child in prim.GetChildren())
+            assert any(below.HasAPI(UsdPhysics.CollisionAPI) for below in Usd.PrimRange(prim))
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     errors = UsdValidation.ValidationContext(validators).Validate(stage)
     assert [error.GetMessage() for error in errors] == []

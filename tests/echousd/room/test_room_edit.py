@@ -168,7 +168,7 @@ def test_owner_of_a_shared_asset_may_go(root):
     assert room.assets["nightstand_right"] == "nightstand"
     stage = Usd.Stage.Open(str(root))
     stage.Reload()
-    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_mesh")
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/geo/nightstand_mesh")
     assert not stage.GetPrimAtPath("/Room/Objects/nightstand_left")
     again = graph.add_node("nightstand", "wardrobe")
     assert edit(root, again, model=StandIn()).assets["nightstand"] == "nightstand_2"

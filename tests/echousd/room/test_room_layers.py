@@ -75,15 +75,15 @@ def test_kinds_payloads_and_hints(stage):
         hint = UsdGeom.ModelAPI(stage.GetPrimAtPath(path)).GetExtentsHint()
         assert len(hint) == 2
     unloaded = Usd.Stage.Open(stage.GetRootLayer(), Usd.Stage.LoadNone)
-    assert not unloaded.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    assert not unloaded.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
     unloaded.Load("/Room/Objects/bed")
-    assert unloaded.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    assert unloaded.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
 
 
 def test_style_group_shares_one_asset(stage, room):
     assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
     assert room.meshes["nightstand_right"] is room.meshes["nightstand_left"]
-    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/nightstand_mesh")
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/geo/nightstand_mesh")
 
 
 def test_meshes_have_a_transform_of_their_own(stage):
@@ -137,24 +137,53 @@ def test_meshes_have_normals_uvs_and_materials(stage):
 def test_asset_opened_alone_has_looks_of_its_own(root):
     stage = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
     for group in ("wood", "linen", "blanket"):
-        subset = stage.GetPrimAtPath(f"/bed/bed_mesh/{group}")
+        subset = stage.GetPrimAtPath(f"/bed/geo/bed_mesh/{group}")
         material = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()[0]
-        assert material.GetPath() == f"/bed/Looks/{group}"
+        assert material.GetPath() == f"/bed/mtl/{group}"
+        assert list(material.GetPrim().GetAttribute("semantics:labels:material").Get()) == [group]
+
+
+def test_asset_is_what_studios_expect(root):
+    file = str(root.parent / "assets/bed/bed.usda")
+    bare = Usd.Stage.Open(file, Usd.Stage.LoadNone)
+    behind = [prim for prim in bare.TraverseAll() if prim.IsA(UsdGeom.Mesh) or prim.GetName() == "wood"]
+    assert behind == []  # geometry and materials are behind the payload
+    stage = Usd.Stage.Open(file)
+    bed = stage.GetPrimAtPath("/bed")
+    assert [str(prim.GetTypeName()) for prim in (bed.GetChild("geo"), bed.GetChild("mtl"))] == ["Scope", "Scope"]
+    assert bed.GetInherits().GetAllDirectInherits() == ["/_class_/bed"]
+    assert bed.GetVariantSet("LOD").GetVariantNames() == ["high", "proxy"]
+    palettes = bed.GetVariantSet("palette")
+    color = stage.GetAttributeAtPath("/bed/mtl/wood/surface.inputs:diffuseColor")
+    seen = set()
+    for name in palettes.GetVariantNames():
+        palettes.SetVariantSelection(name)
+        seen.add(tuple(color.Get()))
+    assert len(seen) >= 8
+    # the proxy: colliders are seen in place of the meshes, with a material
+    bed.GetVariantSet("LOD").SetVariantSelection("proxy")
+    shown = [
+        prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)
+        and UsdGeom.Imageable(prim).ComputeVisibility() != "invisible"
+        and UsdGeom.Imageable(prim).ComputePurpose() == "default"
+    ]  # fmt: skip
+    assert [prim.GetName() for prim in shown] == ["bed_collider"]
+    assert UsdShade.MaterialBindingAPI(shown[0]).ComputeBoundMaterial()[0]
 
 
 def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
     def bound(path):
         return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
 
-    left = bound("/Room/Objects/nightstand_left/nightstand_mesh/wood")
-    assert left == bound("/Room/Objects/nightstand_right/nightstand_mesh/wood") == "set_nightstand_left_wood"
-    assert bound("/Room/Objects/wardrobe/wardrobe_mesh/wood") == "room_wood"
+    left = bound("/Room/Objects/nightstand_left/geo/nightstand_mesh/wood")
+    assert left == bound("/Room/Objects/nightstand_right/geo/nightstand_mesh/wood") == "set_nightstand_left_wood"
+    assert bound("/Room/Objects/wardrobe/geo/wardrobe_mesh/wood") == "room_wood"
 
 
 def test_semantics(stage):
     labels = {}
     for prim in stage.Traverse():
-        if prim.HasAPI(UsdSemantics.LabelsAPI):
+        if prim.HasAPI(UsdSemantics.LabelsAPI, "category"):
             labels[prim.GetName()] = {
                 n: UsdSemantics.LabelsAPI(prim, n).GetLabelsAttr().Get()[0] for n in ("category", "ade20k")
             }

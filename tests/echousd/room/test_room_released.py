@@ -58,7 +58,7 @@ def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
     assert len(manifest["model"]) == 12
     stage = Usd.Stage.Open(str(folder / "bedroom.usda"))
     assert stage.GetCompositionErrors() == []
-    bed = UsdGeom.Mesh(stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh"))
+    bed = UsdGeom.Mesh(stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh"))
     assert len(bed.GetFaceVertexCountsAttr().Get()) > 12  # a shape, not a box
 
 

@@ -162,7 +162,7 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
         process.stdout.close()
         stage = opened(folder / "bedroom.usda")
         assert stage.GetCompositionErrors() == []
-        assert stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+        assert stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
     make(seed=1).save(folder, preview=False)
     assert not (folder / STAGING).exists()
 
@@ -187,7 +187,7 @@ def test_room_opens_after_every_step_of_a_regeneration(tmp_path, monkeypatch, mo
     stage = opened(root)
     assert stage.GetCompositionErrors() == []
     for prim in stage.GetPrimAtPath("/Room/Objects").GetChildren():
-        assert any(child.IsA(UsdGeom.Mesh) for child in prim.GetChildren()) or prim.GetName() in (
+        assert any(below.IsA(UsdGeom.Mesh) for below in Usd.PrimRange(prim)) or prim.GetName() in (
             "pendant",
             "second_bed",
         )
@@ -285,7 +285,7 @@ def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
     assert stage.GetCompositionErrors() == []
     assert [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath] == [str(path)]
     assert stage.GetPrimAtPath("/Room").GetVariantSet("layout").GetVariantNames() == ["layout_0", "layout_1"]
-    assert stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh").IsA(UsdGeom.Mesh)
+    assert stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
     assert echousd.read_graph(stage) == room.graph
     text = stage.GetRootLayer().ExportToString()
     assert str(tmp_path) not in text
@@ -300,7 +300,7 @@ def test_room_is_shown_in_notebooks():
     room = make(seed=1)
     assert repr(room) == "Room('bedroom', 6 objects, 5 relations, seed 1)"
     assert "<td>nightstand_left</td>" in room._repr_html_()
-    assert room.stage.GetPrimAtPath("/Room/Objects/bed/bed_mesh")
+    assert room.stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh")
     assert len(room.scene().geometry) == 5
     assert room.scene().bounds[1][1] == pytest.approx(2.8)
 

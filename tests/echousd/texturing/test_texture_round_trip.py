@@ -162,7 +162,7 @@ def bound(stage, path):
 
 def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
     root = copied(small, tmp_path)
-    before = bound(open_stage(root), "/Room/Objects/wardrobe/wardrobe_mesh")
+    before = bound(open_stage(root), "/Room/Objects/wardrobe/geo/wardrobe_mesh")
     job = export_job(root, tmp_path / "job", "generic", resolution=256)
     paint(tmp_path / "job")
     import_look(root, tmp_path / "job", name="first", preview=False)
@@ -172,10 +172,10 @@ def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
     assert sorted(variants.GetVariantNames()) == ["first", "made", "second"]
     for name, material in (("second", "/Room/Looks/second_wardrobe"), ("first", "/Room/Looks/first_wardrobe")):
         variants.SetVariantSelection(name)
-        assert bound(stage, "/Room/Objects/wardrobe/wardrobe_mesh") == material
-        assert stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_mesh").HasAttribute(f"primvars:{primvar(name)}")
+        assert bound(stage, "/Room/Objects/wardrobe/geo/wardrobe_mesh") == material
+        assert stage.GetPrimAtPath("/Room/Objects/wardrobe/geo/wardrobe_mesh").HasAttribute(f"primvars:{primvar(name)}")
     variants.SetVariantSelection("made")
-    assert bound(stage, "/Room/Objects/wardrobe/wardrobe_mesh") == before
+    assert bound(stage, "/Room/Objects/wardrobe/geo/wardrobe_mesh") == before
     stage.Reload()
     assert variants.GetVariantSelection() == "second"
     every = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -184,7 +184,7 @@ def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
     images = [part.visual.material.baseColorTexture for part in scene.geometry.values()]
     assert sum(image is not None and image.size == (256, 256) for image in images) == len(job.objects)
     flat = open_stage(export(root, tmp_path / "room.usdz"))
-    mesh = flat.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_mesh")
+    mesh = flat.GetPrimAtPath("/Room/Objects/wardrobe/geo/wardrobe_mesh")
     binding = UsdShade.MaterialBindingAPI(mesh)
     assert str(binding.GetDirectBinding().GetMaterialPath()) == "/Room/Looks/second_wardrobe"
     assert not any(UsdShade.MaterialBindingAPI(p).GetCollectionBindingRels() for p in flat.TraverseAll())
@@ -203,7 +203,7 @@ def test_shared_instances_get_a_picture_each(small, tmp_path):
     import_look(root, tmp_path / "job", preview=False)
     stage = open_stage(root)
     assert not any(stage.GetPrimAtPath(path).IsInstanceable() for path in twins)
-    assert len({bound(stage, f"{path}/nightstand_mesh") for path in twins}) == 2
+    assert len({bound(stage, f"{path}/geo/nightstand_mesh") for path in twins}) == 2
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
 
 
