@@ -14,6 +14,7 @@ from echomodel.openings import Opening, free_area
 from echomodel.vocabulary import Category, vocabulary
 from echousd.room.geometry import Geometry
 
+SKIN = 1e-4  # metres that count as nothing
 APART = 0.008  # metres of air between a small thing and everything else
 
 
@@ -170,6 +171,7 @@ def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polyg
 def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
     """What an object covers in plan between two heights: the hull of its mesh there, and its colliders; metres."""
     pieces = [thing.geometry.mesh, *(collider.mesh for collider in thing.geometry.colliders)]
+    low, high = low + SKIN, high - SKIN  # a foot that stands at the lower height reaches over it
     return shapely.union_all([_section(thing.to_room(mesh.vertices)[mesh.faces], low, high) for mesh in pieces])
 
 

@@ -19,9 +19,9 @@ from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.dressing import upholstery
 from echousd.room.dressing.dress import RULES, dress, placed, setting_of
-from echousd.room.dressing.setting import reaches
+from echousd.room.dressing.setting import reaches, standing
 from echousd.room.dressing.surfaces import surfaces
-from echousd.room.geometry import Collider
+from echousd.room.geometry import Collider, Geometry, Origin, Part
 from echousd.room.sources.boxes import ORIGIN
 from echousd.room.sources.solid import solid_geometry
 from echousd.stage import read_graph
@@ -244,3 +244,12 @@ def test_cushions_lie_before_the_pillows_of_wide_beds():
         assert abs(abs(x) - 0.21 * wide) < 0.16
         assert y == pytest.approx(0.45, abs=0.01)
         assert z > -deep / 2 + 0.5  # not in the pillow
+
+
+def test_what_stands_at_a_height_reaches_there_with_its_foot():
+    foot = trimesh.creation.cone(radius=0.1, height=0.4)  # wide where it stands
+    foot.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    part = Part("mesh", foot, {"metal": np.arange(len(foot.faces))})
+    geometry = Geometry((part,), (Collider("collider", foot, "convexHull"),), Origin("test"))
+    lamp = standing("lamp", "table_lamp", np.array([0.2, 0.4, 0.2]), np.array([0.0, 0.5, 0.0]), 0.0, geometry)
+    assert reaches(lamp, 0.5, 0.6).area > 0.9 * np.pi * 0.1**2
