@@ -238,9 +238,7 @@ def _shelves_for(word: str, wishes: AssetWishes) -> list[tuple[str, float]]:
 def _same_word(one: Category, other: Category) -> bool:
     if one.support != other.support:  # a table lamp does not hang from a ceiling
         return False
-    near = {one.name, other.name}
-    general = {"chair", "dining_chair", "dressing_chair"}, {"sofa", "multi_seat_sofa"}, {"table", "dining_table"}
-    return one.sgfront == other.sgfront or any(near <= words for words in general)
+    return one.sgfront == other.sgfront or (one.like or one.name) == (other.like or other.name)
 
 
 def _same_family(one: Category, other: Category) -> bool:

@@ -12,25 +12,15 @@ from echomodel.openings import Opening
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
 
-# Share of the floor that furniture covers in real rooms: median of each type (300 rooms), the rest like the last.
-COVER = {"bedroom": 0.46, "living_room": 0.29, "dining_room": 0.26, "living_dining_room": 0.32, "study": 0.35}
 FULL = 0.55  # of the floor at most in what is proposed: beyond it nobody can walk
-ASPECT = {"living_dining_room": 1.55}  # long side over short side, median; others:
-USUAL_ASPECT = 1.3
 WAY = 0.9  # metres beside the longest piece
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 # What use takes beside a piece, metres: people pull chairs out by 0.75 m and walk round beds at 0.5 to 0.6 m.
 BEDSIDE, FOOT, PULL, KNEES, VIEW, HANDS = 0.5, 0.5, 0.75, 0.5, 2.1, 0.1
 DESK_CHAIR = 0.9  # metres before a desk
-# Share of a floor that use can take: the rest are ways and corners; beds are walked round within their own share.
-USED = {"bedroom": 0.78, "study": 0.62, "living_dining_room": 0.58}
-USUALLY_USED = 0.66
 SPREAD = 0.12  # of the logarithm of what is more than needed
 DOOR_AREA = 1.0  # square metres
 WALLED = 0.58  # share of the walls that furniture can stand at: the rest are doors, low windows and corners
-# Share of the floors with a corner cut off; real ones have smaller cuts besides, which no furniture notices.
-CUT = {"living_dining_room": 0.35, "living_room": 0.25}
-USUAL_CUT = 0.12
 LEAST_CUT_AREA = 14.0  # square metres of a floor that can spare a corner
 ARM = 2.4  # metres that each arm of a cut floor is wide at least
 
@@ -128,19 +118,15 @@ def floor_extents(
         along_x: probability that the long side runs along x.
         openings: those that are stated already, in the walls of a rectangle; the walls are made long enough.
     """
-    statistics = room_type_statistics(room_type)
+    row, statistics = vocabulary().room_type(room_type), room_type_statistics(room_type)
     covered = footprint(categories, sizes)
-    usual = covered / COVER[room_type] * float(np.exp(0.12 * rng.standard_normal()))
+    usual = covered / row.cover * float(np.exp(0.12 * rng.standard_normal()))
     area = float(np.clip(usual, quantile(statistics.area, -0.9), quantile(statistics.area, 1.3)))
-    used = (
-        used_area(categories, sizes)
-        / USED.get(room_type, USUALLY_USED)
-        * float(np.exp(SPREAD * abs(rng.standard_normal())))
-    )
+    used = used_area(categories, sizes) / row.used * float(np.exp(SPREAD * abs(rng.standard_normal())))
     area = max(area, covered / FULL, used + DOOR_AREA)
     longest = longest_side(categories, sizes)
     least = max(statistics.short[0], WAY + longest / 2, _across(categories, sizes))
-    aspect = float(np.clip(ASPECT.get(room_type, USUAL_ASPECT) * np.exp(0.14 * rng.standard_normal()), 1.0, 2.2))
+    aspect = float(np.clip(row.aspect * np.exp(0.14 * rng.standard_normal()), 1.0, 2.2))
     short = max(float(np.sqrt(area / aspect)), least)
     long = max(area / short, short, longest + 0.1)
     grown = wall_length(categories, sizes) / WALLED / (2 * (short + long))
@@ -162,7 +148,7 @@ def floor_outline(
         rng: of all randomness.
     """
     area = extents[0] * extents[1]
-    wanted = rng.random() < CUT.get(room_type, USUAL_CUT)
+    wanted = rng.random() < vocabulary().room_type(room_type).cut
     width, depth = (float(share) for share in rng.uniform(0.25, 0.42, 2))
     corner = int(rng.integers(4))
     if not wanted or area < LEAST_CUT_AREA:

@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import numpy as np
 
@@ -24,43 +25,27 @@ class SizeStatistics:
     correlation: np.ndarray
 
 
-# Classes that the statistics do not hold: low, median, high of x, y, z as sold; "like" borrows another class.
-ASSUMED: dict[str, tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]] | str] = {
-    "chaise_longue_sofa": ((0.65, 0.65, 1.4), (0.8, 0.82, 1.65), (1.1, 1.0, 1.95)),
-    "children_cabinet": ((0.5, 0.6, 0.3), (0.85, 1.1, 0.42), (1.5, 1.8, 0.55)),
-    "chinese_chair": ((0.52, 0.8, 0.48), (0.62, 1.0, 0.55), (0.75, 1.2, 0.66)),
-    "console_table": ((0.8, 0.7, 0.28), (1.2, 0.8, 0.36), (1.7, 0.95, 0.46)),
-    "corner_side_table": ((0.35, 0.42, 0.35), (0.5, 0.55, 0.48), (0.68, 0.7, 0.65)),
-    "dressing_chair": ((0.38, 0.42, 0.36), (0.46, 0.6, 0.46), (0.58, 0.85, 0.56)),
-    "lazy_sofa": ((0.65, 0.55, 0.65), (0.88, 0.75, 0.92), (1.15, 0.95, 1.2)),
-    "round_end_table": ((0.35, 0.4, 0.35), (0.48, 0.54, 0.48), (0.65, 0.66, 0.65)),
-    "single_bed": ((0.95, 0.7, 1.95), (1.2, 0.98, 2.12), (1.45, 1.3, 2.35)),
-    "sofa": "multi_seat_sofa",
-    "table": "dining_table",
-    "wine_cabinet": ((0.5, 0.9, 0.3), (0.95, 1.7, 0.38), (1.8, 2.3, 0.48)),
-    "table_lamp": ((0.18, 0.35, 0.18), (0.3, 0.52, 0.3), (0.45, 0.72, 0.45)),
-    "wall_lamp": ((0.1, 0.18, 0.1), (0.18, 0.32, 0.16), (0.4, 0.55, 0.28)),
-    "bench": ((0.8, 0.4, 0.33), (1.2, 0.46, 0.42), (1.6, 0.55, 0.55)),
-    "tv": ((0.9, 0.53, 0.04), (1.25, 0.74, 0.08), (1.7, 1.0, 0.22)),
-}
-# Round from above, as sold: width equals depth.
-ROUND = {"round_end_table", "lazy_sofa", "table_lamp"}
+@cache
+def _table() -> dict[str, Any]:
+    """What real rooms tell of sizes, by category."""
+    text = resources.files("echomodel").joinpath("data/room_statistics.json").read_text("utf-8")
+    found: dict[str, Any] = json.loads(text)["sizes"]
+    return found
 
 
 @cache
 def size_statistics(category: str) -> SizeStatistics:
-    """Statistics of a class, or of its SG-FRONT class where it has none of its own; raises `UnknownWord`."""
+    """Statistics of a class, or of the one that its row calls `like` where it has none; raises `UnknownWord`."""
     row = vocabulary().category(category)
     name = row.name
-    table = json.loads(resources.files("echomodel").joinpath("data/room_statistics.json").read_text("utf-8"))["sizes"]
-    if name not in table:
-        assumed = ASSUMED.get(name, row.sgfront)
-        if isinstance(assumed, str):
-            return size_statistics(assumed)
-        low, median, high = (np.array(values) for values in assumed)
-        return SizeStatistics(low, median, high, _correlation(0.4, 0.98 if name in ROUND else 0.6, 0.4))
-    c = table[name]["correlation"]
-    low, median, high = (np.array(table[name][key]) for key in ("p5", "median", "p95"))
+    if name not in _table() and not row.sizes:
+        return size_statistics(row.like or row.sgfront)
+    if name not in _table():
+        low, median, high = (np.array(values) for values in row.sizes)
+        return SizeStatistics(low, median, high, _correlation(0.4, 0.98 if row.round else 0.6, 0.4))
+    found = _table()[name]
+    c = found["correlation"]
+    low, median, high = (np.array(found[key]) for key in ("p5", "median", "p95"))
     return SizeStatistics(low, median, high, _correlation(c["xy"], c["xz"], c["yz"]))
 
 

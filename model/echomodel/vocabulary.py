@@ -10,142 +10,36 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import resources
-from typing import Any, Literal
+from typing import Any
 
 from echomodel.habits import Habit
 from echomodel.placements import Placement
+from echomodel.rows import (
+    INVITES,
+    MEASURES,
+    ROLES,
+    STANCES,
+    SUPPORTS,
+    UNITES,
+    Category,
+    Predicate,
+    PredicateKind,
+    RoomType,
+)
+
+__all__ = [
+    "Category",
+    "Predicate",
+    "PredicateKind",
+    "RoomType",
+    "UnknownWord",
+    "Vocabulary",
+    "normalised",
+    "speaking",
+    "vocabulary",
+]
 
 TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet
-SUPPORTS = ("floor", "table", "wall", "ceiling")
-MEASURES = ("place", "size", None)
-UNITES = ("style", "shape")
-ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
-# at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top
-STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near")
-
-
-@dataclass(frozen=True)
-class Category:
-    """Everything that the product knows of a fine object category; code asks the row and lists no words of its own.
-
-    Arguments:
-        coarse, sgfront: its SG-FRONT classes, simple and fine.
-        support: what it rests on, one of `SUPPORTS`.
-        role: what people use it for, one of `ROLES`.
-        look: how its materials are laid out (`echousd.room.looks.BANDS`).
-        density: mass over the volume of the whole box, kg/m³ (furniture is mostly hollow).
-        ade20k: its name among the 150 classes of ADE20K.
-        colour: of its boxes in pictures of graphs, `#rrggbb`.
-        front: one side of it is its front; what has none may stand at any heading.
-        wall: it stands with its back to a wall (in at least four of five real rooms).
-        carries: a lamp, a television or a plant may stand on its top.
-        hangs: it may also hang on a wall.
-        solid: its collider may be one hull; everything else has room below or inside that other things need.
-        access: metres in front that must stay free, so that it can be opened or used.
-        belongs_to: categories that it attends, the likeliest first.
-        stands: how it stands to them, one of `STANCES`.
-        admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
-            thing's smaller horizontal side.
-        usual: (low, high) of x, y and z in metres of most such pieces, where the class's statistics mix several things.
-        aliases: what people call it.
-    """
-
-    name: str
-    coarse: str
-    sgfront: str
-    support: str
-    role: str
-    look: str
-    density: float
-    ade20k: str
-    colour: str = "#eeeeee"
-    front: bool = True
-    wall: bool = False
-    carries: bool = False
-    hangs: bool = False
-    solid: bool = False
-    access: float = 0.0
-    belongs_to: tuple[str, ...] = ()
-    stands: str = ""
-    admits: tuple[tuple[str, float], ...] = ()
-    usual: tuple[tuple[float, float], ...] = ()
-    aliases: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Predicate:
-    """Everything that the product knows of a relation, but for the code of its rule (`echomodel.rules`).
-
-    Arguments:
-        id: its position; SG-FRONT's own id where SG-FRONT has it.
-        sgfront: SG-FRONT's spelling, None where SG-FRONT lacks it.
-        inverse: what says the same of the swapped pair, None where nothing does.
-        order, rank: the order that it belongs to (left and right share one), and 1 where the subject comes after the
-            object, -1 where before.
-        kind: its `PredicateKind`.
-        measures: what its rule asks of boxes, `place` or `size`; None where it is not measured.
-        step: signs (x, z) of the way from the object to the subject, (0, 0) where it names no direction.
-        mirror_x, mirror_z: what it becomes where the room is mirrored along an axis, None = itself.
-        emphasis, loss_weight: weight of its margin in guidance and in the training loss; what is rare and must hit a
-            small spot needs more than one.
-        rests: the subject stands on the object: repair puts it onto the object's top.
-        follows: the subject goes along where the object is moved.
-        unites: what the two objects have in common, of `style` and `shape`.
-        aliases: other words for it.
-        swapped: words that mean it with subject and object exchanged; they are named in errors only.
-    """
-
-    name: str
-    id: int
-    kind: str
-    sgfront: str | None = None
-    inverse: str | None = None
-    symmetric: bool = False
-    transitive: bool = False
-    order: str | None = None
-    rank: int = 0
-    measures: str | None = None
-    step: tuple[int, int] = (0, 0)
-    mirror_x: str | None = None
-    mirror_z: str | None = None
-    emphasis: float = 1.0
-    loss_weight: float = 1.0
-    rests: bool = False
-    follows: bool = False
-    unites: tuple[str, ...] = ()
-    aliases: tuple[str, ...] = ()
-    swapped: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class PredicateKind:
-    """Predicates that are drawn alike: the colour `#rrggbb` and the line (`solid`, `dashed`, `dotted`) of arrows."""
-
-    name: str
-    colour: str
-    line: Literal["solid", "dashed", "dotted"]
-
-
-@dataclass(frozen=True)
-class RoomType:
-    """A kind of room.
-
-    Arguments:
-        contents: (category, count) of what such a room usually holds.
-        scans: what SG-FRONT's scans of such rooms are called before the dash; the first is written.
-        signs: categories or coarse classes by which furniture tells such a room; certainty: of the types all of whose
-            signs are there, the one with the greatest is meant.
-        like: the room type that weights take it for which do not know it, "" = there is none.
-        aliases: what people call it.
-    """
-
-    name: str
-    contents: tuple[tuple[str, int], ...]
-    scans: tuple[str, ...] = ()
-    signs: tuple[str, ...] = ()
-    certainty: int = 0
-    like: str = ""
-    aliases: tuple[str, ...] = ()
 
 
 class UnknownWord(ValueError):
@@ -248,6 +142,8 @@ class Vocabulary:
             _known(f"category {row.name}", "role", (row.role,), ROLES)
             _known(f"category {row.name}", "belongs_to", row.belongs_to, categories)
             _known(f"category {row.name}", "stands", (row.stands,), STANCES)
+            _known(f"category {row.name}", "like", (row.like,), {"", *categories})
+            _known(f"category {row.name}", "invites", row.invites, INVITES)
             _known(f"category {row.name}", "admits", (word for word, _ in row.admits), categories | set(ROLES))
         kinds = {kind.name for kind in self.predicate_kinds}
         for position, relation in enumerate(self.predicates):

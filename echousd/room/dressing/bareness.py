@@ -52,7 +52,7 @@ def stretches(setting: Setting, wall: Wall) -> list[tuple[float, float]]:
 
 def bare_corners(setting: Setting) -> None:
     """Plants, then a tall vase, in the emptiest corners of rooms that are large for what stands in them."""
-    green = len(setting.of("plant"))
+    green = setting.plants
     wanted = sum(setting.room.area >= area for area in FLOORS) - green
     if setting.full or wanted <= 0:
         return

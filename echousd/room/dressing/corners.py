@@ -18,7 +18,7 @@ def corner_plants(setting: Setting) -> None:
     """Tall plants in free corners, a floor vase where there are plants enough."""
     if not setting.full:
         return
-    green = len(setting.of("plant"))
+    green = setting.plants
     for corner in range(len(setting.floor)):
         rng = setting.rng(f"corner {corner}", "plant")
         kind = "floor_plant" if green < GREEN else "floor_vase"
@@ -37,7 +37,7 @@ def poufs(setting: Setting) -> None:
     """A pouf before a corner of the rug that a sofa or an armchair stands on."""
     if not setting.full:
         return
-    for host in setting.of("sofa", "armchair", "lounge_chair"):
+    for host in setting.inviting("pouf"):
         rng = setting.rng(host.name, "pouf")
         size, variant = usual_size("pouf", rng), int(rng.integers(1 << 30))
         w, _, d = host.size
@@ -68,7 +68,7 @@ def cables(setting: Setting) -> None:
     """The cable of every lamp that stands on the floor, to the nearest wall, where it lies free."""
     if not (setting.full and setting.walls):
         return
-    for host in setting.of("floor_lamp"):
+    for host in (lamp for lamp in setting.of("light") if lamp.row.support == "floor"):
         rng = setting.rng(host.name, "cable")
         ways = (thing for thing in _ways_to_walls(setting, host, rng) if not _on_rug(setting, thing))
         setting.put_first(ways, host=host.name, margin=0.004)

@@ -19,10 +19,11 @@ SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -sha
 def rugs(setting: Setting) -> None:
     """One rug below every sofa group, bed and dining table that has room for it; else below an armchair or a desk."""
     done: list[shapely.Polygon] = []
-    hosts = setting.of("sofa", "bed", "dining_table") or setting.of("armchair", "lounge_chair") or setting.of("desk")
-    for host in sorted(hosts, key=lambda o: -float(o.size[0] * o.size[2])):
-        if host.row.name in ("lazy_sofa",):
-            continue
+    hosts = setting.inviting("rug")
+    seats = [o for o in hosts if o.row.role == "seat"]
+    desks = [o for o in hosts if o.row.role == "board" and o.row.access]
+    groups = [o for o in hosts if o not in seats and o not in desks] or seats or desks
+    for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
         rng = setting.rng(host.name, "rug")
         variant = int(rng.integers(1 << 30))
         group, centre, size = _under(setting, host)
@@ -44,22 +45,21 @@ def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, flo
     w, _, d = (float(v) for v in host.size)
     if host.row.role == "bed":
         wide, long = w + 1.3, min(d * 0.75 + 0.5, 2.4)
-        near = {o.name for o in setting.of("seat", "nightstand")}
+        near = {o.name for o in (*setting.of("seat"), *setting.stands("head"))}
         return {host.name, *near}, (0.0, d / 2 + 0.45 - long / 2), (wide, long)
     if host.row.role == "seat":
         wide, long = w + 0.9, d + 0.8
-        near = {o.name for o in setting.of("seat", "light", "decor", "side_table", "coffee_table", "round_end_table")}
+        near = {o.name for o in (*setting.of("seat", "light", "decor"), *setting.stands("before", "beside"))}
         return {host.name, *near}, (0.0, 0.25), (wide, long)
     if host.row.role == "sofa":
         front = d / 2
-        tables = [o for o in setting.of("coffee_table") if host.footprint.distance(o.footprint) < 1.2]
+        tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < 1.2]
         reach = 1.7
         for table in tables[:1]:
             cos, sin = np.cos(host.yaw), np.sin(host.yaw)
             away = table.position - host.position
             reach = float(np.clip(sin * away[0] + cos * away[2] - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
-        around = {o.name for o in (*setting.of("seat", "sofa", "coffee_table", "light", "decor", "side_table"),
-                                   *setting.of("corner_side_table", "round_end_table"))}  # fmt: skip
+        around = {o.name for o in (*setting.of("seat", "sofa", "light", "decor"), *setting.stands("before", "beside"))}
         long = reach + 0.3
         return {host.name, *around}, (0.0, front - 0.3 + long / 2), (w + 0.5, long)
     seats = {o.name for o in setting.of("seat")}
@@ -102,7 +102,7 @@ def baskets(setting: Setting) -> None:
     """A basket beside a sofa, a bed or a shelf, in full rooms."""
     if not setting.full:
         return
-    for host in setting.of("sofa", "bookshelf", "shelf", "bed"):
+    for host in setting.inviting("basket"):
         rng = setting.rng(host.name, "basket")
         size = usual_size("basket", rng)
         variant = int(rng.integers(1 << 30))

@@ -19,7 +19,6 @@ SHARES = (0.5, 0.3, 0.7, 0.18, 0.82)  # of a wall's length, the middle first
 SHELF = 1.38  # metres from the floor to the board of a wall shelf
 ABOVE = 0.3  # metres over a shelf that stay free
 ON_SHELF = ("small_plant", "photo", "vase", "candles", "bowl", "clock")
-CLOCKED = ("sofa", "dining_table", "desk")
 
 
 def shelves(setting: Setting) -> None:
@@ -65,7 +64,7 @@ def _geometry(board: Thing) -> Geometry:
 
 def clock(setting: Setting) -> None:
     """A clock on a wall where people sit together or work."""
-    if not (setting.full and setting.walls and setting.of(*CLOCKED)):
+    if not (setting.full and setting.walls and setting.inviting("clock")):
         return
     rng = setting.rng("wall clock")
     size, variant = usual_size("wall_clock", rng), int(rng.integers(1 << 30))
@@ -90,7 +89,7 @@ def coats(setting: Setting) -> None:
 
 def tall_mirror(setting: Setting) -> None:
     """A mirror for the whole person where somebody dresses: in rooms with a wardrobe or a bed."""
-    if not (setting.full and setting.walls and setting.of("wardrobe", "bed", "dresser")):
+    if not (setting.full and setting.walls and setting.inviting("tall_mirror")):
         return
     rng = setting.rng("tall mirror")
     size, variant = usual_size("tall_mirror", rng), int(rng.integers(1 << 30))

@@ -110,9 +110,22 @@ class Setting:
         key = "/".join((str(self.seed), "dressing", *words)).encode()
         return np.random.default_rng(int.from_bytes(hashlib.blake2b(key, digest_size=8).digest(), "big"))
 
-    def of(self, *words: str) -> list[Standing]:
-        """The objects of some roles or categories, in the order of the graph."""
-        return [o for o in self.objects.values() if o.row.role in words or o.row.name in words]
+    def of(self, *roles: str) -> list[Standing]:
+        """The objects of some roles, in the order of the graph."""
+        return [o for o in self.objects.values() if o.row.role in roles]
+
+    def inviting(self, *words: str) -> list[Standing]:
+        """The objects that some small things go with (`echomodel.rows.INVITES`), in the order of the graph."""
+        return [o for o in self.objects.values() if any(word in o.row.invites for word in words)]
+
+    @property
+    def plants(self) -> int:
+        """How many plants the graph has."""
+        return sum(o.row.look == "plant" for o in self.objects.values())
+
+    def stands(self, *stances: str) -> list[Standing]:
+        """The objects that stand so to what they attend, in the order of the graph."""
+        return [o for o in self.objects.values() if o.row.stands in stances]
 
     def clear(self, thing: Thing, *, host: str = "", margin: float = APART, floor: bool = True) -> bool:
         """Whether a thing stands in the room, in nobody's way, and meets neither an object but its host nor a thing."""

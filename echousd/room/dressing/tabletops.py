@@ -21,7 +21,7 @@ CORNERS: Places = ((0.9, -0.8), (-0.9, -0.8), (0.9, 0.8), (-0.9, 0.8), (0.0, -0.
 BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 
-# Category -> what is put on its top: kinds of which one is taken, places, and whether only a full room has it.
+# What is put on a top, by what a row calls `top`: kinds of which one is taken, places, and whether only in full rooms.
 TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
     "nightstand": (
         (("book_stack", "cup", "small_plant"), FRONT, False),
@@ -77,11 +77,6 @@ TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
         (("photo",), ENDS, True),
     ),
 }
-LIKE = {
-    "table": "dining_table", "corner_side_table": "side_table", "round_end_table": "side_table",
-    "console_table": "sideboard",
-    "dresser": "sideboard", "cabinet": "sideboard", "children_cabinet": "sideboard", "wine_cabinet": "sideboard",
-}  # fmt: skip
 SHELVED = ("book_stack", "vase", "small_plant", "bowl", "photo", "candles", "basket", "clock")
 
 
@@ -91,7 +86,7 @@ def tabletops(setting: Setting) -> None:
         levels = surfaces(host)
         if not levels:
             continue
-        name = LIKE.get(host.row.name, host.row.name)
+        name = host.row.top
         if name == "dining_table" and setting.full:
             _laid(setting, host, levels[0])
         footprint = float(host.size[0] * host.size[2])

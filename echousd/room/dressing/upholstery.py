@@ -17,7 +17,7 @@ WIDE_BED = 1.3  # metres
 
 def cushions(setting: Setting) -> None:
     """Cushions in the corners of sofas, one on an armchair."""
-    for host in setting.of("sofa", "armchair", "lounge_chair"):
+    for host in setting.inviting("cushions"):
         rng = setting.rng(host.name, "cushion")
         size = usual_size("cushion", rng)
         wide = float(host.size[0])

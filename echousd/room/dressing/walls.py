@@ -15,8 +15,6 @@ EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER = 0.22  # metres between furniture and what hangs over it
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
-MIRRORED = ("dressing_table", "console_table", "dresser")
-PICTURED = ("sofa", "bed", "sideboard", "console_table", "dresser", "cabinet", "desk", "tv_stand")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +78,7 @@ def pictures(setting: Setting) -> None:
     if not setting.walls:
         return
     every = walls_of(setting)
-    for host in setting.of(*PICTURED, "dressing_table"):
+    for host in setting.inviting("picture", "mirror"):
         behind = _behind(host, every)
         if behind is None:
             continue
@@ -149,7 +147,7 @@ def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tu
     """What would look good over an object, best first."""
     wide = float(host.size[0])
     out: list[tuple[str, np.ndarray]] = []
-    if host.row.name in MIRRORED:
+    if "mirror" in host.row.invites:
         out.append(("round_mirror" if rng.random() < 0.5 else "mirror", usual_size("round_mirror", rng)))
         if out[0][0] == "mirror":
             out = [("mirror", usual_size("mirror", rng))]

@@ -33,7 +33,6 @@ __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "s
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
 MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor)
-SAME_AS = {"table": "dining_table"}
 UNSAID = ("", "board")
 BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
 
@@ -86,8 +85,10 @@ def _named(parts: list[Solid]) -> list[Solid]:
 
 
 def _builder(name: str) -> Builder:
-    name = SAME_AS.get(name, name)
-    for module in MODULES:
-        if hasattr(module, name):
-            return getattr(module, name)
+    """The program of a category, or of the one that its row is like."""
+    row = vocabulary().category(name)
+    for word in (name, row.like or row.sgfront):
+        for module in MODULES:
+            if hasattr(module, word):
+                return getattr(module, word)
     raise ValueError(f"no furniture is made for {name}")

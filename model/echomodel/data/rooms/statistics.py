@@ -9,6 +9,8 @@ from importlib import resources
 
 import numpy as np
 
+from echomodel.vocabulary import vocabulary
+
 # How many corners are cut where the floor is not a rectangle: shares of 1, 2, 3 and 4.
 CUTS = {"bedroom": (0.72, 0.2, 0.06, 0.02), "study": (0.75, 0.2, 0.05, 0.0)}
 MANY_CUTS = (0.35, 0.35, 0.2, 0.1)
@@ -45,7 +47,7 @@ def room_statistics() -> dict:
 
 @cache
 def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatistics:
-    """The part of one room type of the vocabulary; raises ValueError for another word.
+    """The part of one room type of the vocabulary, or of the one that it is like; raises ValueError for another word.
 
     Arguments:
         name: room type.
@@ -53,6 +55,9 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
     """
     rooms = room_statistics()["rooms"]
     if name not in rooms:
+        like = next((row.like for row in vocabulary().room_types if row.name == name), "")
+        if like:
+            return room_type_statistics(like, requests=requests)
         raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
     raw = rooms[name]
     asked = room_requests()["presence"].get(name, {}) if requests else {}
