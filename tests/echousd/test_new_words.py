@@ -7,17 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from inline_batches import Inline
+from pxr import Usd, UsdPhysics
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.data.furniture import decor
+from echomodel.data.furniture.carpentry import box
 from echomodel.habits import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
+from echousd.batches.batch import batch
 from echousd.check import check_room
 from echousd.cli.main import command
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
 from echousd.repair import repair_boxes
+from echousd.room.dressing.dress import placed
+from echousd.room.dressing.tabletops import TOPS
 from echousd.stage.foreign import foreign_graph
 
 LEVEL = 0.05  # metres
@@ -30,6 +37,11 @@ def music():
     harp = Category(
         name="harp", coarse="cabinet", sgfront="bookshelf", support="floor", role="decor", look="plant", density=40.0,
         ade20k="sculpture", colour="#112233", aliases=("concert_harp",),
+    )  # fmt: skip
+    spinet = Category(
+        name="spinet", coarse="desk", sgfront="desk", support="floor", role="board", look="table", density=90.0,
+        ade20k="piano", wall=True, access=0.6, carries=True, top="sideboard", invites=("picture", "clock"),
+        sizes=((1.2, 0.8, 0.5), (1.4, 0.9, 0.6), (1.6, 1.0, 0.7)),
     )  # fmt: skip
     line = Predicate(
         name="in_line_with", id=len(words.predicates), kind="closeness", inverse="in_line_with", symmetric=True,
@@ -45,7 +57,7 @@ def music():
         return LEVEL - pair.offset[:, 0].abs()
 
     more = replace(
-        words, categories=(*words.categories, harp), predicates=(*words.predicates, line),
+        words, categories=(*words.categories, harp, spinet), predicates=(*words.predicates, line),
         room_types=(*words.room_types, room),
     )  # fmt: skip
     with speaking(more):
@@ -129,3 +141,44 @@ def test_a_rule_is_registered_once(music):
 def test_outside_the_block_they_are_unknown():
     with pytest.raises(ValueError, match="unknown category 'harp'"):
         Node("harp", "harp")
+
+
+def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monkeypatch):
+    def spinet(size, style, choices):  # a furniture program is a function of its name
+        w, h, d = size
+        sides = [box((x, 0, -d / 2), (x + 0.05, 0.5 * h, d / 2)) for x in (-w / 2, w / 2 - 0.05)]
+        return [*sides, box((-w / 2, 0.5 * h, -d / 2), (w / 2, h, d / 2))]
+
+    monkeypatch.setattr(decor, "spinet", spinet, raising=False)
+    graph = starting_graph("music room", {"spinet": 1})  # of no stated size: its floor is that of its like
+    graph = graph.replaced(relations=(*graph.relations, Relation("stool", "in_line_with", "harp")))
+    options = {"shapes": "parts", "dress": "full", "walls": True}
+    room = next(echousd.generate_many([graph], seed=3, **options))
+    names = graph.names
+    size = dict(zip(names, np.asarray(room.boxes.size), strict=True))
+    assert np.all(size["spinet"] > np.array((1.2, 0.8, 0.5)) * 0.5)
+    assert np.all(size["spinet"] < np.array((1.6, 1.0, 0.7)) * 1.2)
+    assert len(room.geometry["spinet"].description) == len(room.geometry["harp"].description) > 0
+    small = placed(room)
+    assert {thing.kind for thing in small if thing.on == "spinet"} & {"flowers", "vase", "book_stack", "bowl", "photo"}
+    assert "wall_clock" in {thing.kind for thing in small}
+
+    result = batch(graph_file(tmp_path, graph), tmp_path / "run", seed=3, executor=Inline(), preview=False, **options)
+    assert (result.done, result.failed) == (1, 0)
+    root = next((tmp_path / "run").glob("rooms/*/*/*.usda"))
+    report = check_room(root)
+    assert report.ok, report
+    assert "in_line_with" in {found.relation.triple[1] for found in report.relations if found.margin is not None}
+    stage = Usd.Stage.Open(str(root))
+    prim = next(prim for prim in stage.Traverse() if prim.GetName() == "spinet" and UsdPhysics.MassAPI(prim))
+    assert 10 < UsdPhysics.MassAPI(prim).GetMassAttr().Get() < 300
+
+
+def test_rows_name_tops_that_there_are():
+    assert {row.top for row in vocabulary().categories} == {"", *TOPS}
+
+
+def graph_file(folder, graph):
+    path = folder / "music.json"
+    path.write_text(graph.to_json())
+    return path
