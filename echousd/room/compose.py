@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
-from echousd.room import assets, cameras, lights, looks, materials, physics, structure
+from echousd.room import assets, cameras, joints, lights, looks, materials, physics, structure
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
@@ -148,10 +148,15 @@ def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
 
 
 def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
-    """`layers/physics.usda`: the scene and what never moves; the furniture's physics is in its assets."""
+    """`layers/physics.usda`: the scene, the shell, its doors' hinges; the furniture's physics is in its assets."""
     stage = _room_stage(room, "physics")
     stage.OverridePrim("/Room")
-    physics.write_physics(stage, [mesh.path for part in built for mesh in part.meshes if mesh.solid])
+    forms = {True: "convexHull", False: "none"}  # what may turn, what stands as it is
+    solid = {mesh.path: forms[part.joint is not None] for part in built for mesh in part.meshes if mesh.solid}
+    physics.write_physics(stage, solid)
+    for part in built:
+        if part.joint and part.mass:
+            joints.write_hinge(stage, part.path, part.joint, part.mass)
     physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
 

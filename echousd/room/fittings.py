@@ -66,7 +66,7 @@ def door_handle(opening: Opening, left_first: bool) -> trimesh.Trimesh:
         opening: the door.
         left_first: whether someone inside who looks at the wall has its first corner on the left.
     """
-    hinge_first = (opening.hinge == "left") == left_first
+    hinge_first = _hinge_first(opening, left_first)
     at = opening.end - LINING - 0.07 if hinge_first else opening.offset + LINING + 0.07
     toward = -0.11 if hinge_first else 0.11
     w = 0.0 if opening.swing == "in" else WALL - LEAF
@@ -77,6 +77,23 @@ def door_handle(opening: Opening, left_first: bool) -> trimesh.Trimesh:
         boards.append(board((at - 0.009, at + 0.009), (level - 0.009, level + 0.009), (near, far)))
         boards.append(board((min(at, at + toward), max(at, at + toward)), (level - 0.009, level + 0.009), lever))
     return joined(boards)
+
+
+def hinge_line(opening: Opening, left_first: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(3,) each: foot of the line that a leaf turns about, and the unit vectors along it when closed and when open.
+
+    Arguments: see `door_handle`.
+    """
+    first = _hinge_first(opening, left_first)
+    u = opening.offset + LINING + GAP if first else opening.end - LINING - GAP
+    inwards = opening.swing == "in"
+    closed = np.array([1.0 if first else -1.0, 0.0, 0.0])
+    return np.array([u, 0.0, 0.0 if inwards else WALL]), closed, np.array([0.0, 0.0, -1.0 if inwards else 1.0])
+
+
+def _hinge_first(opening: Opening, left_first: bool) -> bool:
+    """Whether the hinges are at the jamb that the wall's first corner is nearer to."""
+    return (opening.hinge == "left") == left_first
 
 
 def window_frame(opening: Opening) -> trimesh.Trimesh:

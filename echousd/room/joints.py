@@ -6,11 +6,12 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.data.furniture.solids import Joint
-from echousd.room.geometry import FRAME, Geometry
+from echousd.room.geometry import FRAME, Geometry, Mass
 from echousd.room.masses import write_mass
 from echousd.room.paths import GEO, piece_name, piece_of, piece_path
 
 ARTICULATION, STATIC, ARTICULATED = "articulation", "static", "articulated"
+Point = tuple[float, float, float]
 DAMPING = 2.0  # N s/m or N m s: a drawer that is let go stops
 
 
@@ -36,21 +37,44 @@ def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
         UsdPhysics.ArticulationRootAPI.Apply(frame)
         UsdGeom.Scope.Define(stage, f"/{asset}/{piece_name(asset, 'joints')}")
         for joint in geometry.joints:
-            _joint(stage, asset, joint)
+            path = f"/{asset}/{piece_name(asset, 'joints')}/{piece_name(asset, joint.body)}_joint"
+            still, moving = (piece_path(f"/{asset}", asset, body) for body in (FRAME, joint.body))
+            _joint(stage, path, still, moving, joint, (joint.anchor, joint.anchor))
     variants.SetVariantSelection(STATIC)
 
 
-def _joint(stage: Usd.Stage, asset: str, joint: Joint) -> None:
-    path = f"/{asset}/{piece_name(asset, 'joints')}/{piece_name(asset, joint.body)}_joint"
+def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
+    """Author the variant set `articulation` on a door of the shell: nothing in `static`, its leaf on a hinge else.
+
+    Arguments:
+        stage: receives the opinions. leaf: prim path of what turns, whose origin is on the axis, below the door's prim.
+        joint: its anchor in the door's frame. mass: of the leaf.
+    """
+    door = leaf.rpartition("/")[0]
+    variants = stage.OverridePrim(door).GetVariantSets().AddVariantSet(ARTICULATION)
+    for name in (STATIC, ARTICULATED):
+        variants.AddVariant(name)
+    variants.SetVariantSelection(ARTICULATED)
+    with variants.GetVariantEditContext():
+        body = stage.OverridePrim(leaf)
+        UsdPhysics.RigidBodyAPI.Apply(body)
+        write_mass(body, mass)
+        # against the door's prim, which is no body and stays where it is, wherever the room is put
+        _joint(stage, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)))
+    variants.SetVariantSelection(STATIC)
+
+
+def _joint(stage: Usd.Stage, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point]) -> None:
+    """A joint between two prims; `places`: its anchor in the frame of each."""
     slides = joint.kind == "prismatic"
     made = (UsdPhysics.PrismaticJoint if slides else UsdPhysics.RevoluteJoint).Define(stage, path)
-    made.CreateBody0Rel().SetTargets([Sdf.Path(piece_path(f"/{asset}", asset, FRAME))])
-    made.CreateBody1Rel().SetTargets([Sdf.Path(piece_path(f"/{asset}", asset, joint.body))])
+    made.CreateBody0Rel().SetTargets([Sdf.Path(still)])
+    made.CreateBody1Rel().SetTargets([Sdf.Path(moving)])
     made.CreateAxisAttr(UsdPhysics.Tokens.x)
     turn = Gf.Rotation(Gf.Vec3d(1, 0, 0), Gf.Vec3d(*joint.axis)).GetQuat()
-    place, turned = Gf.Vec3f(*joint.anchor), Gf.Quatf(turn.GetReal(), Gf.Vec3f(turn.GetImaginary()))
-    for create in (made.CreateLocalPos0Attr, made.CreateLocalPos1Attr):
-        create(place)
+    turned = Gf.Quatf(turn.GetReal(), Gf.Vec3f(turn.GetImaginary()))
+    for create, place in zip((made.CreateLocalPos0Attr, made.CreateLocalPos1Attr), places, strict=True):
+        create(Gf.Vec3f(*place))
     for create in (made.CreateLocalRot0Attr, made.CreateLocalRot1Attr):
         create(turned)
     made.CreateLowerLimitAttr(0.0)

@@ -94,18 +94,18 @@ def bind_contact(
     binding.Bind(made, UsdShade.Tokens.weakerThanDescendants, "physics")
 
 
-def write_physics(stage: Usd.Stage, static_meshes: Iterable[str]) -> None:
-    """Author the physics scene, and the colliders of what stays where it is as overs.
+def write_physics(stage: Usd.Stage, shell: Mapping[str, str]) -> None:
+    """Author the physics scene, and the colliders of the shell as overs.
 
     Arguments:
         stage: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`.
-        static_meshes: paths of meshes that collide as they are and never move (floor, walls).
+        shell: path of a solid mesh -> how it collides, a token of `physics:approximation`.
     """
     UsdPhysics.Scene.Define(stage, SCENE).CreateGravityMagnitudeAttr(GRAVITY)
-    for path in static_meshes:
+    for path, form in shell.items():
         prim = stage.OverridePrim(path)
         UsdPhysics.CollisionAPI.Apply(prim)
-        UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(UsdPhysics.Tokens.none)
+        UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(form)
     bind_contact(stage, SHELL, f"{SHELL}/contact", WOODEN)
 
 

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
+from echomodel.data.furniture.solids import Joint
 from echousd.room import assets
 from echousd.room.finishes.harmonies import linear
+from echousd.room.geometry import Mass
 from echousd.room.looks import Look
 from echousd.room.paths import SHELL, piece_name
 from echousd.room.room import RoomData
@@ -19,6 +22,7 @@ from echousd.room.surface import Surface, surface
 from echousd.room.taxonomy import ade20k
 from echousd.room.walls import Piece, ShellPart, ceiling, walls
 
+LEAF = 320.0  # kg/m³ of a door's leaf
 LOOKS = {
     "ceiling": Look(linear("f6f4f0"), 0.95),
     "trim": Look(linear("f7f5f1"), 0.4),
@@ -40,13 +44,23 @@ class ShellMesh:
 
 @dataclass(frozen=True, eq=False)
 class ShellPrim:
-    """A part of the shell with its meshes; a door or a window stands below its wall."""
+    """A part of the shell with its meshes; a door or a window stands below its wall, a leaf below its door.
+
+    What has a joint has its origin at the joint's anchor; `mass` of it is that of its body.
+    """
 
     path: str
     label: str
     kind: str
     meshes: tuple[ShellMesh, ...]
     extent: np.ndarray
+    joint: Joint | None = None
+    mass: Mass | None = None
+
+    @property
+    def at(self) -> np.ndarray:
+        """(3,) float, its origin in the frame of the part above, metres."""
+        return np.array(self.joint.anchor) if self.joint else np.zeros(3)
 
 
 def shell_prims(room: RoomData) -> list[ShellPrim]:
@@ -74,11 +88,15 @@ def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any]) -> Sdf.Laye
 def write_shell(stage: Usd.Stage, prims: Sequence[ShellPrim]) -> None:
     """Author the parts with kind, labels and extents, and their meshes."""
     for part in prims:
-        prim = UsdGeom.Xform.Define(stage, part.path).GetPrim()
+        xform = UsdGeom.Xform.Define(stage, part.path)
+        prim = xform.GetPrim()
+        if part.joint:  # a pivot to turn
+            xform.AddTranslateOp().Set(Gf.Vec3d(*part.joint.anchor))
+            xform.AddRotateYOp().Set(0.0)
         Usd.ModelAPI(prim).SetKind(part.kind)
         low, high = (Gf.Vec3f(*map(float, corner)) for corner in part.extent)
         UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
-        for taxonomy, word in (("category", part.label), ("ade20k", ade20k(part.label))):
+        for taxonomy, word in (("category", part.label), ("ade20k", ade20k(part.label))) if part.label else ():
             UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
         for mesh in part.meshes:
             assets.write_mesh(stage, mesh.path, mesh.form)
@@ -86,13 +104,28 @@ def write_shell(stage: Usd.Stage, prims: Sequence[ShellPrim]) -> None:
 
 def _prims(part: ShellPart, above: str, kind: str) -> Iterator[ShellPrim]:
     path = f"{above}/{part.name}"
-    meshes = tuple(_mesh(piece, path) for piece in part.pieces)
-    inner = [prim for each in part.inner for prim in _prims(each, path, Kind.Tokens.subcomponent)]
-    extents = np.stack([mesh.form.extent for mesh in meshes] + [prim.extent for prim in inner])
-    yield ShellPrim(path, part.label, kind, meshes, np.stack([extents[:, 0].min(0), extents[:, 1].max(0)]))
-    yield from inner
+    at = np.array(part.joint.anchor) if part.joint else np.zeros(3)
+    meshes = tuple(_mesh(piece, path, at) for piece in part.pieces)
+    inner = [list(_prims(each, path, Kind.Tokens.subcomponent)) for each in part.inner]
+    extents = np.stack([mesh.form.extent for mesh in meshes] + [prims[0].extent + prims[0].at for prims in inner])
+    extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
+    mass = _mass([piece for piece in part.pieces if piece.solid], at) if part.joint else None
+    yield ShellPrim(path, part.label, kind, meshes, extent, part.joint, mass)
+    for prims in inner:
+        yield from prims
 
 
-def _mesh(piece: Piece, above: str) -> ShellMesh:
-    form = surface(piece.mesh, {piece.look: np.arange(len(piece.mesh.faces))})
+def _mesh(piece: Piece, above: str, at: np.ndarray) -> ShellMesh:
+    mesh = piece.mesh
+    if at.any():
+        mesh = mesh.copy()
+        mesh.apply_translation(-at)
+    form = surface(mesh, {piece.look: np.arange(len(mesh.faces))})
     return ShellMesh(f"{above}/{piece.name}", piece.look, form, piece.solid)
+
+
+def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:
+    """Of a leaf, as light as a hollow door."""
+    hull = trimesh.Trimesh(np.concatenate([piece.mesh.vertices for piece in pieces])).convex_hull
+    moments, axes = np.linalg.eigh(LEAF * np.asarray(hull.moment_inertia))
+    return Mass(round(LEAF * float(hull.volume), 2), hull.center_mass - at, moments, axes)

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 import trimesh
 
+from echomodel.data.furniture.solids import Joint
 from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
 from echousd.room import fittings
 from echousd.room.fittings import WALL
@@ -29,12 +30,19 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class ShellPart:
-    """A floor, wall, ceiling, door or window: prim name, what it is, its meshes, and parts that belong to it."""
+    """A floor, wall, ceiling, door or window, or what of one moves.
+
+    Arguments:
+        name: of its prim. label: what it is, "" for a part of what is labelled.
+        pieces: its meshes. inner: parts that belong to it.
+        joint: how it moves against the part that it belongs to, None = not at all.
+    """
 
     name: str
     label: str
     pieces: tuple[Piece, ...]
     inner: tuple[ShellPart, ...] = ()
+    joint: Joint | None = None
 
 
 def walls(polygon: np.ndarray, height: float, openings: Sequence[Opening] = ()) -> list[ShellPart]:
@@ -125,24 +133,32 @@ def _filled(
 ) -> ShellPart:
     """What stands in an opening; passages have a frame and nothing else."""
     name = f"{wall}_{opening.name}"
-    made: list[tuple[str, str, trimesh.Trimesh | None, bool]] = []
+
+    def made(what: str, look: str, mesh: trimesh.Trimesh | None, solid: bool = True) -> tuple[Piece, ...]:
+        return () if mesh is None else (Piece(piece_name(name, what), look, _placed(mesh, frame), solid),)
+
     if opening.kind == "window":
-        made = [
-            ("frame", "trim", fittings.window_frame(opening), True),
-            ("glass", "glass", fittings.window_glass(opening), True),
-            ("sill", "trim", fittings.window_sill(opening), True),
-            ("rail", "rail", fittings.curtain_rail(opening, length, height), False),
-        ]
-    else:
-        made = [("frame", "trim", fittings.door_frame(opening), True)]
-        if opening.kind == "door":
-            made.append(("leaf", "leaf", fittings.door_leaf(opening), True))
-            made.append(("handle", "rail", fittings.door_handle(opening, left_first), False))
-    label = "window" if opening.kind == "window" else "door"
-    pieces = [
-        Piece(piece_name(name, what), look, _placed(m, frame), solid) for what, look, m, solid in made if m is not None
-    ]
-    return ShellPart(name, label, tuple(pieces))
+        pieces = (
+            *made("frame", "trim", fittings.window_frame(opening)),
+            *made("glass", "glass", fittings.window_glass(opening)),
+            *made("sill", "trim", fittings.window_sill(opening)),
+            *made("rail", "rail", fittings.curtain_rail(opening, length, height), solid=False),
+        )
+        return ShellPart(name, "window", pieces)
+    if opening.kind != "door":
+        return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)))
+    leaf = made("leaf", "leaf", fittings.door_leaf(opening))
+    handle = made("handle", "rail", fittings.door_handle(opening, left_first), solid=False)
+    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first))
+    return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)), (hinge,))
+
+
+def _hinge(opening: Opening, frame: np.ndarray, left_first: bool) -> Joint:
+    """How a door's leaf turns about its edge, by a right angle to the side that it opens to."""
+    at, closed, opened = fittings.hinge_line(opening, left_first)
+    anchor = frame[:3, :3] @ at + frame[:3, 3]
+    up = np.cross(frame[:3, :3] @ closed, frame[:3, :3] @ opened)  # from closed to open it turns about this
+    return Joint("hinge", "revolute", (0.0, float(np.sign(up[1])), 0.0), tuple(anchor.round(6).tolist()), np.pi / 2)
 
 
 def _placed(mesh: trimesh.Trimesh, frame: np.ndarray) -> trimesh.Trimesh:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from pxr import Usd, UsdGeom, UsdPhysics
+import trimesh
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
 from small_room import StandIn, small_graph
 
 import echousd
-from echomodel.openings import Opening, rectangle
+from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
+from echousd.check import check_room
 from echousd.graph import RoomSpec
 from echousd.room.room import RoomOptions
 from echousd.room.walls import WALL, ceiling, outline, walls
@@ -21,7 +23,9 @@ PASSAGE = Opening("way", "passage", 2, 2.0, 1.0, 2.1)
 
 
 def pieces(parts) -> dict:
-    return {p.name: p.mesh for part in parts for one in (part, *part.inner) for p in one.pieces}
+    return {piece.name: piece.mesh for part in parts for piece in part.pieces} | (
+        pieces([one for part in parts for one in part.inner]) if parts else {}
+    )
 
 
 @pytest.mark.parametrize("polygon", [rectangle(4.0, 3.0), rectangle(4.0, 3.0)[::-1].copy(), NOTCHED])
@@ -84,3 +88,59 @@ def test_prims_of_the_shell(tmp_path) -> None:
     assert "Wall_1_skirting" not in collides
     for prim in Usd.PrimRange(shell):
         assert prim.GetTypeName() != "Mesh" or UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(), prim.GetPath()
+
+
+@pytest.mark.parametrize("swing", ["in", "out"])
+@pytest.mark.parametrize("hinge", ["left", "right"])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_leaf_opens_about_its_hinge_to_the_side_that_it_should(swing, hinge, turn) -> None:
+    plan = rectangle(4.0, 3.0)[::turn].copy()
+    door = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge=hinge, swing=swing)
+    wall = walls(plan, 2.6, (door,))[2]
+    (leaf,) = wall.inner[0].inner
+    mesh = next(piece.mesh for piece in leaf.pieces if piece.name.endswith("leaf")).copy()
+    jamb, closed = hinge_point(plan, door)
+    assert np.linalg.norm(np.array(leaf.joint.anchor)[[0, 2]] - jamb) < 0.04 + (WALL if swing == "out" else 0)
+    axis = np.array(leaf.joint.axis)
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(leaf.joint.reach, axis, leaf.joint.anchor))
+    off = (mesh.vertices[:, [0, 2]] - jamb) @ inward_normal(plan, 2)  # metres into the room
+    along = (mesh.vertices[:, [0, 2]] - jamb) @ closed
+    assert np.abs(along).max() < 0.09  # open, it stands beside its jamb
+    if swing == "in":
+        assert off.max() > 0.8
+        assert shapely.Polygon(swing_area(plan, door)).buffer(0.05).covers(shapely.MultiPoint(mesh.vertices[:, [0, 2]]))
+    else:
+        assert off.min() < -0.8 - WALL
+
+
+def test_doors_articulate(tmp_path) -> None:
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
+    for up in ("Y", "Z"):
+        options = RoomOptions(up_axis=up, walls=True)
+        room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+        stage = Usd.Stage.Open(str(room.save(tmp_path / up, preview=False)))
+        door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")
+        leaf = stage.GetPrimAtPath(f"{door.GetPath()}/Wall_3_door_hinge")
+        assert not leaf.HasAPI(UsdPhysics.RigidBodyAPI)
+        cache = UsdGeom.BBoxCache(0, ["default"])
+        still = cache.ComputeWorldBound(leaf).ComputeAlignedRange()
+        door.GetVariantSets().SetSelection("articulation", "articulated")
+        assert leaf.HasAPI(UsdPhysics.RigidBodyAPI)
+        assert 5 < UsdPhysics.MassAPI(leaf).GetMassAttr().Get() < 40
+        joint = UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(f"{leaf.GetPath()}_joint"))
+        assert joint.GetBody1Rel().GetTargets() == [leaf.GetPath()]
+        assert (joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()) == (0, pytest.approx(90))
+        poses = [
+            np.array(UsdGeom.Xformable(stage.GetPrimAtPath(body.GetTargets()[0])).ComputeLocalToWorldTransform(0)).T
+            @ [*place.Get(), 1]
+            for body, place in (
+                (joint.GetBody0Rel(), joint.GetLocalPos0Attr()), (joint.GetBody1Rel(), joint.GetLocalPos1Attr()),
+            )
+        ]  # fmt: skip
+        np.testing.assert_allclose(*poses, atol=1e-5)
+        assert cache.ComputeWorldBound(leaf).ComputeAlignedRange() == still  # the choice moves nothing
+        if up == "Z":
+            continue
+        validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+        assert [e.GetMessage() for e in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+        assert check_room(tmp_path / up / f"{up}.usda").ok
