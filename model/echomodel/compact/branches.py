@@ -17,7 +17,7 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.config import CompactConfig
+from echomodel.config import CompactConfig, FurnitureConfig
 
 MEASURES = 2  # set of measures of the drafts that this version computes
 
@@ -51,12 +51,20 @@ def _outdated_layout(settings: Mapping[str, Any]) -> str | None:
     return None
 
 
+def _outdated_furniture(settings: Mapping[str, Any]) -> str | None:
+    known = FurnitureConfig()
+    told = tuple(settings.get("kinds", known.kinds)), settings.get("numbers", known.numbers)
+    if told != (known.kinds, known.numbers):
+        return "whose furniture was described in other words; train it again"
+    return None
+
+
 PARTS: dict[str, Part] = {
     "latent": Part(LatentGraph),
     "layout": Part(LayoutDenoiser, ("latent",), branch=True, outdated=_outdated_layout),
     "autoencoder": Part(Autoencoder),
     "shape": Part(ShapeDenoiser, ("latent", "autoencoder"), branch=True),
-    "furniture": Part(FurnitureDenoiser, ("latent",), branch=True),
+    "furniture": Part(FurnitureDenoiser, ("latent",), branch=True, outdated=_outdated_furniture),
 }
 
 

@@ -1,10 +1,13 @@
 """The furniture branch: known pieces stay, batches are their scenes, told styles are shared, the echo is the way."""
 
+import json
+import shutil
+
 import pytest
 import torch
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.model import CompactModel, load_weights, save_weights
+from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
 from echomodel.config import CompactConfig, FurnitureConfig
 from echomodel.data.furniture.description import GROUPS, HOT, STYLE, WIDTH
 from echomodel.echo import EchoModel
@@ -87,6 +90,26 @@ def test_weights_travel_with_the_latent_graph_and_say_what_is_missing(tmp_path):
     assert loaded.branches == {"furniture"}
     with pytest.raises(ValueError, match="2 boxes for a graph of 3 nodes"):
         model.sample_furniture(GraphBatch.single([0, 1, 2]), boxes(2), generator=torch.Generator())
+
+
+def test_weights_that_describe_furniture_in_other_words_are_refused(tmp_path):
+    from importlib import resources
+
+    from safetensors import safe_open
+    from safetensors.torch import load_file, save_file
+
+    weights = resources.files("echomodel") / "weights"
+    shipped = str(weights / "parts.safetensors")
+    with safe_open(shipped, "pt") as file:
+        header = file.metadata()
+    config = json.loads(header["config"])
+    config["furniture"]["kinds"] = [9, 5, *config["furniture"]["kinds"][2:]]  # the same width, other words
+    save_file(load_file(shipped), tmp_path / "parts.safetensors", {**header, "config": json.dumps(config)})
+    shutil.copy(str(weights / "layout.safetensors"), tmp_path)
+    with pytest.raises(
+        WeightsError, match=r"parts.safetensors: .*was described in other words; train it"
+    ):
+        EchoModel.load(tmp_path)
 
 
 def test_the_shipped_weights_share_a_told_style_across_classes():

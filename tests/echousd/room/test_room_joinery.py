@@ -69,6 +69,24 @@ def test_what_needs_more_boxes_than_the_budget_leaves_the_smallest_out():
     np.testing.assert_allclose(made.mesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "size", [(0.01, 0.01, 0.01), (40.0, 2.2, 0.6), (5.0, 0.01, 5.0), (0.3, 10.0, 0.3), (1.0, 1.0, 0.001)]
+)
+@pytest.mark.parametrize("category", ["wardrobe", "bookshelf", "floor_lamp", "plant", "kids_bed", "office_chair"])
+def test_boxes_of_any_size_are_filled(category, size):
+    made = piece(category, np.array(size))
+    assert 0 < made.faces <= 5000
+    assert made.watertight
+    np.testing.assert_allclose(made.mesh.extents, size, atol=1e-6)
+    assert all(np.isfinite(collider.mesh.vertices).all() for collider in made.colliders)
+
+
+def test_sizes_that_are_none_are_refused():
+    for size in ((0.0, 1.0, 1.0), (float("nan"), 1.0, 1.0), (-1.0, 1.0, 1.0)):
+        with pytest.raises(ValueError, match=r"size of chair is \[.*\], need three positive numbers in metres"):
+            piece("chair", np.array(size))
+
+
 def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     from pxr import Usd, UsdGeom, UsdPhysics
 
