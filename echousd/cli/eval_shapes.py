@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     import trimesh
 
+ROW = 12  # pieces of rooms in a row of their sheet
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to `echousd eval`."""
@@ -59,7 +61,7 @@ def shapes(
     if source not in ("parts", "sdf"):
         raise ValueError(f"--shapes is {source!r}, allowed: parts, sdf")
     if source == "parts":
-        _parts(meshes or shape_set, model, per_class or 8, seed, steps, sheet, out, json_out=json_out)
+        _parts(meshes or shape_set, model, per_class or 8, rooms, seed, steps, sheet, out, json_out=json_out)
         return
     if (meshes is None) == (shape_set is None):
         raise ValueError("name one set to compare with: --meshes FOLDER or --set FOLDER")
@@ -94,6 +96,7 @@ def _parts(
     compared: Path | None,
     weights: Path | None,
     per_class: int,
+    rooms: int,
     seed: int,
     steps: int | None,
     sheet: Path | None,
@@ -105,32 +108,38 @@ def _parts(
     from echomodel.data.shapeset import ShapeSet
     from echomodel.data.sheet import contact_sheet
     from echomodel.echo import EchoModel
-    from echomodel.metrics.parts_evaluation import PartsEvaluation, evaluate_parts
+    from echomodel.metrics.parts_evaluation import ROOMS, PartsEvaluation, evaluate_parts
     from echousd.cli.terminal import Terminal
 
     folder = compared / "shapes" if compared and (compared / "shapes").is_dir() else compared
     shapes = None if folder is None else ShapeSet(folder)
-    settings = PartsEvaluation(per_class=per_class, seed=seed, steps=steps)
+    settings = PartsEvaluation(per_class=per_class, rooms=rooms, seed=seed, steps=steps)
     result, made = evaluate_parts(EchoModel.load(weights), settings, shapes)
+    standing = made.pop(ROOMS, [])
     if sheet is not None:
         write_picture(sheet, contact_sheet([(name, made[name]) for name in sorted(made)]))
+        rows = [("", standing[start : start + ROW]) for start in range(0, len(standing), ROW)]
+        if rows:
+            write_picture(sheet.with_stem(f"{sheet.stem}_rooms"), contact_sheet(rows))
     if out is not None:
         write_json(out, plain_json(result))
     if json_out:
         say_json(result)
         return
     console, pieces, style = Terminal(), result["pieces"], result["style"]
-    console.print(
-        f"{pieces['pieces']} pieces, {pieces['closed']} closed, {pieces['loose']} with a loose part, "
-        f"boxes filled to {1000 * pieces['box_error']:.2g} mm"
-    )
+    for where, counts in (("alone", pieces), ("in rooms", result.get("rooms_pieces"))):
+        if counts:
+            console.print(
+                f"{counts['pieces']:.0f} pieces {where}, {counts['closed']:.0f} closed, {counts['loose']:.0f} with a "
+                f"loose part, boxes filled to {1000 * counts['box_error']:.2g} mm"
+            )
     console.print(
         f"style distance across classes: told {style['told']:.3f}, nothing told {style['untold']:.3f}, "
         f"of other suites {style['other']:.3f}, ratio {style['ratio']:.2f}"
     )
     console.print(
         f"within a class: style distance {result['diversity']['style_distance']:.3f}, "
-        f"{result['diversity']['distinct']} of {pieces['pieces']} pieces differ"
+        f"{result['diversity']['distinct']} of {pieces['pieces']:.0f} pieces differ"
     )
     for name in ("sets", "shapes_sets"):
         if "mean" in result.get(name, {}):

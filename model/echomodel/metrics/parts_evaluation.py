@@ -13,11 +13,14 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.data.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.data.rooms import generate_rooms
 from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
+from echomodel.metrics.shape_evaluation import FIRST_ROOM
 from echomodel.metrics.shapes import set_scores, surface_points
 from echomodel.progress import StageListener
+from echomodel.rules import label_relations
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -26,14 +29,22 @@ if TYPE_CHECKING:
 
 POINTS = 1024
 SUITE = 4  # pieces of different classes in a suite
+ROOMS = "rooms"  # key of the meshes that stand in rooms
+NOTHING = {"pieces": 0.0, "closed": 0.0, "loose": 0.0, "box_error": 0.0}
 
 
 @dataclass(frozen=True)
 class PartsEvaluation:
-    """How much to score: `per_class` pieces of every class, `suites` of four pieces; `steps`, None = the model's."""
+    """How much to score; `steps`, None = the model's.
+
+    Arguments:
+        per_class: pieces of every class, each alone. suites: of four pieces of different classes. rooms: of the room
+            generator, half of their relations told, all of whose furniture is made.
+    """
 
     per_class: int = 8
     suites: int = 64
+    rooms: int = 0
     seed: int = 0
     steps: int | None = None
 
@@ -53,8 +64,8 @@ def evaluate_parts(
 
     Returns:
         `pieces` (how many, closed, loose, largest error of the box), `sets` against pieces of styles drawn anew (and
-        `shapes_sets` against the set), `style` within told suites and elsewhere, `diversity` within a class; and the
-        meshes by class.
+        `shapes_sets` against the set), `rooms_pieces` of generated rooms, `style` within told suites and elsewhere,
+        `diversity` within a class; and the meshes by class, those of rooms under "rooms".
 
     Raises ValueError for weights without a furniture branch.
     """
@@ -65,7 +76,7 @@ def evaluate_parts(
     generator = torch.Generator().manual_seed(settings.seed)
     meshes: dict[str, list[trimesh.Trimesh]] = {}
     fresh: dict[str, list[trimesh.Trimesh]] = {}
-    counts = {"pieces": 0, "closed": 0, "loose": 0, "box_error": 0.0}
+    counts = dict(NOTHING)
     spread, distinct = [], 0
     words = [category.name for category in vocabulary().categories]
     for number, name in enumerate(words):
@@ -74,13 +85,7 @@ def evaluate_parts(
         found = _sampled(model, graph, sizes, generator, settings.steps)
         meshes[name], fresh[name] = [], []
         for vector, size in zip(found.numpy(), sizes, strict=True):
-            parts = solids(name, *piece_of(vector), size)
-            mesh = mesh_of(parts, size)
-            counts["pieces"] += 1
-            counts["closed"] += bool(mesh.is_watertight and mesh.is_winding_consistent)
-            counts["loose"] += bool(loose_solids(parts))
-            counts["box_error"] = max(counts["box_error"], float(np.abs(mesh.extents - size).max()))
-            meshes[name].append(mesh)
+            meshes[name].append(_counted(counts, name, vector, size))
             fresh[name].append(mesh_of(solids(name, Style.draw(rng), Choices.draw(rng), size), size))
         apart = style_distances(found)[~torch.eye(len(found), dtype=torch.bool)]
         spread.append(float(apart.mean()) if len(apart) else 0.0)
@@ -91,9 +96,38 @@ def evaluate_parts(
     if shapes is not None:
         result["shapes_set"] = str(shapes.directory)
         result["shapes_sets"] = set_scores(ours, _references(shapes, ours, rng))
+    if settings.rooms:
+        result["rooms_pieces"], meshes[ROOMS] = room_pieces(model, settings, generator)
     result["style"] = style_scores(model, settings, generator)
     result["diversity"] = {"style_distance": float(np.mean(spread)), "distinct": distinct}
     return result, meshes
+
+
+def room_pieces(
+    model: EchoModel, settings: PartsEvaluation, generator: torch.Generator
+) -> tuple[dict[str, float], list[trimesh.Trimesh]]:
+    """The furniture of generated rooms: counts as for the pieces that stand alone, and the meshes."""
+    rng = np.random.default_rng([settings.seed, 6])
+    words = [category.name for category in vocabulary().categories]
+    counts, meshes = dict(NOTHING), []
+    for room in generate_rooms(settings.rooms, settings.seed, start=FIRST_ROOM):
+        relations = label_relations(room, rules="strict", drop=0.5, rng=rng)
+        graph = GraphBatch.from_room(room, triplets=torch.from_numpy(relations))
+        found = model.sample_furniture(graph, Boxes.from_room(room), generator=generator, steps=settings.steps)
+        for number, vector, size in zip(graph.category.tolist(), found.float().cpu().numpy(), room.size, strict=True):
+            meshes.append(_counted(counts, words[number], vector, np.asarray(size, float)))
+    return counts, meshes
+
+
+def _counted(counts: dict[str, float], name: str, vector: np.ndarray, size: np.ndarray) -> trimesh.Trimesh:
+    """The mesh of one piece, taken into account."""
+    parts = solids(name, *piece_of(vector), size)
+    mesh = mesh_of(parts, size)
+    counts["pieces"] += 1
+    counts["closed"] += bool(mesh.is_watertight and mesh.is_winding_consistent)
+    counts["loose"] += bool(loose_solids(parts))
+    counts["box_error"] = max(counts["box_error"], float(np.abs(mesh.extents - size).max()))
+    return mesh
 
 
 def style_scores(model: EchoModel, settings: PartsEvaluation, generator: torch.Generator) -> dict[str, float]:
