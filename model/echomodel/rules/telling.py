@@ -9,10 +9,10 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import BoxesLike
+from echomodel.vocabulary import vocabulary
 
 SELDOM = 0.3  # weight of sizes and styles among the relations that are told
-PLACES = 8  # predicates below this number, and mirror images, speak of places
-MIRROR = 12
+PLAIN = ("comparison", "likeness")  # kinds of predicates that say nothing of places
 JITTER = 0.3  # largest share by which a gap is taken for larger than it is
 
 
@@ -24,7 +24,8 @@ def near_first(
     All unordered pairs are told one relation before any is told a second; which one is drawn.
 
     Arguments:
-        holds: (P, 16) bool over the ordered pairs `receiver`, `sender` (P,) int64 of scenes with `counts` (S,) nodes.
+        holds: (P, predicates) bool over the ordered pairs `receiver`, `sender` (P,) int64 of scenes with `counts` (S,)
+            nodes.
         boxes: N boxes, metres and radians. generator: source of the draws.
     """
     found = holds.nonzero()
@@ -34,7 +35,8 @@ def near_first(
     pair, predicate = found.unbind(1)
     one, other = receiver[pair], sender[pair]
     joined = torch.minimum(one, other) * len(size) + torch.maximum(one, other)
-    weight = torch.where((predicate >= PLACES) & (predicate != MIRROR), SELDOM, 1.0)
+    plain = torch.tensor([row.kind in PLAIN for row in vocabulary().predicates])
+    weight = torch.where(plain[predicate], SELDOM, 1.0)
     luck = torch.rand(len(found), generator=generator) ** (1 / weight)
     order = torch.argsort(luck, descending=True)
     order = order[torch.argsort(joined[order], stable=True)]
@@ -58,7 +60,7 @@ def told_relations(relations: Tensor, boxes: BoxesLike, per_object: float, gener
         boxes: the n boxes of the room. per_object: relations an object. generator: source of the draws.
     """
     count = len(torch.as_tensor(boxes.yaw))
-    holds = torch.zeros(count * count, 16, dtype=torch.bool)
+    holds = torch.zeros(count * count, len(vocabulary().predicates), dtype=torch.bool)
     holds[relations[:, 0] * count + relations[:, 2], relations[:, 1]] = True
     number = torch.arange(count * count)
     one, other = number // count, number % count

@@ -15,6 +15,7 @@ import numpy as np
 
 from echomodel.data.rooms.generator import generate_room
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_statistics, room_type_statistics
+from echomodel.files import write_text
 from echomodel.sizes import size_score
 
 ROUNDS, ROOMS, SIZE_ROOMS, SEED = 8, 1200, 3000, 20
@@ -69,7 +70,7 @@ def write_requests(path: Path) -> None:
         f' "{name}": {{\n' + ",\n".join(f"  {json.dumps(key)}: {json.dumps(table[key])}" for key in table) + "\n }"
         for name, table in (("presence", presence), ("size", sizes))
     ]
-    path.write_text("{\n" + ",\n".join(tables) + "\n}\n", "utf-8")
+    write_text(path, "{\n" + ",\n".join(tables) + "\n}\n")
 
 
 if __name__ == "__main__":
