@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
-from echousd.room import assets, cameras, joints, lights, looks, materials, physics, structure
+from echousd.room import assets, cameras, coverings, joints, lights, looks, materials, physics, structure
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
@@ -185,8 +185,12 @@ def room_looks(
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
-    table |= {"floor": looks.look(harmony, "floor"), **structure.LOOKS, "wall": looks.look(harmony, "wall")}
-    bindings |= {mesh.path: mesh.look for part in built for mesh in part.meshes}
+    table |= {slot: looks.look(harmony, slot) for slot in ("wall", "wallpaper")} | structure.LOOKS
+    table["floor"] = looks.look(harmony, coverings.floor_slot(room))
+    paper = {"wall": "wallpaper"} if (papered := coverings.papered_wall(room)) else {}
+    for part in built:
+        own = paper if part.path == f"{SHELL}/{papered}" else {}
+        bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
     used = {*bindings.values(), *(f"{ROOM_STYLE}_{slot}" for slot in small)}
     return {name: look for name, look in table.items() if name in used}, bindings
 

@@ -126,6 +126,51 @@ def plaster() -> Relief:
     return Relief(1 + 0.002 * fine, 0.00006 * fine)
 
 
+def papered() -> Relief:
+    """Wallpaper: broad soft stripes with a fine line at their edges and sprigs between them."""
+    u, v = _grid()
+    place = (8 * u) % 1.0
+    stripe = 1 / (1 + np.exp(-24 * (np.abs(place - 0.5) - 0.25)))
+    line = np.exp(-(((np.abs(place - 0.5) - 0.25) / 0.018) ** 2))
+    x, y = (8 * u) % 1.0 - 0.5, (8 * v + 0.5 * np.floor(8 * u)) % 1.0 - 0.5
+    sprig = sum(
+        np.exp(-(((x - a) / 0.035) ** 2 + ((y - b) / 0.075) ** 2)) for a, b in ((0, 0.1), (-0.07, 0), (0.07, 0))
+    )
+    tone = 1 + 0.035 * stripe - 0.06 * line - 0.07 * sprig
+    return Relief(tone / tone.mean())
+
+
+def carpet() -> Relief:
+    """Wall-to-wall carpet, loops in rows."""
+    fine, soft = noise(83, 200.0, 200.0, 4.0), noise(84, 10.0, 10.0)
+    return Relief(1 + 0.06 * fine + 0.012 * soft, 0.002 * fine)
+
+
+def tiles(across: int = 4) -> Relief:
+    """Square floor tiles with joints, each of a tone of its own."""
+    u, v = _grid()
+    edge = np.minimum(*(np.minimum(w * across % 1.0, 1 - w * across % 1.0) + 0 * u * v for w in (u, v)))
+    joint = np.clip(1 - edge / 0.012, 0, 1)
+    own = np.kron(np.random.default_rng(85).normal(1.0, 0.02, (across, across)), np.ones((SIZE // across,) * 2))
+    tone = (own + 0.015 * noise(86, 10.0, 10.0)) * (1 - 0.32 * joint)
+    return Relief(tone / tone.mean(), -0.001 * joint, 0.35 * joint)
+
+
+def brushed() -> Relief:
+    """Metal brushed along u."""
+    streaks = noise(87, 1.5, 220.0, 1.6)
+    return Relief(1 + 0.035 * streaks, None, 0.07 * streaks)
+
+
+def bound() -> Relief:
+    """Book cloth: a fine weave, rubbed at the bands of the spine."""
+    _, v = _grid()
+    weave = noise(88, 150.0, 150.0, 4.0)
+    bands = np.exp(-((((3 * v) % 1.0 - 0.5) / 0.04) ** 2))
+    tone = 1 + 0.035 * weave + 0.10 * bands
+    return Relief(tone / tone.mean(), 0.0001 * weave)
+
+
 def pile() -> Relief:
     """Short pile."""
     fine = noise(81, 160.0, 160.0, 4.0)
@@ -185,7 +230,7 @@ PATTERNS: Mapping[str, Callable[[], Relief]] = {
     made.__name__: made
     for made in (
         wood, veneer, planks, woven, knitted, linen, leather, plaster, pile, bordered, striped, latticed, wicker, leaf,
-        stone,
+        stone, papered, carpet, tiles, brushed, bound,
     )
 }  # fmt: skip
 

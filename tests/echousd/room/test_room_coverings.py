@@ -1,0 +1,54 @@
+"""What covers floors and walls: chosen by the seed, the paper behind the bed, and in every harmony."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from pxr import Usd, UsdShade
+from small_room import StandIn, small_graph
+
+import echousd
+from echousd.room import RoomOptions
+from echousd.room.coverings import floor_slot, papered_wall
+from echousd.room.room import Provenance
+
+
+@pytest.fixture(scope="module")
+def room():
+    return echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True)
+    )
+
+
+def seeded(room, seed):
+    return replace(room, provenance=Provenance(seed=seed))
+
+
+def test_about_a_third_of_the_bedrooms_has_carpet_and_a_third_paper(room):
+    floors = [floor_slot(seeded(room, seed)) for seed in range(90)]
+    papers = [papered_wall(seeded(room, seed)) for seed in range(90)]
+    assert set(floors) == {"floor", "carpet"}
+    assert 18 < floors.count("carpet") < 42
+    assert 18 < 90 - papers.count("") < 42
+    assert len(set(papers)) == 2  # none, and the one behind the bed
+    assert papered_wall(replace(seeded(room, papers.index(max(papers))), options=RoomOptions())) == ""
+
+
+def test_coverings_are_bound_and_have_their_images(room, tmp_path):
+    seed = next(s for s in range(99) if papered_wall(seeded(room, s)) and floor_slot(seeded(room, s)) == "carpet")
+    root = seeded(room, seed).save(tmp_path / "bedroom", preview=False)
+    stage = Usd.Stage.Open(str(root))
+
+    def look(path):
+        return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
+
+    wall = papered_wall(seeded(room, seed))
+    assert look(f"/Room/Shell/{wall}/{wall}_mesh") == "wallpaper"
+    assert look(f"/Room/Shell/{wall}/{wall}_skirting") == "trim"
+    others = [f"Wall_{n}" for n in range(1, 5) if f"Wall_{n}" != wall]
+    assert {look(f"/Room/Shell/{name}/{name}_mesh") for name in others} == {"wall"}
+    assert look("/Room/Shell/Floor/Floor_mesh") == "floor"
+    names = {path.name.split("_")[0] for path in (root.parent / "textures").iterdir()}
+    assert {"carpet", "papered"} <= names
+    assert "planks" not in names
