@@ -31,6 +31,7 @@ ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or
 CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 400  # of one room: repair grows faster than their number
 TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
+OF_OPENINGS = ("door_free", "window_free")  # living rules
 DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
 
 
@@ -134,6 +135,7 @@ def best_boxes(
     repair: bool = True,
     sized: Boxes | None = None,
     drawn: Drawn | None = None,
+    proposed: bool = False,
     steps: int | None = None,
     change: GraphEdit | None = None,
     timer: StageTimer,
@@ -145,6 +147,7 @@ def best_boxes(
     Arguments:
         drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
         drawn: drafts that were sampled already.
+        proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
         others: as `sample_boxes` and `finished_boxes`.
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
@@ -170,7 +173,7 @@ def best_boxes(
             if drafts == 1 or not repair:
                 return found
             with timer.stage("repair"):
-                wrong = _wishes(graph, found)
+                wrong = _wishes(graph, found, proposed)
             if best is None or wrong < worth:
                 best, worth = found, wrong
             if not any(worth):
@@ -208,12 +211,17 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
     return out
 
 
-def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]]) -> tuple[float, ...]:
-    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults."""
+def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], proposed: bool) -> tuple[float, ...]:
+    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults.
+
+    Arguments:
+        proposed: faults of openings come last, as these may still be moved.
+    """
     from echousd.repair.living import living_faults
 
     boxes, conflicts = found
-    return len(layout_outcome(graph, boxes).faults), len(conflicts), len(living_faults(graph, boxes))
+    late = [proposed and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
+    return len(layout_outcome(graph, boxes).faults), len(conflicts), len(late) - sum(late), sum(late)
 
 
 def finished_boxes(
@@ -223,17 +231,24 @@ def finished_boxes(
     boxes = _alike(graph, boxes, styles)
     if not repair:
         return rounded_boxes(graph, boxes), ()
-    from echousd.repair import RepairConfig
+    from echousd.repair import RepairConfig, RepairResult
     from echousd.repair import repair as repaired
+    from echousd.repair.living import living_faults
+
+    def wrong(one: RepairResult) -> tuple[int, ...]:
+        return len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
 
     graph = _with_homeless_unlocked(graph)
     with timer.stage("repair"):
         found = repaired(graph, boxes)
         same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):
-            # chairs of one set that had to shrink: all of them, if it fits
-            second = repaired(with_sizes(graph, same), same, config=RepairConfig(arrange=False))
-            if len(second.broken) <= len(found.broken) and len(second.collisions) <= len(found.collisions):
+            # chairs of one set that had to shrink: all of them, if it fits; else at other places
+            fixed = with_sizes(graph, same)
+            second = repaired(fixed, same, config=RepairConfig(arrange=False))
+            if wrong(second) > wrong(found):
+                second = min(second, repaired(fixed, same), key=wrong)
+            if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
     return rounded_boxes(graph, found.boxes), found.conflicts
 

@@ -152,7 +152,8 @@ def generate(
         whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
         return best_boxes(
             echo, with_given_sizes(graph, sizes), styles, seed=seed, drafts=drafts, repair=repair,
-            drawn=drawn if whole else None, steps=steps, timer=timer,
+            drawn=drawn if whole else None, proposed=not stated.room.openings, steps=steps,
+            timer=timer,
         )  # fmt: skip
 
     def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
@@ -175,7 +176,7 @@ def generate(
     for number in range(1, samples):
         found, _ = best_boxes(
             echo, sized, styles, seed=seed, number=number, drafts=drafts, repair=repair, sized=boxes, steps=steps,
-            timer=timer,
+            proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
         layouts.append(found)
     plan = plan_boxes(layouts)

@@ -14,6 +14,7 @@ from echousd.repair.geometry import depth_inside
 
 MISSING = 1.6  # for each place that those who attend a piece would not find
 UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
+BESIDE = 0.8  # share of its half extent that a place lies off the piece's middle, to be on a side of it
 ELBOW = 0.3  # metres behind a chair, to pull it out
 VIEW = 1.1  # per metre that a television is beside the line of sight
 
@@ -34,11 +35,18 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
         size = setting.size[members[0]]
         reach = 0.35 * float(min(size[0], size[2])) + ELBOW * (setting.stances[members[0]] == "at")
         free = _free(setting, state, i, points, reach)
-        told = (offset * asked > 0.06) | (asked == 0)
+        told = (offset * asked > BESIDE * _half(setting, i, poses)[:, None]) | (asked == 0)
         kept = free & told.all(-1)
         lost = np.maximum(min(len(members), len(local)) - kept.sum(1), 0)
         out += (UNTOLD if asked.any() else MISSING) * lost
     return out
+
+
+def _half(setting: Setting, i: int, poses: Poses) -> np.ndarray:
+    """(K, 2) float: half of what box i takes along x and z at each pose, metres."""
+    cos, sin = (np.abs(turn) for turn in poses.turns)
+    width, depth = setting.size[i, [0, 2]] / 2
+    return np.concatenate([cos * width + sin * depth, sin * width + cos * depth], 1)
 
 
 def _waiting(setting: Setting, state: State, i: int) -> list[tuple[list[Slot], np.ndarray, list[int]]]:

@@ -95,7 +95,8 @@ class Setting:
                 share, owner = shared_fraction(self.kinds[i], self.kinds[j])
                 side = self.size[(i, j)[owner]]
                 out[i, j] = out[j, i] = share * min(side[0], side[2])
-                if self.anchor[i] != j and self.anchor[j] != i:  # chairs are tucked under their own table
+                strange = self.anchor[i] != j and self.anchor[j] != i  # chairs are tucked under their own table
+                if strange or "head" in (self.stances[i], self.stances[j]):  # solid pieces would be moved apart later
                     out[i, j] = out[j, i] = 0.0
                 if self.carrier[i] == j or self.carrier[j] == i:
                     out[i, j] = out[j, i] = np.inf
@@ -148,11 +149,16 @@ class Setting:
 
     @cached_property
     def told(self) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]:
-        """For each box its relations (r, 3) int, their other ends (r,) int and whether they name a side (r,) bool."""
-        sided = np.array([any(predicate.step) for predicate in vocabulary().predicates], bool)
+        """For each box its relations (r, 3) int, their other ends (r,) int and whether they name a side (r,) bool.
+
+        Without those of sizes, which hold or not wherever it stands.
+        """
+        words = vocabulary().predicates
+        sided = np.array([any(predicate.step) for predicate in words], bool)
+        placed = np.array([predicate.measures != "size" for predicate in words], bool)[self.triplets[:, 1]]
         out = []
         for i in range(len(self.kinds)):
-            rows = self.triplets[(self.triplets[:, [0, 2]] == i).any(1)]
+            rows = self.triplets[(self.triplets[:, [0, 2]] == i).any(1) & placed]
             out.append((rows, np.where(rows[:, 0] == i, rows[:, 2], rows[:, 0]), sided[rows[:, 1]]))
         return tuple(out)
 
