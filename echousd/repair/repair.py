@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
+UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 DEFAULT_HEIGHT = 2.8
 
@@ -231,7 +232,10 @@ def repair_boxes(
     if floor_polygon is not None and config.arrange:
         sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
         told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
-        usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=np.isin(np.arange(n), told))
+        higher = [predicate.id for predicate in vocabulary().predicates if predicate.order == "height"]
+        of_more = np.unique(triplets[np.isin(triplets[:, 1], list({*sizes} - {*higher}))][:, [0, 2]])
+        lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), told)[:, None] & UPRIGHT)
+        usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=lenient)
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         laid = laid_tables(at.problem.categories, at.size, anchor, ~rigid & ~np.isin(np.arange(n), told))

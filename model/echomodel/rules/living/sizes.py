@@ -37,21 +37,20 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
 
     Arguments:
         categories: n words. size: (n, 3) float, metres.
-        lenient: (n,) bool, boxes that are only brought into what the rule of scale allows.
+        lenient: (n, 3) bool, sides that are only brought into what the rule of scale allows.
     """
     out = size.copy()
     for number, word in enumerate(categories):
         if not kind_of(word).name:
             continue
-        low, high = (np.array(side) for side in size_range(word))
         table, usual = size_statistics(word), kind_of(word).usual
-        if lenient[number]:  # told to be larger or smaller than something: no lamp becomes two metres wide for that
-            high = np.minimum(high, np.array([side[1] for side in usual]) * LARGER) if usual else high
-        else:
-            ends = zip(*usual, strict=True) if usual else (table.low, table.high)
-            middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
-            low, high = (middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends)
-        out[number] = np.clip(size[number], low, high)
+        low, high = (np.array(side) for side in size_range(word))
+        if usual:  # no lamp becomes two metres wide because it is told to be larger than something
+            high = np.minimum(high, np.array([side[1] for side in usual]) * LARGER)
+        ends = zip(*usual, strict=True) if usual else (table.low, table.high)
+        middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
+        most = [middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends]
+        out[number] = np.clip(size[number], *np.where(lenient[number], (low, high), most))
     return out
 
 
