@@ -28,7 +28,7 @@ types: $(STAMP)
 test: lint types
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not clients"
 
-# make clients: opens generated rooms in Blender, three.js, NVIDIA's validator and older OpenUSDs.
+# make clients: opens generated rooms in Blender, three.js, simulators, validators and older OpenUSDs.
 clients: $(STAMP)
 	$(BIN)/python -m pytest tests/clients -m clients
 

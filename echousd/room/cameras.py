@@ -9,6 +9,7 @@ from echousd.room.volume import Volume
 from echousd.sight import Furniture
 from echousd.views import APERTURE, FOCAL_LENGTH, MARGIN, WIDE, inside_view, perspective_view
 
+FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
 TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
 
 
@@ -20,7 +21,7 @@ def write_cameras(
     walled: np.ndarray | None = None,
     hung: Furniture | None = None,
 ) -> None:
-    """Author `/Room/Cameras/top` (orthographic, -Z up in the picture) and `/Room/Cameras/perspective`.
+    """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
 
     Arguments:
         stage: receives the cameras.
@@ -30,14 +31,16 @@ def write_cameras(
     """
     UsdGeom.Scope.Define(stage, "/Room/Cameras")
     top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
-    top.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+    # from afar rather than orthographic, whose width Blender takes for ten times what it is
     width = float((volume.upper - volume.lower)[[0, 2]].max()) * MARGIN
+    height = float(volume.upper[1]) + FAR * width
+    top.CreateFocalLengthAttr(FAR * APERTURE * TENTHS)
     for aperture in (top.CreateHorizontalApertureAttr(), top.CreateVerticalApertureAttr()):
-        aperture.Set(10 * width)  # tenths of a scene unit
-    height = float(volume.upper[1]) + 2.0
+        aperture.Set(APERTURE * TENTHS)
+    top.CreateFocusDistanceAttr(height)
     top.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height, float(volume.centre[2])))
     top.AddRotateXOp().Set(-90.0)
-    top.CreateClippingRangeAttr(Gf.Vec2f(0.1, height + 1.0))
+    top.CreateClippingRangeAttr(Gf.Vec2f(0.5 * FAR * width, height + 1.0))
     camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
     if walled is not None:
         matrix = inside_view(walled, furniture, float(volume.upper[1]), hung)

@@ -98,6 +98,12 @@ def layer_data(room: RoomData, name: str) -> dict[str, Any]:
     }
 
 
+def simready_data(room: RoomData) -> dict[str, Any]:
+    """What SimReady's profiles ask of a root layer besides; the date is the earliest there is, as in our archives."""
+    told = {"asset_type": "Scene", "source_file": room.provenance.source or "none", "usd_date_generated": "1980-01-01"}
+    return {**told, "SimReady_Metadata": dict(told)}
+
+
 def geometry_layer(room: RoomData) -> Sdf.Layer:
     """`layers/geometry.usda`: every object references its asset."""
     stage = _room_stage(room, "geometry")
@@ -217,6 +223,7 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls."""
     stage = _room_stage(room, "")
     layer = stage.GetRootLayer()
+    layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
     layer.documentation = "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten."
     UsdGeom.SetStageUpAxis(stage, room.options.up_axis)
     root = UsdGeom.Xform.Define(stage, "/Room")

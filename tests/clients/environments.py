@@ -11,7 +11,7 @@ PYTHON_CLIENTS = {
     "blender": ("bpy==5.0.1",),
     "blender42": ("bpy==4.2.0", "numpy<2"),
     "mujoco": ("mujoco-usd==4.0.0",),
-    "newton": ("newton==1.8.0", "warp-lang==1.19.0", "usd-core==26.11", "scipy", "trimesh", "mujoco", "mujoco-warp"),
+    "newton": ("newton[importers]==1.8.0", "warp-lang==1.19.0", "mujoco==4.0.0", "mujoco-warp==4.0.0"),
     "omni": ("omniverse-asset-validator==1.18.0", "usd-core==26.11"),
     "simready": ("simready-validate==2026.8.0", "simready-foundation-tier-core==2026.8.0"),
     "tinyusdz": ("tinyusdz==0.9.4", "numpy"),

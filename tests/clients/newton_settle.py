@@ -17,7 +17,9 @@ for file in sys.argv[1:]:
     builder = newton.ModelBuilder()
     builder.add_usd(file)
     model = builder.finalize(device="cpu")
-    solver = newton.solvers.SolverMuJoCo(model, use_mujoco_cpu=True)
+    solver = newton.solvers.SolverMuJoCo(
+        model, use_mujoco_cpu=True, integrator="implicitfast", cone="elliptic", impratio=10.0
+    )  # the pyramid, its default, lets things creep
     now, after, control = model.state(), model.state(), model.control()
     newton.eval_fk(model, model.joint_q, model.joint_qd, now)
     start = now.body_q.numpy().copy()

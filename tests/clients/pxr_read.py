@@ -33,7 +33,7 @@ print(
     json.dumps(
         {
             "version": list(Usd.GetVersion()),
-            "composition_errors": [str(error) for error in stage.GetCompositionErrors()],
+            "composition_errors": [str(error) for error in getattr(stage, "GetCompositionErrors", list)()],
             "up_axis": str(UsdGeom.GetStageUpAxis(stage)),
             "objects": objects,
             "relations": relations,

@@ -19,7 +19,7 @@ for (const file of files) {
   const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
   const scene = new USDLoader().parse(buffer, path.dirname(file) + '/');
   scene.updateMatrixWorld(true);
-  const found = { file, meshes: 0, triangles: 0, withoutUv: [], materials: new Set(), objects: {} };
+  const found = { file, meshes: 0, triangles: 0, withoutUv: [], materials: new Set(), maps: {}, objects: {} };
   scene.traverse((thing) => {
     if (thing.name) found.objects[thing.name] = true;
     if (!thing.isMesh) return;
@@ -27,7 +27,10 @@ for (const file of files) {
     found.meshes += 1;
     found.triangles += (geometry.index ? geometry.index.count : geometry.attributes.position.count) / 3;
     if (!geometry.attributes.uv) found.withoutUv.push(thing.name);
-    for (const material of [thing.material].flat()) found.materials.add(material.name || material.color.getHexString());
+    for (const material of [thing.material].flat()) {
+      found.materials.add(material.uuid);
+      for (const map of ["map", "normalMap", "roughnessMap"]) if (material[map]) found.maps[map] = (found.maps[map] || 0) + 1;
+    }
   });
   const box = new THREE.Box3().setFromObject(scene);
   console.log(JSON.stringify({

@@ -251,16 +251,14 @@ def test_colliders_end_where_the_meshes_do(room):
 
 
 def test_cameras_see_everything_and_light_is_there(stage, room):
-    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
-    to_view = camera.GetCamera(0).frustum.ComputeViewMatrix() * camera.GetCamera(0).frustum.ComputeProjectionMatrix()
-    for number, name in enumerate(room.names):
-        low, high = room.meshes[name].bounds
-        for corner in np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3):
-            seen = to_view.Transform(Gf.Vec3d(*(room.pose(number) @ [*corner, 1])[:3]))
-            assert max(abs(v) for v in seen) <= 1.0, name
-    top = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/top"))
-    assert top.GetProjectionAttr().Get() == "orthographic"
-    assert top.GetHorizontalApertureAttr().Get() / 10 >= 4.0
+    for camera in ("perspective", "top"):
+        frustum = UsdGeom.Camera(stage.GetPrimAtPath(f"/Room/Cameras/{camera}")).GetCamera(0).frustum
+        to_view = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
+        for number, name in enumerate(room.names):
+            low, high = room.meshes[name].bounds
+            for corner in np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3):
+                seen = to_view.Transform(Gf.Vec3d(*(room.pose(number) @ [*corner, 1])[:3]))
+                assert max(abs(v) for v in seen) <= 1.0, (camera, name)
     assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
     assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
 
