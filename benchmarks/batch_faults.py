@@ -56,7 +56,7 @@ def main() -> None:
         quiet = [name for name, row in read_journals(calm).items() if row["state"] == "done"]
         print(f"undisturbed: {len(quiet)} rooms in {time.monotonic() - began:.0f} s", flush=True)
         run, kills = None, {"worker": 0, "run": 0}
-        for number in range(options.kills):
+        while (number := sum(kills.values())) < options.kills:
             if run is None:
                 resume = (wild / ".batch" / "plan.jsonl").is_file()
                 run = subprocess.Popen(
@@ -64,8 +64,9 @@ def main() -> None:
                 )
             try:
                 run.wait(rng.uniform(0.2, options.longest))
-                run = None  # it was faster than the next kill
-                continue
+                run = None
+                print(f"all rooms were there after {number} kills", flush=True)
+                break
             except subprocess.TimeoutExpired:
                 pass
             workers = workers_of(run.pid)

@@ -90,10 +90,11 @@ def memory(request: BatchRequest, folder: Path) -> None:
     folder.mkdir()
     save_plan(plan, folder)
     pool, journal = LocalWorkers(1), Journal(shard_folder(folder, (0, 1)))
-    step = max(1, len(plan.entries) // 10)
+    step, told = max(1, len(plan.entries) // 10), {0}
 
     def tell(progress: BatchProgress) -> None:
-        if progress.room and progress.done % step == 0:
+        if progress.done % step == 0 and progress.done not in told:
+            told.add(progress.done)
             print(f"{progress.done:6d} rooms  {progress.megabytes:6.0f} MiB, {progress.failed} failed", flush=True)
 
     Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions(progress=tell)).execute(pool)
