@@ -48,7 +48,7 @@ def edit(
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
-    faces: Annotated[int, typer.Option(help="Face budget of each new mesh.", min=100)] = 5000,
+    faces: Annotated[int | None, typer.Option(help="Faces of each new mesh; default: as the room.", min=100)] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most, the best is kept.", min=1, max=64)] = None,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")

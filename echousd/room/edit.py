@@ -21,7 +21,7 @@ from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
-from echousd.room.manifest import check_seed
+from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
@@ -36,7 +36,7 @@ from echousd.room.sources.retrieval import (
     source_of,
     with_given_sizes,
 )
-from echousd.room.sources.source import FACES, ShapeRequest
+from echousd.room.sources.source import ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import layout_outcome, warn_of_faults
@@ -55,7 +55,7 @@ def edit(
     repair: bool = True,
     drafts: int | None = None,
     steps: int | None = None,
-    faces: int = FACES,
+    faces: int | None = None,
     progress: StageListener | None = None,
     assets: AssetWishes | str | Path | None = None,
 ) -> Room:
@@ -70,7 +70,8 @@ def edit(
             those of the room.
         seed: of the new randomness.
         shapes: as for `generate`; None = what the room is made of.
-        model, repair, drafts, steps, faces, progress, assets: as for `generate`.
+        faces: face budget of each new mesh; None = that of the room.
+        model, repair, drafts, steps, progress, assets: as for `generate`.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room, and of
@@ -125,7 +126,7 @@ def edit(
             notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
         return layouts
 
-    layouts, models = laid_out(given.sizes), given
+    layouts, models, budget = laid_out(given.sizes), given, faces or saved.manifest.get("faces", FACES)
     if fresh and shapes is not None:
         models = retrieved(graph, layouts[0], styles, shapes, wishes, seed, given, among=fresh)
         layouts = laid_out(models.sizes) if models.sizes != given.sizes else layouts
@@ -135,11 +136,11 @@ def edit(
     if fresh and shapes is not None:
         wanted = tuple(name for name in graph.names if name in fresh)
         request = ShapeRequest(
-            graph, layouts[0], styles, seed, model_used, steps, faces, wanted, dict(geometry), change, timer, models
+            graph, layouts[0], styles, seed, model_used, steps, budget, wanted, dict(geometry), change, timer, models
         )
         made = mixed_shapes(request, shapes)
         own = {name: made.geometry[owner] for name, owner in made.owners.items()}
-        geometry |= merged(own, saved.manifest.get("merge", "parts"), faces)
+        geometry |= merged(own, saved.manifest.get("merge", "parts"), budget)
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
     manifest = saved.manifest
@@ -158,7 +159,7 @@ def edit(
         layouts=tuple(layouts),
         outcomes=outcomes,
         notes=notes,
-        provenance=_provenance(manifest, model_used),
+        provenance=_provenance(manifest, model_used, budget),
         options=RoomOptions(
             manifest["up_axis"],
             manifest.get("walls", False),
@@ -267,8 +268,8 @@ def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, given: bool, root:
         )
 
 
-def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None) -> Provenance:
+def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None, faces: int) -> Provenance:
     preset, model = manifest["preset"], manifest["model"]
     if echo is not None:
         preset, model = echo.preset, echo.hash or model
-    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])
+    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"], faces)

@@ -19,6 +19,9 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=255)
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
 
 
+FACES = 5000  # budget of each mesh where nobody says another
+
+
 class Step(BaseModel):
     """One edit that can be taken back: what it said, the archive with what it replaced, and the files that it added."""
 
@@ -51,6 +54,7 @@ class Manifest(BaseModel):
     dress: Literal["none", "some", "full"] = "none"
     palette: str = ""
     merge: Literal["parts", "bodies", "closed"] = "parts"
+    faces: Annotated[int, Field(ge=1)] = FACES
     meshes: dict[str, dict[str, Any]] = {}
     history: list[Step] = []
     store: Annotated[str, Field(max_length=4096)] = ""

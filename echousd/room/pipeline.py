@@ -30,7 +30,7 @@ from echousd.room.layouts import (
     with_sizes,
 )
 from echousd.room.locking import with_locked_places
-from echousd.room.manifest import check_seed
+from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.owned import with_own_boxes, with_own_pieces
 from echousd.room.progress import StageTimer
@@ -39,7 +39,7 @@ from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.guided import shape_nearness
 from echousd.room.sources.mixing import check_sources, mixed_shapes, sources_of
 from echousd.room.sources.retrieval import anchored, given_pieces, retrieved, with_given_sizes
-from echousd.room.sources.source import FACES, ShapeRequest
+from echousd.room.sources.source import ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
 from echousd.room.verdicts import layout_outcome, warn_of_faults
@@ -203,7 +203,7 @@ def generate(
         layouts=tuple(layouts),
         outcomes=outcomes,
         notes=(*crowded, *homeless, *notes),
-        provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
+        provenance=Provenance(seed, echo.preset, echo.hash, shapes, file, faces),
         options=options,
         timings=timer.seconds,
     )

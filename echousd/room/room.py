@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from echousd.room.finishes.harmonies import HARMONIES as PALETTES
-from echousd.room.manifest import check_seed
+from echousd.room.manifest import FACES, check_seed
 from echousd.room.styles import style_groups
 
 if TYPE_CHECKING:
@@ -135,13 +135,14 @@ class LayoutOutcome:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a room comes from; written into every layer and into the manifest."""
+    """Where a room comes from; written into every layer and, with the face budget of its meshes, into the manifest."""
 
     seed: int = 0
     preset: str = "compact"
     model: str = "none"
     shapes: str = "boxes"
     source: str = ""
+    faces: int = FACES
 
     def __post_init__(self) -> None:
         check_seed(self.seed)

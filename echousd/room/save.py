@@ -25,7 +25,7 @@ from echousd.room.compose import LAYERS, place_layouts, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.history import remembered
 from echousd.room.lock import locked
-from echousd.room.manifest import MANIFEST_KEY
+from echousd.room.manifest import FACES, MANIFEST_KEY
 from echousd.room.paths import layer_file
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
@@ -238,6 +238,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "ceiling": room.options.ceiling,
         "dress": room.options.dress,
         **({"palette": room.options.palette} if room.options.palette else {}),
+        **({"faces": room.provenance.faces} if room.provenance.faces != FACES else {}),
         **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from echousd.room.geometry import Geometry
+from echousd.room.manifest import FACES
 from echousd.room.progress import StageTimer
 from echousd.room.sources.retrieval import Retrieved
 from echousd.room.styles import shared_assets
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
     from echousd.graph import SceneGraph
 
-FACES = 5000
 
 
 @dataclass(frozen=True, eq=False)

@@ -239,3 +239,12 @@ def test_weights_that_did_not_make_the_room_are_told(root, echousd_command, monk
     assert done.code == 2
     assert "made with weights of the preset 'released' (hash standin), which do not ship; name their file" in done.err
     assert hashes(root.parent) == before
+
+
+def test_new_meshes_keep_the_face_budget_of_the_room(root):
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    room = edit(root, graph, model=StandIn())
+    assert 300 < room.geometry["chair"].faces <= 600
+    assert edit(root, graph, model=StandIn(), faces=300).geometry["chair"].faces <= 300
+    saved = room.save(root.parent, preview=False).with_suffix(".json")
+    assert json.loads(saved.read_text())["faces"] == 600
