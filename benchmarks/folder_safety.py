@@ -176,6 +176,8 @@ def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[s
             wait_for(forked(command(folder)))
         write_missing_preview(folder)
         after = bytes_of(folder)
+        if after == before != undisturbed[kind]:
+            print(f"  kill {number}: the second run left the old room", flush=True)
         told["same bytes in the end"] += after == undisturbed[kind]
         told["left as before"] += after == before and after != undisturbed[kind]
         shutil.rmtree(folder.parent)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from echousd.graph import SceneGraph
 from echousd.graph.consistency import GraphError
+from echousd.graph.floors import check_extents
 from echousd.repair.living import LivingFault, living_faults
 from echousd.stage.contents import RoomContents
 
@@ -24,6 +26,11 @@ def find_living(room: RoomContents) -> tuple[LivingFault, ...]:
     if not room.objects or room.spec is None:
         return ()
     things = room.objects
+    try:
+        check_extents(room.spec.extents)
+    except GraphError as error:
+        warnings.warn(f"<{room.path}>: {error}; nobody's ways are looked for on it", stacklevel=2)
+        return ()
     try:
         graph = SceneGraph(room.spec, tuple(thing.node for thing in things), room.relations)
     except GraphError:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
 
 HEIGHT = 2.8  # metres, of rooms that state none
+LARGEST = 10_000.0  # m² of the box around a floor; what is rasterized on it takes 0.1 MB for each
 CROWDED = 0.62  # share of the floor, from which on a person is told
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -114,17 +115,31 @@ def with_plan_of(graph: SceneGraph, before: SceneGraph) -> SceneGraph:
     return graph if room is graph.room else graph.replaced(room=room)
 
 
+def check_extents(extents: tuple[float, float] | None) -> None:
+    """Raises `GraphError` for a floor on which a room would take gigabytes.
+
+    Arguments:
+        extents: (x, z) of its bounding box, metres; None where nothing is known.
+    """
+    if extents is not None and not extents[0] * extents[1] <= LARGEST:
+        raise GraphError(
+            f"the floor of {extents[0]:.6g} x {extents[1]:.6g} m is too large, allowed: {LARGEST:.0f} m² around it",
+            ("room",),
+        )
+
+
 def check_space(graph: SceneGraph) -> tuple[str, ...]:
     """Sentences where the furniture leaves hardly a way through the floor that is stated, and of what stands beside it.
 
-    Raises `GraphError` where the furniture cannot fit: its least footprint covers more than the floor, or one piece of
-    a stated size is longer than the room.
+    Raises `GraphError` for a floor that is too large, and where the furniture cannot fit: its least footprint covers
+    more than the floor, or one piece of a stated size is longer than the room.
     """
     from echomodel.plans import footprint
 
     corners, extents = graph.room.corners, graph.room.extents
     if corners is None or extents is None:
         return ()
+    check_extents(extents)
     from echomodel.openings import signed_area
 
     area = abs(signed_area(corners))
