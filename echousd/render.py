@@ -154,8 +154,8 @@ def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np
             for across in (0, apart, 2 * apart):
                 there = slice(down, down + height), slice(across, across + width)
                 other_light, other_normal, other_point = (a[there] for a in padded)
-                turn = np.clip((normal * other_normal).sum(-1, keepdims=True), 0, 1)
-                step = np.abs((normal * (other_point - point)).sum(-1, keepdims=True))
+                turn = np.clip(np.einsum("hwc,hwc->hw", normal, other_normal), 0, 1)[..., None]
+                step = np.abs(np.einsum("hwc,hwc->hw", normal, other_point - point))[..., None]
                 for _ in range(4):  # to the 16th power
                     turn *= turn
                 share = turn * (step < 0.02)

@@ -38,6 +38,10 @@ def export(
         typer.Option(help="Texels along an object's picture; default 2048 (SceneTex: 4096 for all).", min=64),
     ] = None,
     layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    shell: Annotated[
+        bool | None,
+        typer.Option("--shell/--no-shell", help="Floor and walls too; default: not for hunyuan and mvpainter."),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a job that lies there, its results too.")] = False,
     json: AsJson = False,
 ) -> None:
@@ -46,8 +50,9 @@ def export(
 
     started = time.perf_counter()
     job = export_job(
-        room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, force=force
-    )
+        room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
+        force=force,
+    )  # fmt: skip
     if json:
         told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
         say_written([output / "job.json"], started, more=told)

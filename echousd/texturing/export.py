@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,7 @@ def export_job(
     dressing: str = "none",
     resolution: int | None = None,
     layout: int | None = None,
+    shell: bool | None = None,
     force: bool = False,
 ) -> Job:
     """Write a room as a job for a texturing tool: meshes with texture coordinates, cameras, prompts and `job.json`.
@@ -55,6 +56,7 @@ def export_job(
         dressing: small things: `none` of them, `grouped` as one object, or `each`.
         resolution: texels along a picture of one object; SceneTex's is 4096.
         layout: number of the layout, None = the one that the room shows.
+        shell: floor, walls and ceiling too; None = not for `hunyuan` and `mvpainter`, which paint single pieces.
         force: replace a job that lies there.
 
     Raises ValueError for another tool, a folder in the way, a room that does not open, and where xatlas (for pictures:
@@ -71,9 +73,21 @@ def export_job(
     stage = open_stage(room)
     with showing_layout(stage, layout), reading(stage):
         surfaces = read_surfaces(stage, dressing=dressing)
+        if not (tool not in SCRIPTS if shell is None else shell):
+            surfaces = _without_shell(surfaces)
         job, files = _made(stage, surfaces, tool, prompt, dressing, resolution)
     _write_folder(out, {**files, JOB: job_bytes(job)})
     return job
+
+
+def _without_shell(surfaces: Surfaces) -> Surfaces:
+    """What stands in a room, its floor and walls left out; ValueError where nothing stands there."""
+    stuff = {thing.name: "floor, wall or ceiling (--shell takes it along)" for thing in surfaces.objects
+             if thing.kind == "stuff"}  # fmt: skip
+    things = tuple(thing for thing in surfaces.objects if thing.kind == "things")
+    if not things:
+        raise ValueError("nothing to paint but floor and walls, which --shell takes along")
+    return replace(surfaces, objects=things, left_out={**surfaces.left_out, **stuff})
 
 
 def _made(

@@ -143,6 +143,8 @@ def test_glb_comes_back_in_any_order(small, tool, tmp_path, monkeypatch):
     job = export_job(root, tmp_path / "job", tool, resolution=512)
     assert {path.stem for path in (tmp_path / "job/glbs").iterdir()} == {thing.name for thing in job.objects}
     assert {path.stem for path in (tmp_path / "job/imgs").iterdir()} == {thing.name for thing in job.objects}
+    assert {thing.kind for thing in job.objects} == {"things"}
+    assert job.left_out["Floor"] == "floor, wall or ceiling (--shell takes it along)"
     rng = np.random.default_rng(1)
     folder = tmp_path / "job/results" if tool == "hunyuan" else tmp_path / "job/results/glbs"
     folder.mkdir(exist_ok=True)
@@ -154,6 +156,14 @@ def test_glb_comes_back_in_any_order(small, tool, tmp_path, monkeypatch):
     wrong = errors_in_texels(root, job)
     assert np.quantile(wrong, 0.99) < 0.75
     assert wrong.max() < 2.5
+
+
+def test_the_shell_is_painted_where_it_is_asked_for(small, tmp_path, monkeypatch):
+    monkeypatch.setattr(texturing_export, "IMAGE", 16)
+    root = copied(small, tmp_path)
+    with_it = export_job(root, tmp_path / "with", "hunyuan", resolution=64, shell=True)
+    without = export_job(root, tmp_path / "without", "generic", resolution=64, shell=False)
+    assert "Floor" in {thing.name for thing in with_it.objects} - {thing.name for thing in without.objects}
 
 
 def bound(stage, path):
