@@ -44,8 +44,8 @@ def texture_coordinates(given: Unwrapped, back: Unwrapped, name: str) -> np.ndar
     if st is None:
         raise ValueError(
             f"object {name!r}: {len(back.faces)} triangles came back, and {best} of the {len(given.faces)} that were "
-            "given are not among them; allowed: the same triangles in any order (no remeshing, no decimation): turn that "
-            f"off in the tool, bake its colours onto meshes/{name}.obj, or leave the object out with --skip {name}"
+            "given are not among them; allowed: the same triangles in any order (no remeshing, no decimation): turn "
+            f"that off in the tool, bake its colours onto meshes/{name}.obj, or leave the object out with --skip {name}"
         )
     if st.min() < -1e-3 or st.max() > 1 + 1e-3:
         raise ValueError(

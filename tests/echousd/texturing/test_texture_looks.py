@@ -237,7 +237,7 @@ def test_one_object_alone(room):
     [
         (lambda m: Unwrapped(m.points * (1, 1.5, 1), m.st, m.faces), "of the 12 that were given are not among them"),
         (lambda m: Unwrapped(m.points * (-1, 1, 1), m.st, m.faces), "are not among them"),
-        (lambda m: Unwrapped(m.points, m.st, m.faces[:-1]), "11 triangles came back, and 1 of the 12 .* --skip wardrobe"),
+        (lambda m: Unwrapped(m.points, m.st, m.faces[:-1]), "11 triangles came back, and 1 of .* --skip wardrobe"),
         (lambda m: Unwrapped(m.points, m.st + 2, m.faces), "texture coordinates from 2.* came back, allowed: 0 to 1"),
     ],
 )
