@@ -25,6 +25,7 @@ from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
+from echousd.room.reproducible import one_thread
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.mixing import check_sources, mixed_shapes
@@ -95,7 +96,7 @@ def edit(
     notes: tuple[str, ...] = ()
     given = Retrieved()
     if fresh or moving:
-        with timer.stage("load"):
+        with timer.stage("load"), one_thread():
             model_used = load_model(model)
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
@@ -147,7 +148,7 @@ def edit(
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
     if repair:
-        with timer.stage("repair"):
+        with timer.stage("repair"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=manifest.get("walls", False))
     room = Room(
         name=manifest["name"],

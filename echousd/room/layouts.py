@@ -172,7 +172,7 @@ def best_boxes(
             found = finished_boxes(graph, draft, styles, repair, timer)
             if drafts == 1 or not repair:
                 return found
-            with timer.stage("repair"):
+            with timer.stage("repair"), one_thread():
                 wrong = _wishes(graph, found, proposed)
             if best is None or wrong < worth:
                 best, worth = found, wrong
@@ -239,7 +239,7 @@ def finished_boxes(
         return len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
 
     graph = _with_homeless_unlocked(graph)
-    with timer.stage("repair"):
+    with timer.stage("repair"), one_thread():
         found = repaired(graph, boxes)
         same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):

@@ -34,6 +34,7 @@ from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.owned import with_own_boxes, with_own_pieces
 from echousd.room.progress import StageTimer
+from echousd.room.reproducible import one_thread
 from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.guided import shape_nearness
@@ -134,7 +135,7 @@ def generate(
     graph = anchored(graph, beside)
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
-    with timer.stage("load"):
+    with timer.stage("load"), one_thread():
         echo = load_model(model, preset)
         shapes = shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
@@ -191,7 +192,7 @@ def generate(
     geometry = merged(own, options.merge, faces)
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)
     if repair:
-        with timer.stage("repair"):
+        with timer.stage("repair"), one_thread():
             layouts, outcomes = cleared_layouts([graph] * samples, layouts, geometry, floor, walls=options.walls)
     made_room = Room(
         name=graph.room.type,
