@@ -70,7 +70,7 @@ def linearise(
     add(margin - slack, spread(by_pair, problem.triplets[:, [0, 2]], n), RELATION)
 
     apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)
-    allowed = allowed_overlap(problem.categories, size, problem.pairs)
+    allowed = np.where(problem.touching, 0.0, allowed_overlap(problem.categories, size, problem.pairs))
     add(apart.value + allowed - 0.002, apart.gradient, COLLISION)
 
     if problem.floor is not None:

@@ -66,6 +66,13 @@ class Problem:
         return None if self.floor is None else Walls(self.floor.polygon)
 
     @cached_property
+    def touching(self) -> np.ndarray:
+        """(p,) bool, pairs that touch at most, though such a pair may overlap: a bed moved off its nightstand later
+        would leave its wall."""
+        head = np.array([vocabulary().category(word).stands == "head" for word in self.categories], bool)
+        return head[self.pairs].any(1) if len(self.pairs) else np.zeros(0, bool)
+
+    @cached_property
     def fronts(self) -> np.ndarray:
         """(n,) bool, which of the boxes have a front."""
         return np.array([vocabulary().category(word).front for word in self.categories], bool)

@@ -315,3 +315,12 @@ def test_the_depth_of_points_is_their_distance_to_the_border(corners: np.ndarray
     expected = np.where(shapely.contains(polygon, there), away, -away)
     np.testing.assert_allclose(depth_inside(floor, points), expected, atol=1e-9)
     np.testing.assert_allclose(inside(floor, points)[0], expected, atol=1e-9)
+
+
+def test_a_nightstand_touches_its_bed_at_most() -> None:
+    size, position = np.array([[1.8, 1.0, 2.1], [0.5, 0.5, 0.4]]), np.array([[0, 0, -0.7], [1.12, 0, -1.55]], float)
+    done = repair_boxes(
+        ["double_bed", "nightstand"], size, position, np.zeros(2), np.zeros((0, 3)), floor_polygon=FLOOR, height=2.7,
+        config=RepairConfig(arrange=False),
+    )  # fmt: skip
+    assert separation(done.size, done.position, done.yaw, np.array([(0, 1)]))[0] > -0.001
