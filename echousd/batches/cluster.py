@@ -13,6 +13,7 @@ from typing import Any
 from echousd.batches.executor import POLL, Outcome, Task, attempt, resident
 
 ROOMS_A_NETWORK = 8  # rooms at once that one actor draws layouts for; its share of a room's time is smaller
+STARTING = 120.0  # seconds that Ray may take to start a worker, who counts its own; then the cluster ends it
 DYING = 0.2  # seconds between two looks of a worker at its own memory
 
 
@@ -78,13 +79,16 @@ class RayCluster:
 
     def submit(self, task: Task) -> None:
         """Begin a task."""
+        seconds = None if self._timeout is None else self._timeout * task.rooms
         if task.network:
             busy = {begun.actor for begun in self._begun.values()}
             number = next(number for number in range(len(self._actors)) if number not in busy)
-            reference = self._actors[number].work.remote(task.call, task.given, None if self._gpus else self._memory)
+            memory = None if self._gpus else self._memory
+            reference = self._actors[number].work.remote(task.call, task.given, memory, seconds)
             self._begun[reference] = _Begun(task, time.monotonic(), number)
         else:
-            self._begun[self._room.remote(task.call, task.given, self._memory)] = _Begun(task, time.monotonic())
+            reference = self._room.remote(task.call, task.given, self._memory, seconds)
+            self._begun[reference] = _Begun(task, time.monotonic())
 
     def outcomes(self, seconds: float) -> list[Outcome]:
         """What has ended since, after waiting for at most so long; tasks beyond the time limit are cancelled."""
@@ -148,7 +152,8 @@ class RayCluster:
     def _overdue(self) -> list[Outcome]:
         found = []
         for reference, begun in list(self._begun.items()):
-            if self._timeout is None or time.monotonic() - begun.since <= self._timeout * begun.task.rooms:
+            late = None if self._timeout is None else self._timeout * begun.task.rooms + STARTING
+            if late is None or time.monotonic() - begun.since <= late:
                 continue
             del self._begun[reference]
             if begun.actor < 0:
@@ -163,12 +168,13 @@ class RayCluster:
 class _Network:
     """An actor that keeps its model between packs."""
 
-    def work(self, call: Any, given: Any, memory: int | None) -> tuple[str, Any]:
-        return watched(call, given, memory)
+    def work(self, call: Any, given: Any, memory: int | None, seconds: float | None) -> tuple[str, Any]:
+        return watched(call, given, memory, seconds)
 
 
-def watched(call: Any, given: Any, memory: int | None) -> tuple[str, Any]:
-    """`attempt`, given up as soon as the process holds more than so many MiB."""
+def watched(call: Any, given: Any, memory: int | None, seconds: float | None = None) -> tuple[str, Any]:
+    """`attempt`, given up as soon as the process holds more than so many MiB or takes longer than so many seconds."""
+    began = time.monotonic()
     done = threading.Event()
     found: list[tuple[str, Any]] = []
 
@@ -179,10 +185,14 @@ def watched(call: Any, given: Any, memory: int | None) -> tuple[str, Any]:
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     while not done.wait(DYING):
-        held = resident(os.getpid())
+        held, told = resident(os.getpid()), ""
         if memory is not None and held > memory:
+            told = f"held {held:.0f} MiB of memory, allowed: {memory} MiB"
+        elif seconds is not None and time.monotonic() - began > seconds:
+            told = f"took longer than {seconds:g} s"
+        if told:
             threading.Timer(1.0, os._exit, (1,)).start()  # after this answer is on its way: the thread cannot be ended
-            return "limit", f"held {held:.0f} MiB of memory, allowed: {memory} MiB"
+            return "limit", told
     return found[0]
 
 
