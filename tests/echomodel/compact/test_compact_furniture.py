@@ -106,9 +106,7 @@ def test_weights_that_describe_furniture_in_other_words_are_refused(tmp_path):
     config["furniture"]["kinds"] = [9, 5, *config["furniture"]["kinds"][2:]]  # the same width, other words
     save_file(load_file(shipped), tmp_path / "parts.safetensors", {**header, "config": json.dumps(config)})
     shutil.copy(str(weights / "layout.safetensors"), tmp_path)
-    with pytest.raises(
-        WeightsError, match=r"parts.safetensors: .*was described in other words; train it"
-    ):
+    with pytest.raises(WeightsError, match=r"parts.safetensors: .*was described in other words; train it"):
         EchoModel.load(tmp_path)
 
 
