@@ -29,7 +29,7 @@ from echomodel.graph import GraphBatch
 from echomodel.metrics.shapes import set_scores, surface_points
 from echomodel.vocabulary import vocabulary
 
-POINTS, WIDTH, STEPS, BATCH, FOLDS, JUDGES = 384, 96, 500, 48, 5, 3
+POINTS, WIDTH, STEPS, BATCH, FOLDS, JUDGES = 256, 96, 240, 32, 3, 2
 
 
 class PointNet(nn.Module):
@@ -91,7 +91,7 @@ def real_clouds(sources: list[Path], cache: Path) -> dict[str, np.ndarray]:
                 except ValueError as error:
                     print(f"left out: {error}")
         np.savez(cache, **{name: np.stack(clouds) for name, clouds in found.items()})
-    return dict(np.load(cache))
+    return {name: clouds[:, :POINTS] for name, clouds in np.load(cache).items()}
 
 
 def pieces(model: EchoModel, classes: list[str], count: int, *, sdf: bool) -> dict[str, dict[str, list]]:
