@@ -20,7 +20,7 @@ from echousd.graph.floors import with_plan_of
 from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
-from echousd.room.layouts import best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
+from echousd.room.layouts import Draws, best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
 from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
@@ -120,7 +120,7 @@ def edit(
                 layouts.append(_boxes_of(pinned))
                 continue
             found, told = best_boxes(
-                model_used, pinned, styles, seed=seed, number=number, repair=repair, steps=steps, change=change,
+                model_used, pinned, styles, Draws(seed, number, steps, change), repair=repair,
                 drafts=drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
             )  # fmt: skip
             layouts.append(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,23 +84,25 @@ class Drawn:
     best: Judged | None = None
 
 
-def sample_boxes(
-    model: RoomModel,
-    graph: SceneGraph,
-    *,
-    seed: int,
-    number: int,
-    count: int = 1,
-    steps: int | None = None,
-    change: GraphEdit | None = None,
-    timer: StageTimer,
-) -> list[Boxes]:
-    """Drafts from the layout branch in the room's frame; what the graph fixes is given to it and comes back.
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Which drafts are drawn, and how.
 
     Arguments:
-        number: which draws: equal numbers and counts give equal drafts.
-        count: drafts that are drawn at once.
+        seed, number: of the draws; equal ones, and equal counts, give equal drafts.
+        steps: of the sampler, None = the model's own. change: what was edited in the graph, None = nothing.
     """
+
+    seed: int
+    number: int = 0
+    steps: int | None = None
+    change: GraphEdit | None = None
+
+
+def sample_boxes(
+    model: RoomModel, graph: SceneGraph, draws: Draws, *, count: int = 1, timer: StageTimer
+) -> list[Boxes]:
+    """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
     centre, nodes = floor_centre(graph), graph.nodes
     batch = GraphBatch.pack([graph_batch(graph)] * count)
     given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
@@ -112,12 +114,13 @@ def sample_boxes(
     extra: dict[str, Any] = {}
     if bool(given.any()):
         extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
-    if steps is not None:
-        extra["steps"] = steps
-    if change is not None:
-        extra["edit"] = repeated(change, len(nodes), count)
+    if draws.steps is not None:
+        extra["steps"] = draws.steps
+    if draws.change is not None:
+        extra["edit"] = repeated(draws.change, len(nodes), count)
+    generator = seeded(draws.seed, "layout", draws.number)
     with timer.stage("layout") as tell, one_thread():
-        found = model.sample_layout(batch, generator=seeded(seed, "layout", number), progress=tell, **extra).to("cpu")
+        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu")
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
         for rows in torch.arange(count * len(nodes)).chunk(count)
@@ -128,16 +131,13 @@ def best_boxes(
     model: RoomModel,
     graph: SceneGraph,
     styles: Mapping[str, str],
+    draws: Draws,
     *,
-    seed: int,
-    number: int = 0,
     drafts: int = 1,
     repair: bool = True,
     sized: Boxes | None = None,
     drawn: Drawn | None = None,
     proposed: bool = False,
-    steps: int | None = None,
-    change: GraphEdit | None = None,
     timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:
     """The best of several drafts after repair: kept relations first, then collisions, then the living rules.
@@ -145,7 +145,7 @@ def best_boxes(
     Further drafts are drawn, a few at once, only where those before leave something to be wished for.
 
     Arguments:
-        drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
+        draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
         drawn: drafts that were sampled already.
         proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
         others: as `sample_boxes` and `finished_boxes`.
@@ -165,7 +165,7 @@ def best_boxes(
         if not given and best is not None and drawn is not None and drawn.elsewhere:
             raise DraftsWanted(Judged(of, *best, worth))
         for draft in given or sample_boxes(
-            model, graph, seed=seed, number=number + start, count=count, steps=steps, change=change, timer=timer
+            model, graph, replace(draws, number=draws.number + start), count=count, timer=timer
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)

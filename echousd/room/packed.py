@@ -11,7 +11,7 @@ from echomodel.graph import GraphBatch
 from echomodel.randomness import SceneGenerators
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan
-from echousd.room.layouts import draft_rounds, sample_boxes
+from echousd.room.layouts import Draws, draft_rounds, sample_boxes
 from echousd.room.progress import StageTimer
 from echousd.room.reproducible import one_thread, rounded_boxes
 from echousd.room.tensors import floor_centre, graph_batch, seeded
@@ -76,9 +76,7 @@ def sample_round(
     for i, graph in enumerate(planned):
         if i not in found:
             found[i] = tuple(
-                sample_boxes(
-                    model, graph, seed=seeds[i], number=start, count=counts[i], steps=steps, timer=StageTimer()
-                )
+                sample_boxes(model, graph, Draws(seeds[i], start, steps), count=counts[i], timer=StageTimer())
             )
     return [found[i] for i in range(len(graphs))]
 

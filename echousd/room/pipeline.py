@@ -20,6 +20,7 @@ from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
 from echousd.room.layouts import (
     Drawn,
+    Draws,
     best_boxes,
     check_drafts,
     check_objects,
@@ -152,9 +153,8 @@ def generate(
         styles = style_groups(graph)
         whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
         return best_boxes(
-            echo, with_given_sizes(graph, sizes), styles, seed=seed, drafts=drafts, repair=repair,
-            drawn=drawn if whole else None, proposed=not stated.room.openings, steps=steps,
-            timer=timer,
+            echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=steps), drafts=drafts, repair=repair,
+            drawn=drawn if whole else None, proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
 
     def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
@@ -176,7 +176,7 @@ def generate(
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, samples):
         found, _ = best_boxes(
-            echo, sized, styles, seed=seed, number=number, drafts=drafts, repair=repair, sized=boxes, steps=steps,
+            echo, sized, styles, Draws(seed, number, steps), drafts=drafts, repair=repair, sized=boxes,
             proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
         layouts.append(found)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from echousd.graph import SceneGraph
 
 
-
 @dataclass(frozen=True, eq=False)
 class ShapeRequest:
     """Everything that a source may look at.

@@ -9,7 +9,7 @@ from echomodel.loading import load_model
 from echomodel.randomness import SceneGenerators, normal, uniform, whole_numbers
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan
-from echousd.room.layouts import draft_rounds, sample_boxes
+from echousd.room.layouts import Draws, draft_rounds, sample_boxes
 from echousd.room.packed import packs, sample_many, sample_round
 from echousd.room.progress import StageTimer
 
@@ -51,9 +51,7 @@ def test_further_drafts_are_those_of_single_runs():
         packed = sample_round(model, graphs, seeds, [5, 8], number=number, steps=4)
         for graph, seed, most, drafts in zip(graphs, seeds, (5, 8), packed, strict=True):
             start, count = draft_rounds(most)[number]
-            alone = sample_boxes(
-                model, with_plan(graph, seed), seed=seed, number=start, count=count, steps=4, timer=StageTimer()
-            )
+            alone = sample_boxes(model, with_plan(graph, seed), Draws(seed, start, 4), count=count, timer=StageTimer())
             for a, b in zip(alone, drafts, strict=True):
                 assert float((a.position - b.position).abs().max()) < 5e-4
 
