@@ -103,7 +103,7 @@ def test_further_drafts_of_a_pack_are_drawn_together_whatever_was_ended(tmp_path
     limit = {1: 9.0, 2: 0.3, 3: -9.0}
     monkeypatch.setattr(
         "echousd.room.layouts._wishes",
-        lambda graph, found: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
+        lambda graph, found, proposed: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
     )
     options, out = {**QUICK, "drafts": 5}, tmp_path / "run"
     calm = Inline()
