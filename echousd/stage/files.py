@@ -42,6 +42,8 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
         layers = regular_layers(path)
         stage = Usd.Stage.Open(str(path))
         del layers
+    except UnicodeDecodeError as error:  # in the names of the layers that it refers to
+        raise StageError(f"{path}: a layer that is no UTF-8 text ({error.reason})") from None
     except Tf.ErrorException as error:
         raise StageError(f"{path}: not a USD file that can be read ({said(error)})") from None
     finally:
@@ -146,7 +148,10 @@ def source(stage: Usd.Stage) -> str:
 
 def said(error: Tf.ErrorException) -> str:
     """The most specific thing that USD says about an error, in one line."""
-    texts = [str(getattr(entry, "commentary", "")).strip() for entry in error.args]
+    try:
+        texts = [str(getattr(entry, "commentary", "")).strip() for entry in error.args]
+    except UnicodeDecodeError as odd:  # USD quotes the damaged layer
+        return f"a text that is no UTF-8: {odd.reason}"
     specific = [text for text in texts if text and not text.startswith("Failed to open layer")]
     return one_line(specific[-1] if specific else "no layer of a known format")
 

@@ -29,3 +29,9 @@ def test_a_pipe_for_a_layer_is_refused_at_once(tmp_path, way, echousd_command):
         open_stage(tmp_path / "room.usda")
     done = echousd_command("check", tmp_path / "room.usda")
     assert (done.code, "not a regular file" in done.err) == (2, True)
+
+
+def test_a_name_of_a_layer_that_is_no_text(tmp_path):
+    (tmp_path / "room.usda").write_bytes(b"#usda 1.0\n(subLayers=[@./pi\xa0pe.usda@])\n")
+    with pytest.raises(StageError, match=r"room.usda: .*UTF-8"):
+        open_stage(tmp_path / "room.usda")
