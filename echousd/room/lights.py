@@ -25,7 +25,7 @@ LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # 
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
 SHARES = {"open": (1.0, 1.0), "walls": (1.1, 0.12), "ceiling": (3.2, 0.7)}
-SKY = "textures/sky.jpg"
+SKY = "layers/sky.jpg"  # stays with the room where a store has the images
 BULB = 0.04  # metres, radius
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
