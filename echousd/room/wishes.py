@@ -11,6 +11,7 @@ import numpy as np
 
 from echousd.graph import GraphError, SceneGraph
 from echousd.graph.sentences import stating, without
+from echousd.graph.titles import composed, identifier_of, is_title, name_of
 from echousd.room.reading import SavedRoom, read_room
 
 MOVED = 1e-3  # metres: a place further from the room's own is somebody's wish
@@ -48,37 +49,38 @@ def wished(saved: SavedRoom, wishes: Wishes) -> SceneGraph:
     An object that is moved, turned or resized keeps the rest of its box as it is.
     """
     graph = saved.graph
-    for name in wishes.remove:
-        graph = graph.remove_node(name)
+    for said in wishes.remove:
+        graph = graph.remove_node(_name(graph, said))
     for text in wishes.unrelate:
         graph = without(graph, text)
     for text in wishes.relabel:
-        name, category = _named(text)
+        name, category = _named(graph, text)
         graph = _placed(graph.relabel_node(name, category), saved, name)
     for text in wishes.add:
-        graph = graph.add_node(*_named(text))
+        graph = _added(graph, text)
     for text in wishes.relate:
         graph = stating(graph, text)
-    for name in wishes.lock:
+    for said in wishes.lock:
+        name = _name(graph, said)
         graph = _placed(graph, saved, name).lock(name)
-    for name in wishes.unlock:
-        graph = graph.update_node(name, locked=False, position=None, yaw=None)
+    for said in wishes.unlock:
+        graph = graph.update_node(_name(graph, said), locked=False, position=None, yaw=None)
     for text in wishes.move:
-        name, place = _named(text)
+        name, place = _named(graph, text)
         graph = _placed(graph, saved, name)
         numbers = _numbers(text, place, (2, 3), "name:x,z or name:x,y,z, metres")
         height = (graph.node(name).position or (0.0, 0.0, 0.0))[1] if len(numbers) == 2 else numbers[1]
         graph = graph.update_node(name, position=(numbers[0], height, numbers[-1]))
     for text in wishes.turn:
-        name, way = _named(text)
+        name, way = _named(graph, text)
         graph = _placed(graph, saved, name)
         graph = graph.update_node(name, yaw=way if way[-1:].isalpha() else f"{way} deg")
     for text in wishes.resize:
-        name, size = _named(text)
+        name, size = _named(graph, text)
         numbers = _numbers(text, size, (3,), "name:x,y,z, metres")
         graph = _placed(graph, saved, name).update_node(name, size=numbers)
     for text in wishes.restyle:
-        name, style = _named(text)
+        name, style = _named(graph, text)
         graph = graph.update_node(name, style=style or None)
     return graph
 
@@ -121,7 +123,28 @@ def _placed(graph: SceneGraph, saved: SavedRoom, name: str, *, anew: bool = Fals
     return graph.update_node(name, **{k: v for k, v in fields.items() if anew or getattr(node, k) is None})
 
 
-def _named(text: str) -> tuple[str, str]:
+def _added(graph: SceneGraph, text: str) -> SceneGraph:
+    """The graph with an object of `name:category`; a name in another script becomes the object's title."""
+    name, category = _parts(text)
+    if not is_title(composed(name)):
+        return graph.add_node(name, category)
+    title = composed(name)
+    if title in graph.titles:
+        raise GraphError(f"object {title!r} is in this graph")
+    return graph.add_node(identifier_of(title, category, set(graph.names)), category, title=title)
+
+
+def _named(graph: SceneGraph, text: str) -> tuple[str, str]:
+    name, rest = _parts(text)
+    return _name(graph, name), rest
+
+
+def _name(graph: SceneGraph, said: str) -> str:
+    """The name of the object that a person calls by its name or by its title."""
+    return str(name_of(said.strip(), graph.titles))
+
+
+def _parts(text: str) -> tuple[str, str]:
     name, colon, rest = text.partition(":")
     return name.strip(), rest.strip() if colon else name.strip()
 

@@ -10,6 +10,7 @@ from pxr import Sdf, Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
+from echousd.graph import GraphError
 from echousd.room.reading import read_room
 from echousd.room.wishes import Wishes, wished
 
@@ -92,6 +93,28 @@ def test_unlocked_things_may_move_again(root):
     assert locked.node("bed").position is not None
     free = locked.update_node("bed", locked=False, position=None, yaw=None)
     assert free == saved.graph
+
+
+def test_titles_in_any_script_name_what_changes(tmp_path):
+    graph = small_graph().update_node("bed", title="Große Liege").update_node("wardrobe", title="衣柜")
+    root = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes").save(tmp_path / "bedroom", preview=False)
+    saved = read_room(root)
+    by_title = Wishes(
+        lock=("Große Liege",), move=("衣柜:1.2,1.0",), turn=("衣柜:180",), resize=("Große Liege:1.6,0.5,2.0",),
+        restyle=("Große Liege:oak",), add=("Größter Stuhl:stool",), relate=("Größter Stuhl close by 衣柜",),
+    )  # fmt: skip
+    by_name = Wishes(
+        lock=("bed",), move=("wardrobe:1.2,1.0",), turn=("wardrobe:180",), resize=("bed:1.6,0.5,2.0",),
+        restyle=("bed:oak",), add=("Groesster_Stuhl:stool",), relate=("Groesster_Stuhl close by wardrobe",),
+    )  # fmt: skip
+    changed = wished(saved, by_title)
+    assert changed.node("Groesster_Stuhl").title == "Größter Stuhl"
+    assert changed.update_node("Groesster_Stuhl", title=None) == wished(saved, by_name)
+    assert wished(saved, Wishes(remove=("衣柜",))) == saved.graph.remove_node("wardrobe")
+    assert wished(saved, Wishes(relabel=("衣柜:desk",))) == wished(saved, Wishes(relabel=("wardrobe:desk",)))
+    assert not wished(saved, Wishes(lock=("衣柜",), unlock=("衣柜",))).node("wardrobe").locked
+    with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
+        wished(saved, Wishes(add=("Große Liege:single_bed",)))
 
 
 def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
