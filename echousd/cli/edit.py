@@ -25,7 +25,7 @@ def register(app: typer.Typer) -> None:
 
 
 def edit(
-    room: Annotated[Path, typer.Argument(help="Root layer of a room that generate made.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room that generate made: root layer or folder.", show_default=False)],
     add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
     remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
     relabel: Annotated[list[str] | None, typer.Option(help="Other category in its place, name:category.")] = None,
@@ -63,9 +63,11 @@ def edit(
 
     Every option may be given several times.
     """
+    from echousd.room.found import room_at
     from echousd.room.reading import read_room
     from echousd.room.wishes import Wishes, wished
 
+    room = room_at(room)
     wishes = Wishes(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),

@@ -18,7 +18,7 @@ def register(app: typer.Typer) -> None:
 
 
 def export(
-    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)],
     arkit: Annotated[
         bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
@@ -42,8 +42,10 @@ def export(
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
     from echousd.export import export as write
+    from echousd.room.found import room_at
 
     started = time.perf_counter()
+    room = room_at(room)
     path = write(
         room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
     )

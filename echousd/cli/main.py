@@ -69,6 +69,7 @@ def _options(
 
 def main() -> None:
     """Entry point of the `echousd` command."""
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # torch's threads sleep between products
     warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"  # no line of our source
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: PTH123, SIM115  # `echousd check room.usda >&-`
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: PTH123, SIM115

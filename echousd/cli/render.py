@@ -21,7 +21,7 @@ def register(app: typer.Typer) -> None:
 
 
 def render(
-    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)],
     output: Annotated[
         Path,
         typer.Option("-o", "--output", help="Picture to write (.png); with --cameras a folder.", show_default=False),
@@ -40,9 +40,11 @@ def render(
 ) -> None:
     """Draw a room from above, from a corner, from inside, or through each of its cameras."""
     from echousd.render import render_cameras, render_file
+    from echousd.room.found import room_at
     from echousd.stage.files import write_whole
 
     started = time.perf_counter()
+    room = room_at(room)
     if cameras:
         if view != "perspective":
             raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")

@@ -24,6 +24,21 @@ def rooms_at(place: Path) -> list[Path]:
     return [place]
 
 
+def room_at(place: Path) -> Path:
+    """The one root layer at a path: a file itself, of a folder its room; raises ValueError where several are."""
+    if not place.is_dir():
+        return place
+    found = _room_in(place)
+    if found is not None:
+        return found
+    rooms = rooms_at(place)
+    if len(rooms) > 1:
+        named = [path.relative_to(place) for path in (*sorted(place.glob("*.usda")), *rooms)]  # a house, then its rooms
+        shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
+        raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
+    return rooms[0]
+
+
 def _room_in(folder: Path) -> Path | None:
     manifest = find_manifest(folder)
     root = None if manifest is None else folder / f"{manifest['name']}.usda"

@@ -30,9 +30,25 @@ def test_a_folder_and_a_pattern_of_rooms(rooms, echousd_command):
     assert "ok" in json.loads(echousd_command("check", rooms / "a", "--json").out)
 
 
+def test_commands_of_one_room_take_its_folder(rooms, echousd_command):
+    done = echousd_command("render", rooms / "a", "-o", rooms / "a.png", "--size", "32")
+    assert done.code == 0, done.err
+    done = echousd_command("export", rooms / "a", "-o", rooms / "a.usdz")
+    assert done.code == 0, done.err
+    done = echousd_command("edit", rooms / "a", "--lock", "bed", "--dry-run")
+    assert (done.code, done.err) == (0, "")
+    done = echousd_command("edit", rooms, "--lock", "bed")
+    assert done.code == 2
+    assert f"{rooms}: a folder of 2 rooms, name one file: a/a.usda, b/b.usda" in done.err
+    done = echousd_command("edit", rooms / "a", "--lock", "bed", "--shapes", "boxes")
+    assert done.code in (0, 1), done.err
+    assert echousd.read_graph(rooms / "a" / "a.usda").node("bed").locked
+
+
 def test_a_folder_without_rooms(tmp_path, echousd_command):
     done = echousd_command("check", tmp_path)
     assert (done.code, done.err) == (2, f"error: {tmp_path}: no room in this folder\n")
+    assert echousd_command("render", tmp_path, "-o", tmp_path / "a.png").err == done.err
     assert "matches nothing" in echousd_command("check", tmp_path / "*.usda").err
 
 

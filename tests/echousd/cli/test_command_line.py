@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import resource
 import subprocess
@@ -16,8 +17,6 @@ from echousd.cli import main
 
 def started(*words: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     """`echousd` in a process of its own."""
-    import os
-
     code = "import sys; from echousd.cli.main import main; sys.argv[0] = 'echousd'; main()"
     variables = {**os.environ, "NO_COLOR": "1", **(environment or {})}
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, env=variables)
@@ -63,6 +62,17 @@ def test_the_start_loads_nothing_heavy_and_is_fast():
         seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     assert done.stdout.splitlines()[-1] == "loaded []"
     assert min(seconds) < 1.0  # of processor time; 0.2 on a free machine
+
+
+def test_threads_wait_asleep_unless_somebody_says_otherwise(monkeypatch):
+    for said, found in ((None, "PASSIVE"), ("ACTIVE", "ACTIVE")):
+        monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
+        if said is not None:
+            monkeypatch.setenv("OMP_WAIT_POLICY", said)
+        monkeypatch.setattr(sys, "argv", ["echousd", "--version"])
+        with pytest.raises(SystemExit):
+            main.main()
+        assert os.environ["OMP_WAIT_POLICY"] == found
 
 
 def test_errors_are_one_line_and_code_2(tmp_path):
