@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pxr import Sdf, Usd, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 from echousd.arkit import for_arkit
 from echousd.drawables import Drawable, Paint, paint_image, read_drawables
@@ -17,7 +18,7 @@ from echousd.flattening import flat_layer
 from echousd.naming import free_name
 from echousd.packing import Package, Reach, images_beside, without_clock
 from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.values import reading
 
@@ -66,6 +67,7 @@ def export(
     if out.exists() and not force:
         raise ValueError(f"{out}: exists; choose another file or use --force")
     stage = open_stage(room)
+    beside: dict[Path, bytes] = {}
     reach = Reach.of(stage, search)
     reach.check_layers(stage)
     with showing_layout(stage, layout), reading(stage):
@@ -77,8 +79,8 @@ def export(
             package = Package(reach, images_beside(out))
             layer = flat_layer(stage, package=package if pictures else None, physics=physics is not False)
             content = layer_bytes(_marked(layer, stage), out.suffix)
-            package.write(out.parent)
-    write_whole(out, content)
+            beside = package.files(out.parent)
+    write_all({out: content, **beside})
     return out
 
 
@@ -92,13 +94,20 @@ def usdz(
         for_arkit(layer)
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         folder = Path(scratch)
-        package.write(folder)
+        write_all(package.files(folder))
         flat = folder / f"{root.stem}{'.usdc' if arkit else '.usda'}"
-        layer.Export(str(flat))
         packed = folder / "package.usdz"
         make = UsdUtils.CreateNewARKitUsdzPackage if arkit else UsdUtils.CreateNewUsdzPackage
-        if not make(Sdf.AssetPath(str(flat)), str(packed)):
-            raise ValueError(f"{root}: cannot be packed as usdz")
+        try:
+            layer.Export(str(flat))
+            whole = make(Sdf.AssetPath(str(flat)), str(packed)) and zipfile.is_zipfile(packed)
+        except Tf.ErrorException:
+            whole = False
+        if not whole:  # USD does not say why
+            raise ValueError(
+                f"{root}: cannot be packed as usdz in {folder.parent}, the folder of temporary files (its disk may be "
+                "full; TMPDIR names another); nothing was changed"
+            )
         return without_clock(packed.read_bytes())
 
 

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from pxr import Ar, Sdf, Usd, UsdUtils
 
 from echousd.stage.encoding import StageError
-from echousd.stage.files import assets_in, write_whole
+from echousd.stage.files import assets_in
 from echousd.store import store_above
 from echousd.textures import TextureError, file_of, texture_bytes
 
@@ -138,10 +138,9 @@ class Package:
             free, number = f"{stem}_{number}{ending}", number + 1
         return free
 
-    def write(self, folder: Path) -> None:
-        """Write the files below `folder`; raises ValueError where that is impossible."""
-        for name, content in self.content.items():
-            write_whole(folder / self.folder / name, content)
+    def files(self, folder: Path) -> dict[Path, bytes]:
+        """What is packed, as files below `folder`."""
+        return {folder / self.folder / name: content for name, content in self.content.items()}
 
 
 def images_beside(file: Path) -> str:

@@ -9,12 +9,30 @@ from typing import Any
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 import echousd
-from echousd.check import file_rules, geometry_rules, graph_rules, mesh_rules, object_rules, physics_rules, value_rules
+from echousd.check import (
+    file_rules,
+    geometry_rules,
+    graph_rules,
+    label_rules,
+    mesh_rules,
+    object_rules,
+    physics_rules,
+    value_rules,
+)
 from echousd.check.findings import Finding, Rule
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said
 
-FAMILIES = (graph_rules, object_rules, geometry_rules, mesh_rules, physics_rules, file_rules, value_rules)
+FAMILIES = (
+    graph_rules,
+    object_rules,
+    label_rules,
+    geometry_rules,
+    mesh_rules,
+    physics_rules,
+    file_rules,
+    value_rules,
+)
 RULES: tuple[Rule, ...] = tuple(rule for family in FAMILIES for rule in family.RULES)
 KEYWORD = "EchoUSD"
 

@@ -41,7 +41,7 @@ def render(
     """Draw a room from above, from a corner, from inside, or through each of its cameras."""
     from echousd.render import render_cameras, render_file
     from echousd.room.found import room_at
-    from echousd.stage.files import write_whole
+    from echousd.stage.files import write_all
 
     started = time.perf_counter()
     room = room_at(room)
@@ -59,8 +59,7 @@ def render(
             raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")
         check_picture(output, force=force)
         pictures = {output: render_file(room, view=view, size=size, colors=colors, layout=layout)}
-    for path, picture in pictures.items():
-        write_whole(path, _png(picture))
+    write_all({path: _png(picture) for path, picture in pictures.items()})
     if json:
         say_written(list(pictures), started)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 from pathlib import Path
@@ -35,11 +36,11 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
         raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join((*TEXT_FORMS, *STAGE_FORMS))}")
     try:
         found = path.stat()
-        size = found.st_size
         if not stat.S_ISREG(found.st_mode):
             raise GraphError(f"{path}: not a regular file, allowed: a file")
-        if size > MAX_BYTES:
-            raise GraphError(f"{path}: {size / 2**20:.0f} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
+        if found.st_size > MAX_BYTES:
+            size = math.ceil(found.st_size / 2**20 * 10) / 10  # up, so that it never says what is allowed
+            raise GraphError(f"{path}: {size:g} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
         text = path.read_text("utf-8-sig")
     except UnicodeDecodeError as error:
         raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None

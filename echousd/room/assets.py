@@ -17,7 +17,7 @@ from echousd.room.materials import write_looks, write_palettes
 from echousd.room.paths import DESCRIPTION, GEO, MTL, coarse_name, payload_name, piece_path
 from echousd.room.physics import write_asset_physics
 from echousd.room.surface import Surface, surface
-from echousd.room.taxonomy import ade20k
+from echousd.stage.taxonomy import ade20k
 
 CLASSES = "_class_"  # the prim that an asset's class stands below
 

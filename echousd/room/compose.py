@@ -22,11 +22,11 @@ from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
 from echousd.room.surface import surface
-from echousd.room.taxonomy import ade20k, word_of
 from echousd.room.volume import room_points, room_volume
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
+from echousd.stage.taxonomy import ade20k, word_of
 
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 

@@ -31,7 +31,7 @@ from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
 from echousd.room.stored import Shelf, shelf_of
 from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.files import layer_bytes, write_all, write_whole
 from echousd.stage.layouts import layout_names
 from echousd.store import Store
 
@@ -143,8 +143,7 @@ def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
         layer = flat_layer(stage, package=package)
     if len(room.layouts) > 1:
         place_layouts(Usd.Stage.Open(layer), room)
-    package.write(path.parent)
-    write_whole(path, layer_bytes(layer, path.suffix))
+    write_all({path: layer_bytes(layer, path.suffix), **package.files(path.parent)})
     return path
 
 

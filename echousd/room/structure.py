@@ -19,8 +19,8 @@ from echousd.room.paths import SHELL, piece_name
 from echousd.room.room import RoomData
 from echousd.room.shell import floor_mesh
 from echousd.room.surface import Surface, surface
-from echousd.room.taxonomy import ade20k
 from echousd.room.walls import Piece, ShellPart, ceiling, walls
+from echousd.stage.taxonomy import ade20k
 
 LEAF = 320.0  # kg/m³ of a door's leaf
 LOOKS = {

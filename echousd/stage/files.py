@@ -6,7 +6,8 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
@@ -203,9 +204,23 @@ def write_whole(path: Path, content: bytes, *, left: str = "nothing was changed"
     Arguments:
         left: what the error says about the state in which everything else is left.
     """
+    write_all({path: content}, left=left)
+
+
+def write_all(files: Mapping[Path, bytes], *, left: str = "nothing was changed") -> None:
+    """Write files, none of which appears before all have found their room on the disk; the first appears last.
+
+    Raises ValueError where that is impossible, and takes folders that it made away again.
+    """
+    path, made = Path(), list[Path]()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as beside:
-            beside.write_bytes(content)
+        with ExitStack() as held:
+            for path, content in files.items():
+                made += [place for place in path.parents if not place.exists()]
+                path.parent.mkdir(parents=True, exist_ok=True)
+                held.enter_context(whole_file(path)).write_bytes(content)
     except OSError as error:
+        for place in sorted(made, key=lambda place: len(place.parts), reverse=True):
+            with suppress(OSError):  # somebody else has put something into it
+                place.rmdir()
         raise ValueError(f"{path}: cannot be written ({error.strerror or error}); {left}") from None

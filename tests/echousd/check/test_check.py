@@ -57,6 +57,7 @@ FOUND = {
     "upside_down": {"echo:Upright"},
     "two_labels": {"echo:OneLabel"},
     "other_label": {"echo:OneLabel"},
+    "mislabelled_wall": {"echo:LabelsAgree"},
     "stated_size": {"echo:StatedBoxes"},
     "stated_yaw": {"echo:StatedBoxes"},
     "no_floor": {"echo:Floor"},

@@ -9,6 +9,7 @@ from echousd.check.validity import RULES, safely
 
 GOOD = Path(__file__).parents[1] / "bad/good.usda"
 LABELS = "semantics:labels:category"
+TAXONOMIES = ("category", "ade20k")
 
 
 @pytest.fixture
@@ -94,3 +95,21 @@ def test_colliders_are_there_and_switched_on(stage, thing, text, off):
         stage.GetRootLayer().GetPrimAtPath(path).ClearInfo("apiSchemas")
         author(stage, f"{path}.physics:approximation", None)
     assert ("echo:Colliders", f"/Room/{thing}", text) in found(stage)
+
+
+def test_walls_are_labelled_walls(stage):
+    path, layer = "/Room/Shell/Wall", stage.GetRootLayer()
+    prim = layer.GetPrimAtPath(path)
+    prim.SetInfo("apiSchemas", Sdf.TokenListOp.CreateExplicit([f"SemanticsLabelsAPI:{word}" for word in TAXONOMIES]))
+    classes = Sdf.AttributeSpec(prim, "semantics:labels:ade20k", Sdf.ValueTypeNames.TokenArray)
+    classes.default = Vt.TokenArray(["wall"])
+    assert found(stage) == []
+    classes.default = Vt.TokenArray(["bed"])
+    told = "semantics:labels:ade20k is 'bed', allowed with 'wall': 'wall'"
+    assert found(stage) == [("echo:LabelsAgree", path, told)]
+    classes.default = Vt.TokenArray([])
+    prim.attributes[LABELS].default = Vt.TokenArray(["floor"])
+    assert found(stage) == [("echo:LabelsAgree", path, f"{LABELS} is 'floor', its name says 'wall'")]
+    assert [one.warning for rule in RULES for one in safely(rule, stage)] == [False]
+    prim.attributes[LABELS].default = Vt.TokenArray(["partition"])  # of somebody's own vocabulary
+    assert [one.warning for rule in RULES for one in safely(rule, stage)] == [True]

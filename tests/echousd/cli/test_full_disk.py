@@ -50,6 +50,80 @@ def test_what_was_begun_disappears(tmp_path, topic):
     assert not list(out.iterdir())
 
 
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("room")
+    (folder / "graph.yaml").write_text(GRAPH)
+    words = ("generate", folder / "graph.yaml", "-o", folder / "room", "--shapes", "boxes", "--dress", "none")
+    made = full(10**9, *words)
+    assert made.returncode == 0, made.stderr
+    return folder / "room" / "room.usda"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
+@pytest.mark.parametrize(
+    ("most", "words"),
+    [
+        (600, ("render", "-o", "top.png", "--size", "64")),
+        (4_000, ("render", "-o", "cameras", "--cameras", "--size", "64")),
+        (600, ("export", "-o", "room.glb")),
+        (40_000, ("export", "-o", "flat/room.usda")),
+        (600, ("texture", "export", "-o", "job", "--for", "generic")),
+    ],
+    ids=lambda value: " ".join(value[:3]) if isinstance(value, tuple) else None,
+)
+def test_nothing_half_made_of_a_room_is_left(tmp_path, room, most, words):
+    at = words.index("-o") + 1
+    out = tmp_path / "out"
+    out.mkdir()
+    topic = words[:2] if words[0] == "texture" else words[:1]
+    done = full(most, *topic, room, *words[len(topic) : at], out / words[at], *words[at + 1 :])
+    last = done.stderr.strip().splitlines()[-1]
+    assert done.returncode == 2, done.stderr
+    assert str(out) in last
+    assert "cannot be written (File too large)" in last
+    assert not list(out.iterdir())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
+@pytest.mark.parametrize("most", [600, 60_000, 200_000])
+@pytest.mark.parametrize("more", [(), ("--arkit",)])
+def test_a_package_needs_room_for_what_it_is_made_of(tmp_path, room, most, more):
+    done = full(most, "export", room, "-o", tmp_path / "room.usdz", *more)
+    assert done.returncode == 2, done.stderr
+    assert "cannot be" in done.stderr
+    assert "nothing was changed" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
+def test_an_index_is_whole_or_stays_as_it_was(tmp_path, room):
+    index = tmp_path / "library.parquet"
+    words = ("assets", "index", room.parent / "assets", "-o", index, "--workers", "1")
+    done = full(600, *words)
+    assert done.returncode == 2, done.stderr
+    assert f"{index}: cannot be written" in done.stderr
+    assert not list(tmp_path.iterdir())
+    assert full(10**9, *words).returncode == 0
+    before = index.read_bytes()
+    assert full(600, *words).returncode == 2
+    assert index.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [index]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="this system limits no file's size")
+def test_a_batch_on_a_full_disk_goes_on_later(tmp_path):
+    graph, out = tmp_path / "graph.yaml", tmp_path / "batch"
+    graph.write_text(GRAPH)
+    words = ("batch", "run", graph, "-o", out, "--shapes", "boxes", "--dress", "none", "--workers", "1")
+    done = full(20_000, *words)
+    assert done.returncode in (1, 2), done.stderr
+    assert "cannot be written (File too large)" in done.stdout + done.stderr
+    assert not list(out.rglob("*.partial"))
+    assert full(10**9, *words, "--resume").returncode == 0
+    assert full(10**9, "batch", "verify", out).returncode == 0
+
+
 def test_terminals_obey_no_cell_and_no_line(capsys):
     from rich.table import Table
 

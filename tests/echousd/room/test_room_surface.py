@@ -8,7 +8,7 @@ from echousd.room.finishes.slots import metres_of
 from echousd.room.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
 from echousd.room.meshing import box_mesh
 from echousd.room.surface import creased_normals, surface, unshared
-from echousd.room.taxonomy import ade20k
+from echousd.stage.taxonomy import ade20k
 
 
 def slow_creased_normals(mesh, crease):

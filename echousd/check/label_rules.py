@@ -1,0 +1,51 @@
+"""Rules on semantics labels of what is no object of the graph too: walls, floors, doors, small things."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pxr import Tf, Usd
+
+from echomodel.vocabulary import UnknownWord, normalised
+from echousd.check.findings import Finding, Rule, prims
+from echousd.stage import encoding as usd
+from echousd.stage.encoding import StageError
+from echousd.stage.labels import is_structure, known_category, spaced
+from echousd.stage.read import find_rooms
+from echousd.stage.taxonomy import SHELL, ade20k
+from echousd.stage.values import texts
+
+CLASSES = "semantics:labels:ade20k"
+
+
+def agreeing_labels(stage: Usd.Stage) -> Iterator[Finding]:
+    """Labels of walls, floors, ceilings, doors and windows are what their names say; two taxonomies say the same."""
+    try:
+        nodes = [prim.GetPath() for room in find_rooms(stage) for prim in room.nodes]
+    except StageError:  # echo:EdgeTargets reports it
+        return
+    for prim in prims(stage):
+        try:
+            words, classes = texts(prim.GetAttribute(usd.LABELS)), texts(prim.GetAttribute(CLASSES))
+        except (StageError, Tf.ErrorException):
+            continue
+        if len(words) != 1:
+            continue
+        word = normalised(words[0])
+        meant = spaced(prim.GetName()).rpartition("_")[2]
+        other = meant in SHELL and word.removesuffix("s") not in (meant, SHELL[meant])
+        if other and not any(prim.GetPath().HasPrefix(path) for path in nodes):
+            known = is_structure(word) or known_category(word) is not None
+            told = f"{usd.LABELS} is {words[0]!r}, its name says {meant!r}"
+            yield Finding(prim.GetPath(), told, warning=not known)
+        if len(classes) == 1:
+            try:
+                same = ade20k(word)
+            except UnknownWord:
+                continue
+            if normalised(classes[0]) != normalised(same):
+                told = f"{CLASSES} is {classes[0]!r}, allowed with {words[0]!r}: {same!r}"
+                yield Finding(prim.GetPath(), told)
+
+
+RULES = (Rule("echo:LabelsAgree", "Labels agree with each other and with names of walls and floors.", agreeing_labels),)
