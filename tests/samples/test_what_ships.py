@@ -10,25 +10,59 @@ from echousd.check.check import check_room
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)
-DRAWN = 0.9  # least share of the measured relations that the layout network alone keeps, over all samples
+# Floors, with what was measured when they were stated, over all samples and seeds:
+DRAWN = 0.9  # least share of the relations that the layout network alone keeps: 197 of 213
+DRAWN_COLLISIONS = 3.0  # most collisions a room that it leaves to repair: 37 in 15
+LIVING = 0.03  # most things a person would point at, per object of a finished room: 2 of 129
+FAULTLESS = 12 / 15  # least share of rooms in which there is no such thing: 13 of 15
 
 
 def states(room) -> Counter:
     return Counter(verdict.state for verdict in room.verdicts)
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A sample at a seed -> the room and what `check` says of it, made once."""
+    made = {}
+
+    def make(sample, seed):
+        if (sample, seed) not in made:
+            room = echousd.generate(sample, seed=seed, shapes="boxes")
+            folder = tmp_path_factory.mktemp(sample.stem) / sample.stem
+            made[sample, seed] = room, check_room(room.save(folder, preview=False))
+        return made[sample, seed]
+
+    return make
+
+
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_every_relation_is_kept_and_the_check_is_clean(sample, seed, tmp_path):
-    room = echousd.generate(sample, seed=seed, shapes="boxes")
-    assert [v for v in room.verdicts if v.state == "broken"] == []
-    assert states(room)["kept"] >= 9
-    report = check_room(room.save(tmp_path / sample.stem, preview=False))
+def test_every_relation_is_kept_and_the_check_is_clean(sample, seed, finished):
+    room, report = finished(sample, seed)
+    asked = len(room.graph.relations)
+    assert asked >= 9
+    assert states(room) == {"kept": asked}, [str(verdict) for verdict in room.verdicts if verdict.state != "kept"]
     assert report.ok, report.to_json()
+    assert [layout.kept for layout in report.layouts] == [asked]
+    assert report.warnings == ()
 
 
+def test_few_things_that_a_person_would_point_at_are_left(finished):
+    made = [finished(sample, seed) for sample in SAMPLES for seed in SEEDS]
+    faults = [fault.says for _, report in made for fault in report.living]
+    assert len(faults) / sum(len(room.names) for room, _ in made) <= LIVING, faults
+    assert sum(not report.living for _, report in made) / len(made) >= FAULTLESS, faults
+
+
+@pytest.mark.filterwarnings("ignore:the room has faults")
 def test_the_network_alone_draws_most_of_what_the_graph_says():
-    total = Counter()
+    total: Counter = Counter()
+    hits = []
     for sample in SAMPLES:
-        total += states(echousd.generate(sample, seed=SEEDS[0], shapes="boxes", repair=False))
+        for seed in SEEDS:
+            room = echousd.generate(sample, seed=seed, shapes="boxes", repair=False)
+            total += states(room)
+            hits += room.outcomes[0].collisions
     assert total["kept"] / (total["kept"] + total["broken"]) >= DRAWN, total
+    assert len(hits) / (len(SAMPLES) * len(SEEDS)) <= DRAWN_COLLISIONS, hits
