@@ -115,7 +115,9 @@ def generate(
 ) -> None:
     """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD.
 
-    A stage of several rooms becomes a folder for each and a root layer that composes them.
+    A stage of several rooms becomes a folder for each and a root layer that composes them. Of a graph's numbers,
+    lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians about +Y: at 0 a
+    front looks along +Z.
     """
     from echousd.room.manifest import check_seed
     from echousd.room.output import check_output, set_crate_version, writing

@@ -7,6 +7,7 @@ import re
 import resource
 import subprocess
 import sys
+import warnings
 
 import pytest
 import typer
@@ -48,6 +49,12 @@ def test_every_command_has_help_with_an_example():
         assert f"echousd {' '.join(path)}" in text, f"{' '.join(path)} shows no example"
 
 
+def test_help_says_units_and_frame(echousd_command):
+    told = " ".join(echousd_command("generate", "--help").out.split())
+    for words in ("lengths are metres", "+Y up", "`90 deg` or radians about +Y"):
+        assert words in told.replace("│ ", "").replace(" │", "")
+
+
 def test_the_start_loads_nothing_heavy_and_is_fast():
     code = (
         "import sys\nfrom echousd.cli.main import run\nrun(['--help'])\n"
@@ -65,8 +72,10 @@ def test_the_start_loads_nothing_heavy_and_is_fast():
 
 
 def test_threads_wait_asleep_unless_somebody_says_otherwise(monkeypatch):
+    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)  # as it was, afterwards
+    monkeypatch.setenv("OMP_WAIT_POLICY", "")
     for said, found in ((None, "PASSIVE"), ("ACTIVE", "ACTIVE")):
-        monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
+        monkeypatch.delenv("OMP_WAIT_POLICY")
         if said is not None:
             monkeypatch.setenv("OMP_WAIT_POLICY", said)
         monkeypatch.setattr(sys, "argv", ["echousd", "--version"])
