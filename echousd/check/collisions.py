@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
+from trimesh.triangles import closest_point
 
 from echousd.repair.geometry import axes, pair_indices, separation
 from echousd.stage.contents import RoomObject
@@ -60,9 +61,18 @@ def _reach(surface: RoomObject, solid: RoomObject) -> float:
     if not len(within):
         return 0.0
     rng = np.random.default_rng(0)
-    skin = np.concatenate((solid.points, _scatter(solid.points[solid.faces], 4000, rng)))
-    # The nearest sample is at most a sample's distance further than the surface itself.
-    return float(cKDTree(skin).query(within)[0].max())
+    triangles = solid.points[solid.faces]
+    skin = np.concatenate((solid.points, _scatter(triangles, 4000, rng)))
+    deepest = 0.0
+    # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
+    at_most = cKDTree(skin).query(within)[0]
+    for number in np.argsort(-at_most):
+        if at_most[number] <= max(deepest, DEEP):
+            break
+        near = closest_point(triangles, np.broadcast_to(within[number], (len(triangles), 3)))
+        far = np.linalg.norm(near - within[number], axis=1)  # NaN where a triangle has no area
+        deepest = max(deepest, float(np.fmin.reduce(far, initial=at_most[number])))
+    return deepest
 
 
 def surface_points(surface: RoomObject, solid: RoomObject) -> np.ndarray:

@@ -11,7 +11,7 @@ import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdValidation
 
 from echousd.check import RULES, check_room, register
-from echousd.check.collisions import find_collisions, mesh_depth, winding_number
+from echousd.check.collisions import DEEP, find_collisions, mesh_depth, winding_number
 from echousd.check.living import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec
@@ -181,7 +181,7 @@ def table(x: float, y: float, z: float) -> trimesh.Trimesh:
 def test_what_fits_between_the_legs_does_not_collide() -> None:
     desk, cabinet = thing("desk", "desk", table(1.6, 0.75, 0.8), (0, 0, 0)), box(0.5, 0.6, 0.5)
     assert not find_collisions([desk, thing("box", "cabinet", cabinet, (0, 0, 0.1))])
-    (hit,) = find_collisions([desk, thing("box", "cabinet", cabinet, (0.6, 0, 0.1))])
+    (hit,) = find_collisions([desk, thing("box", "cabinet", cabinet, (0.6, 0, 0.2))])
     assert (hit.first, hit.second) == ("desk", "box")
     assert hit.depth > 0.02
     assert hit.to_json() == {"objects": ["desk", "box"], "depth": round(hit.depth, 4)}
@@ -201,6 +201,15 @@ def test_depth_of_two_boxes() -> None:
     second = thing("b", "cabinet", box(1, 1, 1), (0.8, 0, 0))
     assert mesh_depth(first, second) == pytest.approx(0.2, abs=0.04)
     assert mesh_depth(first, thing("c", "cabinet", box(1, 1, 1), (1.001, 0, 0))) == 0.0
+
+
+def test_large_faces_that_touch_by_millimetres_are_no_collision() -> None:
+    """Depth is measured to the faces themselves, however far apart samples of them would lie."""
+    wide = thing("a", "dining_table", box(3, 0.8, 3), (0, 0, 0))
+    for reach, deep in ((0.003, False), (0.02, True)):
+        tip = box(0.02, 0.5, 0.3)
+        tip.apply_translation((1.51 - reach, 0, 0))
+        assert (mesh_depth(wide, thing("b", "cabinet", tip, (0, 0, 0))) > DEEP) == deep
 
 
 def test_winding_number_agrees_with_ray_casting() -> None:
