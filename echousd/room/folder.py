@@ -96,6 +96,9 @@ def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: li
     for path in (*order, *remove):
         if inside(folder, path, "a file of the room").is_dir():
             raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
+        blocking = [place for place in (folder / path).parents if place != folder and place.is_file()]
+        if blocking and path in files:
+            raise ValueError(f"{blocking[0]}: is a file, where a folder of the room belongs; nothing was changed")
     try:
         _discard(staging)
         staging.mkdir()

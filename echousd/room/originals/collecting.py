@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pxr import Sdf, Tf, UsdUtils
 
 from echousd.assets.model_file import STAGES, ModelFile
-from echousd.packing import PACKED, LeftOut
+from echousd.packing import PACKED, LeftOut, asset_paths
 from echousd.textures import READABLE
 
 TAKEN = (*STAGES, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")
@@ -30,7 +30,7 @@ def collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
     for name in named:
         path = name.partition("[")[0]
         if os.path.commonpath([top, os.path.realpath(path)]) != top:
-            raise ValueError(f"{model}: depends on {path}, allowed: files below {model.top}")
+            raise ValueError(f"{model}: {_named_by(layers, path)}depends on {path}, allowed: files below {model.top}")
         if Path(path).suffix.lower() not in TAKEN:
             warnings.warn(f"{model}: depends on {path}, which is left out", LeftOut, stacklevel=2)
         total += Path(path).stat().st_size
@@ -46,3 +46,13 @@ def collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
             raise ValueError(f"{model}: cannot be collected ({str(error).splitlines()[0]:.120})") from None
         found = [p for p in sorted(Path(folder).rglob("*")) if p.is_file() and p.suffix.lower() in TAKEN]
         return model.path.name, {p.relative_to(folder).as_posix(): p.read_bytes() for p in found}
+
+
+def _named_by(layers: Sequence[Sdf.Layer], path: str) -> str:
+    """`<prim or property path> ` of who names a file, "" where no value does (a layer that is referred to)."""
+    real = os.path.realpath(path)
+    for layer in layers:
+        for where, said in asset_paths(layer):
+            if os.path.realpath(layer.ComputeAbsolutePath(said)) == real:
+                return f"{where} "
+    return ""

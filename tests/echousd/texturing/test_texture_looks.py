@@ -78,6 +78,18 @@ def test_generating_again_keeps_the_look_and_the_file(room):
     assert not any(path.startswith("looks/") for path in root)  # the user's own
 
 
+def test_a_file_that_is_called_looks_is_named(room):
+    (room.parent / "looks").write_text("mine")
+    before = room.read_bytes()
+    with pytest.raises(ValueError, match=r"bedroom/looks: is a file, where a folder of the room belongs; nothing was"):
+        import_look(room, job_of(room), name="oil", preview=False)
+    assert (room.parent / "looks").read_text() == "mine"
+    assert room.read_bytes() == before
+    assert not (room.parent / ".echousd").exists() or not list((room.parent / ".echousd").glob("journal*"))
+    (room.parent / "looks").unlink()
+    import_look(room, job_of(room), name="oil", preview=False)
+
+
 def test_what_changed_is_shown_as_made_and_told(room):
     import_look(room, job_of(room), name="oil", preview=False)
     layer = (room.parent / "looks/oil.usda").read_bytes()
