@@ -40,8 +40,8 @@ def openings(draw: st.DrawFn, corners: np.ndarray | None, height: float | None) 
         offset = third * room + draw(st.floats(0, (room - width) * 0.9))
         kind = draw(st.sampled_from(["door", "window", "passage"]))
         hinge, swing = draw(st.sampled_from(["left", "right"])), draw(st.sampled_from(["in", "out"]))
-        sill = draw(st.floats(0, (height or 1.0) * 0.4)) if kind == "window" else 0.0
-        top = draw(st.floats(0.1, (height or 9) / 2))
+        sill = draw(st.floats(0, min((height or 1.0) * 0.4, 100.0))) if kind == "window" else 0.0
+        top = draw(st.floats(0.1, min((height or 9) / 2, 100.0)))
         made.append(Opening(name, kind, wall, offset, width, top, sill, hinge, swing))
     return tuple(made)
 

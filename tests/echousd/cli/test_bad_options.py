@@ -88,7 +88,7 @@ def test_pictures_replace_only_pictures_of_ours(echousd_command, tmp_path):
 def test_limits_say_what_was_found(echousd_command, tmp_path):
     large = tmp_path / "large.yaml"
     large.write_text(ROOM + "#" * (9 * 2**20))
-    assert "9 MiB, allowed: 8 MiB for a scene graph" in echousd_command("graph", large).err
+    assert "9.1 MiB, allowed: 8 MiB for a scene graph" in echousd_command("graph", large).err
     large.write_text("room: bedroom\nobjects:\n" + "".join(f"  n{i}: nightstand\n" for i in range(5001)))
     assert "the graph has 5001 objects, allowed: 5000" in echousd_command("graph", large).err
     corners = [[math.cos(i / 501 * 2 * math.pi), math.sin(i / 501 * 2 * math.pi)] for i in range(501)]

@@ -63,7 +63,7 @@ def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
     room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", repair=False)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = open_stage(root)
-    bed = "/Room/Objects/bed"
+    bed = "/Room/Objects/bed/geo"
     assert UsdGeom.Mesh(stage.GetPrimAtPath(f"{bed}/bed_foot"))
     for path, slot in {"bed_top/fabric": "fabric", "bed_top/wood": "wood", "bed_foot": "metal"}.items():
         bound = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(f"{bed}/{path}")).ComputeBoundMaterial()[0]
