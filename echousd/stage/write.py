@@ -158,4 +158,5 @@ def put(spec: Sdf.PrimSpec, name: str, value: Any) -> None:
 def relate(spec: Sdf.PrimSpec, name: str, *targets: Sdf.Path) -> None:
     """Author a relationship with exactly these targets."""
     relationship = spec.properties.get(name) or Sdf.RelationshipSpec(spec, name, False, _UNIFORM)
+    relationship.targetPathList.ClearEditsAndMakeExplicit()  # no target is an opinion as well
     relationship.targetPathList.explicitItems = list(targets)
