@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
 
+from echousd.bare import strip
+
 OURS = "Echo"  # what the names of our types and schemas begin with
 PROPERTIES = "echo:"
 
@@ -21,11 +23,7 @@ def for_arkit(layer: Sdf.Layer) -> None:
             stage.RemovePrim(prim.GetPath())
     for path in [prim.GetPath() for prim in stage.TraverseAll() if _is_empty_scope(prim)]:
         stage.RemovePrim(path)
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    with Sdf.ChangeBlock():
-        for spec in filter(None, (layer.GetPrimAtPath(path) for path in paths if path.IsPrimPath())):
-            _strip(spec)
+    strip(layer, PROPERTIES, OURS)
 
 
 def _is_light(prim: Usd.Prim) -> bool:
@@ -55,16 +53,3 @@ def _turn(stage: Usd.Stage) -> None:
         if scene and scene.GetGravityDirectionAttr().HasAuthoredValue():
             scene.GetGravityDirectionAttr().Set(Gf.Vec3f(turn.TransformDir(scene.GetGravityDirectionAttr().Get())))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-
-
-def _strip(spec: Sdf.PrimSpec) -> None:
-    for name in [found.name for found in spec.properties if found.name.startswith(PROPERTIES)]:
-        spec.RemoveProperty(spec.properties[name])
-    if not spec.HasInfo("apiSchemas"):
-        return
-    applied = spec.GetInfo("apiSchemas").GetAddedOrExplicitItems()
-    kept = [name for name in applied if not name.startswith(OURS)]
-    if not kept:
-        spec.ClearInfo("apiSchemas")
-    elif len(kept) < len(applied):
-        spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=kept))
