@@ -18,17 +18,19 @@ import typer
 AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000
+ENDLESS = re.compile(r"(?<![\w./-])(-?\d)(\d{39,})(?:\.\d+)?(?![\w/-]|\.\w)")  # a number that is no part of a path
 MARK = b"echousd"
 HEAD = 2048  # bytes in which a picture of ours says so
 _errors: ContextVar[TextIO | None] = ContextVar("_errors", default=None)
 
 
 def safe(text: str) -> str:
-    """A text without characters that a terminal obeys (escapes, bells, reversed writing), its long words cut."""
+    """A text without characters that a terminal obeys (escapes, bells, reversed writing); long words are cut."""
     shown = "".join(
         c if c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cf", "Cs", "Zl", "Zp") else _escaped(c)
         for c in text[: 16 * LONGEST_LINE]
     )
+    shown = ENDLESS.sub(lambda number: f"{number[1]}.{number[2][:3]}e+{len(number[2])}", shown)
     cut = re.sub(rf"(\S{{{LONGEST_WORD - 20}}})\S{{40,}}(\S{{10}})", r"\1...\2", shown)
     return cut if len(cut) <= 16 * LONGEST_LINE else cut[: 16 * LONGEST_LINE] + "..."
 

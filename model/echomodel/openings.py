@@ -20,6 +20,7 @@ USUAL = {  # metres, where nobody says otherwise
 WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
 HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
+LONGEST = 10_000.0  # metres of its offset and width: longer than any wall
 TOUCH = 1e-6  # metres: neighbouring openings may share a jamb
 ARC = 9  # points on the arc of a swing
 
@@ -66,10 +67,9 @@ class Opening:
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
                 raise ValueError(f"opening {self.name!r}: {field} is {value!r}, allowed: {least:g} or more, metres")
-            if field in ("height", "sill") and value > HIGHEST:  # the others end with the wall
-                raise ValueError(
-                    f"opening {self.name!r}: {field} is {value!r}, allowed: {least:g} to {HIGHEST:g}, metres"
-                )
+            most = HIGHEST if field in ("height", "sill") else LONGEST
+            if value > most:
+                raise ValueError(f"opening {self.name!r}: {field} is {value!r}, allowed: {least:g} to {most:g}, metres")
             object.__setattr__(self, field, float(value))
         if self.kind != "window" and self.sill:
             raise ValueError(f"opening {self.name!r}: sill is {self.sill:g}, allowed: 0 for a {self.kind}")

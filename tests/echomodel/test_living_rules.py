@@ -205,6 +205,17 @@ def test_the_walkable_share_counts_what_the_robot_gets_to():
     assert found.reached.all()
 
 
+@pytest.mark.parametrize("yaw", [0.0, 0.4, HALF, 2.5])
+def test_arms_reach_as_far_from_every_side_of_a_turned_box(yaw):
+    ahead = np.array([np.sin(yaw), np.cos(yaw)])
+    things, turn = np.array([[1.6, 0.8, 0.4]] * 2), np.full(2, yaw)
+    for far, reached in ((0.2 + 0.5, True), (0.2 + 1.0, False)):  # from the middle of the bar to the strip of floor
+        strip = np.array([(-1.0, 0.0), (1.0, 0.0), (1.0, 0.5), (-1.0, 0.5)])
+        strip = strip @ np.stack([(ahead[1], -ahead[0]), ahead]) + (far - 0.2) * ahead
+        found = ways(things, np.array([(0.0, 0.0, 0.0), (50.0, 0.0, 50.0)]), turn, np.zeros(2, bool), strip)
+        assert found.reached.tolist() == [reached, False]
+
+
 @pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
 def test_margins_have_finite_slopes(rule):
     room = generate_rooms(1, 5, room_type="living_dining_room")[0]

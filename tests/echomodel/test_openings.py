@@ -50,6 +50,7 @@ def window(name: str = "window", edge: int = 1, offset: float = 0.5, **fields: o
         ({"edge": True}, "opening 'door': edge is True, allowed: the number of a corner, 0 or more"),
         ({"offset": -0.1}, "opening 'door': offset is -0.1, allowed: 0 or more, metres"),
         ({"width": float("nan")}, "opening 'door': width is nan, allowed: 0.1 or more, metres"),
+        ({"offset": 1e300}, "opening 'door': offset is 1e+300, allowed: 0 to 10000, metres"),
         ({"height": 1e300}, "opening 'door': height is 1e+300, allowed: 0.1 to 100, metres"),
         ({"width": 0}, "opening 'door': width is 0, allowed: 0.1 or more, metres"),
         ({"sill": 0.2}, "opening 'door': sill is 0.2, allowed: 0 for a door"),

@@ -155,6 +155,8 @@ def _moved_apart(
                     if more not in groups and len(groups) <= GROUPS:
                         groups.append(more)
                     continue
+                if best is not None and -len(kept) > best[0]:
+                    continue
                 price = scene.price(mover, way) * (1 + len(group) - len(groups[0]))
                 score = (-len(kept), len(living_faults(graph, tried, floor)), price)
                 if best is None or score < best:

@@ -54,6 +54,8 @@ def test_terminals_obey_nothing_that_a_file_says(echousd_command, tmp_path):
     assert safe("a\x1b[31mred\x07\u202eb") == "a\\x1b[31mred\\x07\\u202eb"
     assert len(one_line("x" * 10**6)) < 400
     assert one_line("two\nlines") == "two lines"
+    assert safe(f"reaches from {-1e300:.2f} to {1e50:.0f} m") == "reaches from -1.000e+300 to 1.000e+50 m"
+    assert safe(f"/rooms/{'1' * 60}/a.png") == f"/rooms/{'1' * 60}/a.png"  # names of files stay as they are
     named = tmp_path / "room\x1b]0;mine\x07.usda"
     done = echousd_command("graph", named)
     assert done.code == 2

@@ -47,9 +47,10 @@ def ways(
     low, high = polygon.min(0) - CELL, polygon.max(0) + CELL
     xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
     free = _inside(xs, zs, polygon)
-    away = np.stack([_distance(xs, zs, size[i], position[i], float(yaw[i])) for i in range(len(size))] or [free * 9.0])
+    near = [_near(xs, zs, size[i], position[i], float(yaw[i])) for i in range(len(size))]
+    away = [_distance(xs[x], zs[z], size[i], position[i], float(yaw[i])) for i, (x, z) in enumerate(near)]
     for i in np.flatnonzero(obstacle):
-        free &= away[i] > 0
+        free[near[i]] &= away[i] > 0
     # the distance to the next cell that is not free, less half of that cell
     room = (ndimage.distance_transform_edt(free) - 0.5) * CELL >= ROBOT - 0.5 * CELL
     parts, count = ndimage.label(room)
@@ -60,7 +61,7 @@ def ways(
         areas = np.bincount(parts.ravel())[1:]
         start = {int(areas.argmax()) + 1}
     walked = np.isin(parts, sorted(start))
-    reached = np.array([bool((away[i][walked] <= ROBOT + ARM).any()) for i in range(len(size))], bool)
+    reached = np.array([bool((away[i][walked[near[i]]] <= ROBOT + ARM).any()) for i in range(len(size))], bool)
     return Ways(reached, float(walked.sum() / room.sum()))
 
 
@@ -89,6 +90,17 @@ def _inside(xs: np.ndarray, zs: np.ndarray, polygon: np.ndarray) -> np.ndarray:
     run = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
     meets = start[:, 0] + (z - start[:, 1]) / run * (end[:, 0] - start[:, 0])
     return (crossed & (meets > x)).sum(-1) % 2 == 1
+
+
+def _near(xs: np.ndarray, zs: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: float) -> tuple[slice, slice]:
+    """The cells around a box that hold all those within reach of it."""
+    cos, sin = abs(np.cos(yaw)), abs(np.sin(yaw))
+    far = ROBOT + ARM + CELL
+    x, z = (cos * size[0] + sin * size[2]) / 2 + far, (sin * size[0] + cos * size[2]) / 2 + far
+    return (
+        slice(*np.searchsorted(xs, (position[0] - x, position[0] + x))),
+        slice(*np.searchsorted(zs, (position[2] - z, position[2] + z))),
+    )
 
 
 def _distance(xs: np.ndarray, zs: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
