@@ -59,15 +59,16 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
 
     from echomodel.boxes import Boxes
     from echomodel.data.rooms import generate_room
-    from echomodel.data.rooms.generator import MIX
+    from echomodel.data.rooms.generator import drawn_shares
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
     from echomodel.vocabulary import vocabulary
     from echousd.graph import Node, Relation, RoomSpec
 
-    if room_type not in MIX:
-        raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(MIX)}")
-    kind = list(MIX).index(room_type)
+    types = list(drawn_shares())
+    if room_type not in types:
+        raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(types)}")
+    kind = types.index(room_type)
     room = generate_room(np.random.Generator(np.random.PCG64([seed, kind, number])), room_type)
     words, times = vocabulary(), dict.fromkeys(room.categories, 0)
     names = []

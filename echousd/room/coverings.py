@@ -10,16 +10,15 @@ from echomodel.openings import edge_lengths, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.room.room import RoomData
 
-FLOORS = {"bedroom": "carpet", "dining_room": "tiles"}  # of a third of these rooms; the others have boards
-THIRD = 3
+THIRD = 3  # one room in so many has the flooring of its type, or a papered wall
 NEAR = 0.45  # metres between a wall and the back of what stands at it
 HOSTS = ("bed", "sofa")  # roles of what a papered wall stands behind
 
 
 def floor_slot(room: RoomData) -> str:
     """The material slot of the room's floor."""
-    other = FLOORS.get(room.graph.room.type, "floor")
-    return other if _drawn(room, "floor") else "floor"
+    other = vocabulary().room_type(room.graph.room.type).flooring
+    return other if other and _drawn(room, "floor") else "floor"
 
 
 def papered_wall(room: RoomData) -> str:

@@ -33,6 +33,8 @@ class Category:
         hangs: it may also hang on a wall.
         solid: its collider may be one hull; everything else has room below or inside that other things need.
         access: metres in front that must stay free, so that it can be opened or used.
+        left_free: metres in front that the generator of rooms leaves free, as real rooms do. askew: share of such
+            pieces that stand askew in real rooms.
         belongs_to: categories that it attends, the likeliest first.
         stands: how it stands to them, one of `STANCES`.
         admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
@@ -62,6 +64,8 @@ class Category:
     hangs: bool = False
     solid: bool = False
     access: float = 0.0
+    left_free: float = 0.0
+    askew: float = 0.0
     belongs_to: tuple[str, ...] = ()
     stands: str = ""
     admits: tuple[tuple[str, float], ...] = ()
@@ -141,6 +145,10 @@ class RoomType:
             tell none, "" = there is none.
         cover: share of the floor that furniture covers, median. used: share of the floor that use can take, the rest
             are ways and corners. aspect: long side over short side, median. cut: share of floors with a corner cut off.
+        cuts: shares of one, two, three and four corners among the generator's floors that are no rectangle.
+        share: of such rooms in a mixed set of generated rooms, 0 = none is drawn.
+        zones: (room type, weight): what a large room of this type is besides.
+        flooring: the material slot of a third of such floors, "" = all have boards.
         aliases: what people call it.
     """
 
@@ -154,4 +162,8 @@ class RoomType:
     used: float = 0.66
     aspect: float = 1.3
     cut: float = 0.12
+    cuts: tuple[float, ...] = (0.35, 0.35, 0.2, 0.1)
+    share: float = 0.0
+    zones: tuple[tuple[str, float], ...] = ()
+    flooring: str = ""
     aliases: tuple[str, ...] = ()

@@ -114,6 +114,12 @@ class Vocabulary:
         return tuple(entry.id for entry in self.predicates if what in entry.unites)
 
     @cached_property
+    def cornered(self) -> frozenset[str]:
+        """Categories into whose box what stands before them may reach: the inner corner of an L."""
+        before = {row.name for row in self.categories if row.stands == "before"}
+        return frozenset(row.name for row in self.categories if before & {word for word, _ in row.admits})
+
+    @cached_property
     def predicate_names(self) -> frozenset[str]:
         """The names of all predicates, without aliases."""
         return frozenset(entry.name for entry in self.predicates)
@@ -158,7 +164,9 @@ class Vocabulary:
         for room in self.room_types:
             _known(f"room type {room.name}", "contents", (word for word, _ in room.contents), categories)
             _known(f"room type {room.name}", "signs", room.signs, {*categories, *self.coarse_categories})
-            _known(f"room type {room.name}", "like", (room.like,), {"", *(other.name for other in self.room_types)})
+            types = {other.name for other in self.room_types}
+            _known(f"room type {room.name}", "like", (room.like,), {"", *types})
+            _known(f"room type {room.name}", "zones", (word for word, _ in room.zones), types)
         for habit in self.habits:
             _known("habits", "category", (*habit.categories, *habit.anchors), categories)
             _known("habits", "predicate", (*habit.predicates, *habit.sides, *habit.among), predicates)

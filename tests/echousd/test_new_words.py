@@ -14,6 +14,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.data.furniture import decor
 from echomodel.data.furniture.carpentry import box
+from echomodel.data.rooms.generator import drawn_shares, generate_rooms
 from echomodel.habits import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
@@ -25,6 +26,7 @@ from echousd.graph.picture import draw_graph, to_dot
 from echousd.repair import repair_boxes
 from echousd.room.dressing.dress import placed
 from echousd.room.dressing.tabletops import TOPS
+from echousd.room.finishes.slots import SLOTS
 from echousd.stage.foreign import foreign_graph
 
 LEVEL = 0.05  # metres
@@ -176,6 +178,23 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
 
 def test_rows_name_tops_that_there_are():
     assert {row.top for row in vocabulary().categories} == {"", *TOPS}
+
+
+def test_rows_name_floorings_that_there_are():
+    assert {row.flooring for row in vocabulary().room_types} <= {"", *SLOTS}
+
+
+def test_rooms_of_a_new_type_are_drawn_with_their_share(music):
+    *others, room = music.room_types
+    room = replace(room, share=0.5, zones=(("study", 1.0),), flooring="tiles")
+    with speaking(replace(music, room_types=(*others, room))):
+        assert next(iter(drawn_shares())) == "music_room"
+        rooms = generate_rooms(12, 3, halls=0.3)
+    assert sum(made.room_type == "music_room" for made in rooms) >= 3
+
+
+def test_a_table_reaches_into_the_corner_of_what_admits_it():
+    assert vocabulary().cornered == {"l_shaped_sofa"}
 
 
 def graph_file(folder, graph):

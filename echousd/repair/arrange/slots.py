@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.vocabulary import Category
+from echomodel.vocabulary import Category, vocabulary
 
 Size = np.ndarray
 Slot = tuple[float, float, float, float]
@@ -29,7 +29,7 @@ def head(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
 
 def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     """Coffee tables: before the sofa, in reach, the long side along it."""
-    inner = kind.name == "l_shaped_sofa"
+    inner = kind.name in vocabulary().cornered
     out = []
     for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.4)):
         depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])

@@ -16,7 +16,6 @@ from echomodel.rules import label_rooms
 from echomodel.vocabulary import UnknownWord, vocabulary
 
 FIVE, THREE, QUARTERS = (5, 25, 50, 75, 95), (5, 50, 95), (25, 50, 75)
-LAMPS = ("pendant_lamp", "ceiling_lamp")
 
 
 def known_category(word: str) -> str | None:
@@ -157,7 +156,7 @@ def _walls(rooms: Iterable[RoomBoxes]) -> dict:
         side = np.minimum(reach[1], reach[2]) - room.size[:, 0] / 2
         askew = np.abs((room.yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4)
         for k, category in enumerate(room.categories):
-            if category not in LAMPS and np.isfinite(back[k]):
+            if vocabulary().category(category).support != "ceiling" and np.isfinite(back[k]):
                 centre = min(length[k] for length in reach)
                 rows[category].append((back[k], side[k], askew[k], centre))
     out = {}

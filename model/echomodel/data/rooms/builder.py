@@ -12,18 +12,12 @@ from echomodel.data.furniture.sizes import sample_size
 from echomodel.data.rooms.floor import Floor, Wall
 from echomodel.data.rooms.statistics import QUARTILE, back_gaps
 from echomodel.sizes import size_statistics
+from echomodel.vocabulary import vocabulary
 
 HALF_PI = math.pi / 2
 Size = tuple[float, float, float]
-# Metres before doors, drawers and shelves that stay free.
-ACCESS = {
-    "wardrobe": 0.6, "cabinet": 0.5, "children_cabinet": 0.5, "dresser": 0.5, "sideboard": 0.45, "bookshelf": 0.45,
-    "shelf": 0.4, "wine_cabinet": 0.45, "tv_stand": 0.4, "console_table": 0.35, "dressing_table": 0.5, "desk": 0.5,
-}  # fmt: skip
 SMALLEST, LARGEST = 0.55, 1.15  # times the 5th and 95th percentile of the class
 BODY = 1.8  # metres that a free zone is high
-# shares that stand askew, of room_statistics.json
-ASKEW = {"dining_chair": 0.09, "floor_lamp": 0.36, "plant": 0.06, "office_chair": 0.2}
 SUNK, FAR_BACK = -0.02, 0.12  # metres, ends of what a gap behind furniture at a wall is drawn from
 
 
@@ -104,7 +98,7 @@ class Builder:
 
     def askew(self, category: str) -> float:
         """How far one of a category is turned off the axes, radians: most stand straight."""
-        if not self.chance(ASKEW.get(category, 0.0)):
+        if not self.chance(vocabulary().category(category).askew):
             return 0.0
         return float(np.clip(self.rng.normal(0.0, 0.35), -0.7, 0.7))
 
@@ -254,8 +248,8 @@ def _of_its_kind(item: Item) -> Size:
 
 def front_zone(item: Item) -> Item | None:
     """What must stay free before an item, as an item; None where it has no front to open."""
-    depth = ACCESS.get(item.category)
-    if depth is None or item.y > 0:
+    depth = vocabulary().category(item.category).left_free
+    if not depth or item.y > 0:
         return None
     x, z = item.local(0.0, item.size[2] / 2 + depth / 2)
     return Item("", (0.9 * item.size[0], BODY, depth), x, 0.0, z, item.yaw)

@@ -16,11 +16,16 @@ from echomodel.data.rooms.recipes import furnish, wanted
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
+from echomodel.vocabulary import vocabulary
 
-# Shares of room types in a mixed set; bedrooms and living-dining rooms are the most frequent in real collections.
-MIX = {"bedroom": 0.40, "living_dining_room": 0.27, "living_room": 0.14, "dining_room": 0.11, "study": 0.08}
 REDRAWS = 4  # rooms in which what they are for finds no place are drawn anew so often
 STYLES = 327  # of the full set of shapes, which has each of 46 categories in all of them
+
+
+def drawn_shares() -> dict[str, float]:
+    """Room type -> its share in a mixed set of rooms, the most frequent first, as in real collections."""
+    rows = sorted(vocabulary().room_types, key=lambda row: -row.share)
+    return {row.name: row.share for row in rows if row.share}
 
 
 def generate_room(
@@ -32,7 +37,7 @@ def generate_room(
 
     Arguments:
         rng: source of every draw; the room is a function of its state.
-        room_type: word of the vocabulary, or None to draw one from `MIX`.
+        room_type: word of the vocabulary, or None to draw one by `drawn_shares`.
         styles: number of style groups; objects refer to shape `s<style>_<category>`.
         name: the room's id.
         statistics: what such rooms hold, default that of the real ones.
@@ -46,7 +51,8 @@ def generate_room(
         ValueError: a room type that the statistics do not hold.
     """
     if room_type is None:
-        room_type = list(MIX)[int(np.searchsorted(np.cumsum(list(MIX.values())), rng.random() * 0.999999))]
+        shares = drawn_shares()
+        room_type = list(shares)[int(np.searchsorted(np.cumsum(list(shares.values())), rng.random() * 0.999999))]
     statistics = statistics or room_type_statistics(room_type)
     size_shift = room_requests()["size"] if size_shift is None else size_shift
     for attempt in itertools.count():

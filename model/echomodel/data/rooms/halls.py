@@ -8,15 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.data.rooms.statistics import RoomTypeStatistics, room_type_statistics
+from echomodel.vocabulary import vocabulary
 
-# What a room of a type is besides, with weights: a large bedroom is worked and lived in, a hall has two of a kind.
-ZONES = {
-    "bedroom": {"study": 0.45, "living_room": 0.35, "bedroom": 0.2},
-    "living_room": {"living_room": 0.35, "dining_room": 0.25, "study": 0.25, "living_dining_room": 0.15},
-    "dining_room": {"dining_room": 0.45, "living_room": 0.55},
-    "living_dining_room": {"living_room": 0.4, "dining_room": 0.2, "living_dining_room": 0.25, "study": 0.15},
-    "study": {"living_room": 0.5, "study": 0.3, "bedroom": 0.2},
-}
 THREE = 0.4  # share of the halls that have a third zone
 WALLS_SHARED = 0.85  # zones of one room need less floor than rooms of their own
 LARGEST = 80.0  # square metres
@@ -24,8 +17,8 @@ LARGEST = 80.0  # square metres
 
 def hall_of(statistics: RoomTypeStatistics, rng: np.random.Generator) -> tuple[RoomTypeStatistics, list[str]]:
     """Statistics of a floor for several zones, and the room types of all zones, the room's own first."""
-    names = list(ZONES[statistics.name])
-    weights = np.cumsum([ZONES[statistics.name][name] for name in names])
+    names, shares = zip(*vocabulary().room_type(statistics.name).zones, strict=True)
+    weights = np.cumsum(shares)
     count = 1 + int(rng.random() < THREE)
     types = [statistics.name, *(names[int(np.searchsorted(weights, rng.random() * weights[-1]))] for _ in range(count))]
     area = WALLS_SHARED * sum(room_type_statistics(name).area[2] for name in types) * float(rng.uniform(0.9, 1.5))

@@ -11,9 +11,6 @@ import numpy as np
 
 from echomodel.vocabulary import vocabulary
 
-# How many corners are cut where the floor is not a rectangle: shares of 1, 2, 3 and 4.
-CUTS = {"bedroom": (0.72, 0.2, 0.06, 0.02), "study": (0.75, 0.2, 0.05, 0.0)}
-MANY_CUTS = (0.35, 0.35, 0.2, 0.1)
 AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
 QUARTILE = 0.674  # standard score of the third quartile
 USUAL_GAPS = (0.0, 0.03, 0.06)  # metres between a back and its wall: quartiles of classes without figures
@@ -75,7 +72,7 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
         height=tuple(raw["height"]),
         rectangular=raw["rectangular"],
         objects=tuple(raw["objects"]),
-        cuts=CUTS.get(name, MANY_CUTS),
+        cuts=vocabulary().room_type(name).cuts,
         presence=presence,
     )
 

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from echomodel.rules.living.found import Found, found
 from echomodel.rules.living.plan import FAR, Plan
+from echomodel.vocabulary import vocabulary
 
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
 LOUNGE = math.radians(100.0)  # an armchair takes part in its group, it does not stare at the table
@@ -62,7 +63,8 @@ def table_before_sofa(plan: Plan) -> Found:
     lateral, forward = plan.local(i, j)
     _, half_depth = plan.reach(i, j)
     gap = forward - half_depth - plan.size[j, 2] / 2
-    ell = plan.which(lambda kind: any(word == "coffee_table" for word, _ in kind.admits))[j]
+    cornered = vocabulary().cornered
+    ell = plan.which(lambda kind: kind.name in cornered)[j]
     least = torch.where(ell, BEFORE[0] - plan.size[j, 2] * 0.6, plan.numbers([BEFORE[0]]).expand_as(gap))
     within = plan.size[j, 0] / 2 - lateral.abs()
     margin = torch.stack([gap - least, BEFORE[1] - gap, within], -1)
