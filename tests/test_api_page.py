@@ -2,6 +2,7 @@
 
 import importlib.util
 import inspect
+import pydoc
 from pathlib import Path
 
 import echousd
@@ -25,3 +26,13 @@ def test_every_public_name_is_there_and_documented():
         assert inspect.getdoc(getattr(echousd, name)), name
     assert {"generate", "edit", "check_room", "render_file", "export_room", "load_model"} <= set(echousd.__all__)
     assert set(echousd.__all__) == set(echousd._HOME)
+
+
+def test_help_is_short_and_shows_no_names_of_libraries():
+    told = pydoc.render_doc(echousd, renderer=pydoc.plaintext)
+    assert len(told.splitlines()) < 800
+    assert "model_dump" not in told
+    node = pydoc.render_doc(echousd.Node, renderer=pydoc.plaintext).splitlines()
+    assert len(node) < 50
+    assert any("Node(name, category, *, title=None" in line for line in node)
+    assert {"add_node", "relate", "diff"} <= set(dir(echousd.SceneGraph))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from inspect import Parameter, Signature, signature
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -12,10 +13,23 @@ from echomodel.openings import check_openings, rectangle
 from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError
 
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
 OBSTACLE = "obstacle"  # attribute of what stands in the way and is no furniture that we know
 
 
-class PlainModel(BaseModel):
+class _Plain(ModelMetaclass):
+    """The class of our models: `dir` and `help` show their own names, not the hundred that pydantic brings along."""
+
+    def __dir__(cls) -> list[str]:
+        own = (vars(kind) for kind in cls.__mro__ if isinstance(kind, _Plain))
+        return sorted({name for names in own for name in names if not name.startswith("_")} - {"model_config"})
+
+
+class PlainModel(BaseModel, metaclass=_Plain):
     """Frozen, without unknown fields, and with errors of one line."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -46,6 +60,12 @@ class PlainModel(BaseModel):
     def replaced(self, **fields: Any) -> Any:
         """A copy with other values in `fields`, validated."""
         return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **fields})
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        told = signature(cls)  # whose annotations are a page of validators
+        plain = [one.replace(annotation=Parameter.empty) for one in told.parameters.values()]
+        cls.__signature__ = told.replace(parameters=plain, return_annotation=Signature.empty)
 
 
 class RoomSpec(PlainModel):
