@@ -23,7 +23,7 @@ from echousd.batches.executor import resident
 from echousd.batches.journal import read_journals, room_digest
 from echousd.batches.plan import load_plan
 from echousd.batches.verify import verify
-from echousd.check import check_room
+from echousd.checks import check
 
 
 def command(out: Path, options: argparse.Namespace, *, resume: bool = False, shard: str = "0/1") -> list[str]:
@@ -91,7 +91,7 @@ def main() -> None:
         strays = sum(1 for _ in (wild / "rooms").glob("*/*")) - len(entries)
         wrong = list(verify(wild))
         chosen = rng.sample(entries, min(options.check, len(entries)))
-        passed = sum(check_room(wild / entry.path / f"{entry.id}.usda").ok for entry in chosen)
+        passed = sum(check(wild / entry.path / f"{entry.id}.usda").ok for entry in chosen)
         print(
             f"{len(entries)} rooms in {time.monotonic() - began:.0f} s with the undisturbed ones: "
             f"{same} of {len(quiet)} byte-identical, {strays} strays, {len(wrong)} wrong {wrong[:3]}, "

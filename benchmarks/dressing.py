@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import echousd
-from echousd.render import QUICK, render_file
+from echousd.rendering import QUICK, render
 from echousd.room import RoomOptions
 
 
@@ -42,7 +42,7 @@ def main() -> None:
         shared = room.save(Path(scratch) / "shared", preview=False, store=Path(scratch) / "store")
         for _ in range(2):
             started = time.process_time()
-            render_file(root, size=400, rays=QUICK)
+            render(root, size=400, rays=QUICK)
             drawn = time.process_time() - started
         whole, own = bytes_of(root.parent), bytes_of(shared.parent)
     print(f"{arguments.dress}: write cold {spent[0]:.2f} s, warm {spent[1]:.2f} s; preview {drawn:.2f} s")

@@ -9,7 +9,7 @@ from pathlib import Path
 import echousd
 
 PAGE = Path(__file__).with_name("API.md")
-ORDER = ("generate", "edit", "check_room", "render_file", "export_room", "load_model", "Room", "RoomOptions")
+ORDER = ("generate", "edit", "check", "render", "export", "load_model", "Room", "RoomOptions")
 
 
 def page() -> str:

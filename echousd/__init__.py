@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from echomodel.loading import load_model
     from echomodel.vocabulary import vocabulary
     from echousd.batches.batch import batch, generate_many
-    from echousd.check import check_room
-    from echousd.export import export as export_room
+    from echousd.checks import check
+    from echousd.exporting import export
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-    from echousd.render import render_file
+    from echousd.rendering import render
     from echousd.room import Room, RoomOptions, generate
     from echousd.room.edit import edit
     from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
@@ -43,13 +43,13 @@ _HOME = {
     "generate": "echousd.room",
     "generate_many": "echousd.batches.batch",
     "RoomOptions": "echousd.room",
-    "check_room": "echousd.check",
+    "check": "echousd.checks",
     "edit": "echousd.room.edit",
-    "export_room": "echousd.export:export",
+    "export": "echousd.exporting",
     "export_texture_job": "echousd.texturing:export_job",
     "import_look": "echousd.texturing",
     "load_model": "echomodel.loading",
-    "render_file": "echousd.render",
+    "render": "echousd.rendering",
     "vocabulary": "echomodel.vocabulary",
 }
 __all__ = [
@@ -61,9 +61,9 @@ __all__ = [
     "RoomSpec",
     "SceneGraph",
     "batch",
-    "check_room",
+    "check",
     "edit",
-    "export_room",
+    "export",
     "export_texture_job",
     "generate",
     "generate_many",
@@ -72,7 +72,7 @@ __all__ = [
     "read_graph",
     "read_rooms",
     "relations_from_boxes",
-    "render_file",
+    "render",
     "update_graph",
     "vocabulary",
     "write_graph",

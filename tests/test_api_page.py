@@ -24,8 +24,17 @@ def test_the_page_is_up_to_date():
 def test_every_public_name_is_there_and_documented():
     for name in echousd.__all__:
         assert inspect.getdoc(getattr(echousd, name)), name
-    assert {"generate", "edit", "check_room", "render_file", "export_room", "load_model"} <= set(echousd.__all__)
+    assert {"generate", "edit", "check", "render", "export", "load_model"} <= set(echousd.__all__)
     assert set(echousd.__all__) == set(echousd._HOME)
+
+
+def test_no_module_takes_the_place_of_a_public_name():
+    import echousd.cli.main as commands
+
+    commands.command()  # imports every command
+    modules = {path.stem for path in Path(echousd.__file__).parent.iterdir()}
+    assert not modules & set(echousd.__all__)
+    assert all(callable(getattr(echousd, name)) for name in echousd.__all__)
 
 
 def test_help_is_short_and_shows_no_names_of_libraries():

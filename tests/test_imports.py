@@ -11,12 +11,12 @@ ROOT = Path(__file__).parents[1]
 # package -> what it must not import, in a function or above it (imports for type hints alone are none)
 FORBIDDEN = {
     "echomodel": ("echousd", "pxr", "typer", "rich"),
-    "echousd.graph": ("pxr", "torch", "echousd.stage", "echousd.repair", "echousd.room", "echousd.check"),
-    "echousd.stage": ("torch", "echousd.repair", "echousd.room", "echousd.check", "echousd.cli", "typer", "rich"),
-    "echousd.repair": ("pxr", "echousd.stage", "echousd.room", "echousd.check", "echousd.cli", "typer", "rich"),
-    "echousd.check": ("echousd.room", "echousd.cli", "typer", "rich"),
-    "echousd.room": ("echousd.check", "echousd.cli", "typer", "rich"),
-    "echousd.export": ("echousd.room", "echousd.cli"),
+    "echousd.graph": ("pxr", "torch", "echousd.stage", "echousd.repair", "echousd.room", "echousd.checks"),
+    "echousd.stage": ("torch", "echousd.repair", "echousd.room", "echousd.checks", "echousd.cli", "typer", "rich"),
+    "echousd.repair": ("pxr", "echousd.stage", "echousd.room", "echousd.checks", "echousd.cli", "typer", "rich"),
+    "echousd.checks": ("echousd.room", "echousd.cli", "typer", "rich"),
+    "echousd.room": ("echousd.checks", "echousd.cli", "typer", "rich"),
+    "echousd.exporting": ("echousd.room", "echousd.cli"),
 }
 
 

@@ -56,9 +56,9 @@ def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: 
     fault = fault_of(place, row, stored)
     if fault or not check:
         return fault
-    from echousd.check import check_room
+    from echousd.checks import check as checked
 
-    report = check_room(place / row["root"])
+    report = checked(place / row["root"])
     counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
     return "" if report.ok else "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
 

@@ -218,9 +218,9 @@ def _boxes(rows: Rows) -> Any:
 
 
 def _facts(made: Any, root: Path) -> dict[str, Any]:
-    from echousd.check import check_room
+    from echousd.checks import check
 
-    report = check_room(root)
+    report = check(root)
     floor, geometry = made.floor, made.geometry
     states = Counter(verdict.state for verdict in made.verdicts)
     users = made.asset_users

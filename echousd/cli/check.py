@@ -13,8 +13,8 @@ from echousd.cli.output import safe, say, say_json
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from echousd.check import CheckReport
-    from echousd.check.check import LayoutReport
+    from echousd.checks import CheckReport
+    from echousd.checks.report import LayoutReport
     from echousd.settle import SettleReport
 
 
@@ -64,9 +64,9 @@ def _one(
     room: Path, json: bool, rules: str, layout: int | None, strict: bool, settle: bool, *, alone: bool
 ) -> tuple[bool, dict[str, Any]]:
     """Check one room and show what was found, in a line unless it is alone: whether it is good, and the report."""
-    from echousd.check import check_room
+    from echousd.checks import check as checked
 
-    report = check_room(room, rules=rules, layout=layout, settle=settle)
+    report = checked(room, rules=rules, layout=layout, settle=settle)
     good = report.good(strict=strict)
     if not json and alone:
         _show(report, strict)

@@ -41,7 +41,7 @@ def export(
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
-    from echousd.export import export as write
+    from echousd.exporting import export as write
     from echousd.room.found import room_at
 
     started = time.perf_counter()

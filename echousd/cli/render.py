@@ -39,7 +39,8 @@ def render(
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
     """Draw a room from above, from a corner, from inside, or through each of its cameras."""
-    from echousd.render import render_cameras, render_file
+    from echousd.rendering import render as draw
+    from echousd.rendering import render_cameras
     from echousd.room.found import room_at
     from echousd.stage.files import write_all
 
@@ -58,7 +59,7 @@ def render(
         if output.suffix.lower() != ".png":
             raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")
         check_picture(output, force=force)
-        pictures = {output: render_file(room, view=view, size=size, colors=colors, layout=layout)}
+        pictures = {output: draw(room, view=view, size=size, colors=colors, layout=layout)}
     write_all({path: _png(picture) for path, picture in pictures.items()})
     if json:
         say_written(list(pictures), started)

@@ -61,7 +61,7 @@ class Room(RoomData):
 
     def image(self, *, size: int = 512, view: str = "perspective") -> Any:
         """A picture of the room (PIL image); needs the extra `render`."""
-        from echousd.render import render_stage
+        from echousd.rendering import render_stage
 
         return render_stage(self.stage, view=view, size=size)
 

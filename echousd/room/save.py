@@ -155,11 +155,11 @@ def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
     from PIL.PngImagePlugin import PngInfo
 
-    from echousd.render import QUICK, RenderUnavailable, render_file
+    from echousd.rendering import QUICK, RenderUnavailable, render
 
     out = root.with_suffix(".png")
     try:
-        picture = render_file(root, view="perspective", size=PREVIEW, rays=QUICK)
+        picture = render(root, view="perspective", size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
     buffer, mark = io.BytesIO(), PngInfo()
@@ -184,7 +184,7 @@ def write_sheet(root: Path) -> Path | None:
     from PIL import Image, ImageDraw
     from PIL.PngImagePlugin import PngInfo
 
-    from echousd.render import QUICK, RenderUnavailable, render_file
+    from echousd.rendering import QUICK, RenderUnavailable, render
 
     out = root.with_name(f"{root.stem}_layouts.png")
     names = layout_names(open_stage(root))
@@ -197,7 +197,7 @@ def write_sheet(root: Path) -> Path | None:
     sheet = Image.new("RGB", (wide * SHEET, -(-len(names) // wide) * SHEET), "white")
     for number, name in enumerate(names):
         try:
-            picture = render_file(root, size=SHEET, rays=QUICK, layout=name)
+            picture = render(root, size=SHEET, rays=QUICK, layout=name)
         except RenderUnavailable:
             return None
         ImageDraw.Draw(picture).text((8, 6), name, fill="black")

@@ -185,7 +185,7 @@ def _moved(triangles: np.ndarray, frame: np.ndarray) -> np.ndarray:
 
 def _picture(stage: Usd.Stage, thing: Painted) -> bytes:
     """PNG of the object alone, as it looks now."""
-    from echousd.render import render_stage
+    from echousd.rendering import render_stage
 
     mask = Usd.StagePopulationMask([thing.path])
     alone = Usd.Stage.OpenMasked(stage.GetRootLayer(), stage.GetSessionLayer(), mask)

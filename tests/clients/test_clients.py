@@ -15,7 +15,7 @@ from environments import python_of, run, three
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 
 import echousd
-from echousd.export import export
+from echousd.exporting import export
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.stage import read_graph
 

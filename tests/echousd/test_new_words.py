@@ -19,7 +19,7 @@ from echomodel.habits import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
 from echousd.batches.batch import batch
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.cli.main import command
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
@@ -94,7 +94,7 @@ def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
     assert abs(float(apart[0])) <= LEVEL
 
     root = room.save(tmp_path / "music")
-    report = check_room(root)
+    report = check(root)
     assert report.ok, report
     draw_graph(graph, tmp_path / "graph.png")
     assert (tmp_path / "graph.png").stat().st_size > 1000
@@ -168,7 +168,7 @@ def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monk
     result = batch(graph_file(tmp_path, graph), tmp_path / "run", seed=3, executor=Inline(), preview=False, **options)
     assert (result.done, result.failed) == (1, 0)
     root = next((tmp_path / "run").glob("rooms/*/*/*.usda"))
-    report = check_room(root)
+    report = check(root)
     assert report.ok, report
     assert "in_line_with" in {found.relation.triple[1] for found in report.relations if found.margin is not None}
     stage = Usd.Stage.Open(str(root))

@@ -13,7 +13,7 @@ from PIL import Image
 from pxr import Usd
 
 from echousd.drawables import read_drawables
-from echousd.export import export
+from echousd.exporting import export
 from echousd.packing import LeftOut
 from echousd.textures import read_image
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pxr import Usd
 
-from echousd.check import check_room
-from echousd.export import export
+from echousd.checks import check
+from echousd.exporting import export
 from echousd.graph import load_graph
 from echousd.packing import Reach
 from echousd.room import RoomOptions, generate
@@ -132,7 +132,7 @@ def test_a_room_with_a_store_is_the_same_room(shared):
         for s in stages
     ]
     assert found[0] == found[1]
-    assert [error.rule for error in check_room(stored).errors] == [error.rule for error in check_room(alone).errors]
+    assert [error.rule for error in check(stored).errors] == [error.rule for error in check(alone).errors]
 
 
 def test_exports_take_along_what_lies_in_the_store(shared, tmp_path):
@@ -205,7 +205,7 @@ def test_commands_of_the_store(echousd_command, shared, tmp_path):
     assert echousd_command("store", "gc", store, "--older", 0, "--dry-run").out.startswith("unused   1 of ")
     assert echousd_command("store", "gc", store, "--older", 0).out.startswith("removed  1 of ")
     assert not Store.open(store).folder(unused).exists()
-    assert check_room(root).errors == ()
+    assert check(root).errors == ()
     key = next(Store.open(store).keys())
     file = next(Store.open(store).folder(key).iterdir())
     file.chmod(0o644)

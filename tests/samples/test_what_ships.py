@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import echousd
-from echousd.check.check import check_room
+from echousd.checks.report import check
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)
@@ -30,7 +30,7 @@ def finished(tmp_path_factory):
         if (sample, seed) not in made:
             room = echousd.generate(sample, seed=seed, shapes="boxes")
             folder = tmp_path_factory.mktemp(sample.stem) / sample.stem
-            made[sample, seed] = room, check_room(room.save(folder, preview=False))
+            made[sample, seed] = room, check(room.save(folder, preview=False))
         return made[sample, seed]
 
     return make

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.repair import repair
 from echousd.repair.placements import placement_rows, stated_placements
@@ -80,6 +80,6 @@ def test_check_measures_placements(tmp_path):
         placed = repair(graph, boxes).boxes if good else boxes
         room = echousd.generate(graph, shapes="boxes", boxes=placed, repair=False)
         root = room.save(tmp_path / str(good))
-        found = {str(each.relation): each.kept for each in check_room(root).relations}
+        found = {str(each.relation): each.kept for each in check(root).relations}
         assert found["plant in_corner"] is good
         assert found["table between sofa and armchair"] is good

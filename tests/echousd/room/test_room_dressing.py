@@ -13,7 +13,7 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.data.dressing import KINDS, SMALL
 from echomodel.openings import Opening
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.graph import RoomSpec
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
@@ -80,7 +80,7 @@ def test_every_thing_is_a_proper_prim(root):
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     errors = UsdValidation.ValidationContext(validators).Validate(stage)
     assert [error.GetMessage() for error in errors] == []
-    assert check_room(root).ok
+    assert check(root).ok
 
 
 def test_things_stay_in_the_room_and_out_of_each_other(room):
@@ -129,7 +129,7 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
             if one.on != host.name and one.kind not in ("curtain",):
                 within = host.top > low and host.position[1] < high
                 assert not within or reaches(host, low, high).intersection(one.footprint).area < 1e-4, (one, host.name)
-    assert check_room(room.save(tmp_path / name, preview=False)).ok
+    assert check(room.save(tmp_path / name, preview=False)).ok
 
 
 def test_kinds_of_one_category_agree():

@@ -9,8 +9,8 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
-from echousd.check import check_room
-from echousd.export import export
+from echousd.checks import check
+from echousd.exporting import export
 from echousd.room.verdicts import RoomWarning
 
 
@@ -79,10 +79,10 @@ def later(tmp_path_factory):
 def test_every_layout_is_checked_listed_and_drawn(later, echousd_command):
     from PIL import Image
 
-    report = check_room(later)
+    report = check(later)
     assert [(layout.name, layout.ok) for layout in report.layouts] == [("layout_0", True), ("layout_1", False)]
-    assert check_room(later, layout=0).ok
-    assert not check_room(later, layout=1).ok
+    assert check(later, layout=0).ok
+    assert not check(later, layout=1).ok
     manifest = json.loads(later.with_suffix(".json").read_text())
     assert [bool(entry["collisions"]) for entry in manifest["layouts"]] == [False, True]
     assert Image.open(later.with_name("room_layouts.png")).size == (560, 280)

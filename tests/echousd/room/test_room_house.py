@@ -8,7 +8,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.room.house import places
 from echousd.stage import write_graph
 
@@ -49,7 +49,7 @@ def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
     assert list(echousd.read_rooms(stage)) == ["/House/West", "/House/East"]
     bed = UsdGeom.Xformable(stage.GetPrimAtPath("/House/East/Objects/bed")).ComputeLocalToWorldTransform(0)
     np.testing.assert_allclose(bed.ExtractTranslation(), (6 - 0.6, 0, 0), atol=1e-4)
-    report = check_room(stage)
+    report = check(stage)
     assert not report.broken
     assert not report.placement
     # again: ours are replaced

@@ -11,8 +11,8 @@ import echousd
 from echousd.assets.choose import Asked, AssetWishes, asked_of, choose
 from echousd.assets.index import index
 from echousd.assets.table import read_library
-from echousd.check import check_room
-from echousd.export import export
+from echousd.checks import check
+from echousd.exporting import export
 from echousd.room.edit import edit
 from echousd.room.reading import read_room
 from echousd.stage import open_stage
@@ -58,7 +58,7 @@ def test_a_room_of_a_library(library, tmp_path):
     assert "| wardrobe | storage/thing_17.usda | CC0-1.0 | A. Joiner |" in said
     told = read_room(root).manifest["meshes"]["bed"]
     assert (told["asset"], told["licence"], len(told["sha256"])) == ("beds/double_bed.usda", "CC0-1.0", 64)
-    assert check_room(root).ok
+    assert check(root).ok
 
 
 def test_equal_arguments_give_equal_rooms(library):
@@ -137,7 +137,7 @@ def test_collected_models_make_a_room_that_needs_no_library(tmp_path):
     form = stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model/form")
     assert UsdGeom.Mesh(form).GetPointsAttr().Get()
     assert list((moved / "assets/wardrobe/original").rglob("*.png"))
-    assert check_room(moved / root.name).ok
+    assert check(moved / root.name).ok
     packed = export(moved / root.name, tmp_path / "room.usdz")
     names = zipfile.ZipFile(packed).namelist()
     assert any(name.endswith(".png") for name in names)
@@ -159,7 +159,7 @@ def test_models_lie_once_in_a_store(library, tmp_path):
         room = echousd.generate(graph, seed=number, model=StandIn(0.05 * number), shapes="library", assets=library)
         root = room.save(tmp_path / f"room_{number}", preview=False, store=tmp_path / "store")
         assert open_stage(root).GetPrimAtPath("/Room/Objects/lamp/lamp_placed/lamp_model/mesh_0")
-        assert check_room(root).ok
+        assert check(root).ok
     layers = list((tmp_path / "store").rglob("model.usdc"))
     assert len(layers) == 3  # chair-like lamp, pendant, nightstand: what is no USD is converted once
     store = Store.open(tmp_path / "store")
@@ -229,7 +229,7 @@ def test_models_with_colliders_of_their_own_keep_them_and_are_not_stretched(tmp_
     saved = open_stage(room.save(tmp_path / "bedroom", preview=False))
     assert not saved.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_collider")
     assert saved.GetPrimAtPath("/Room/Objects/wardrobe").HasAPI(UsdPhysics.RigidBodyAPI)
-    assert not check_room(tmp_path / "bedroom/bedroom.usda").errors
+    assert not check(tmp_path / "bedroom/bedroom.usda").errors
 
 
 def test_licences_are_filtered(library):

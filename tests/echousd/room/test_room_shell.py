@@ -11,7 +11,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.graph import RoomSpec
 from echousd.room.room import RoomOptions
 from echousd.room.walls import WALL, ceiling, outline, walls
@@ -143,4 +143,4 @@ def test_doors_articulate(tmp_path) -> None:
             continue
         validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
         assert [e.GetMessage() for e in UsdValidation.ValidationContext(validators).Validate(stage)] == []
-        assert check_room(tmp_path / up / f"{up}.usda").ok
+        assert check(tmp_path / up / f"{up}.usda").ok

@@ -4,7 +4,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics
 
 import echousd
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.graph import SceneGraph
 from echousd.room import RoomOptions
 from echousd.stage import StageError, foreign_graph, foreign_rooms, open_stage, read_graph, relations_from_boxes
@@ -168,6 +168,6 @@ def test_an_obstacle_is_a_fixed_box_under_its_own_word(tmp_path):
         assert list(prim.GetAttribute("semantics:labels:ade20k").Get()) == [ade20k]
     assert room.boxes.position[graph.names.index("harp")].tolist() == [-1.0, 1.0, 0.0]  # it may hang there
     assert SceneGraph.from_stage(root).node("harp") == graph.node("harp")
-    report = check_room(root)
+    report = check(root)
     assert [wrong for layout in report.layouts for wrong in layout.placement] == []
     assert [fault for fault in report.errors if fault.rule == "echo:OneLabel"] == []

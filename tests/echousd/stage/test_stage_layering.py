@@ -8,9 +8,9 @@ from pxr import Sdf, Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.drawables import read_drawables
-from echousd.export import export
+from echousd.exporting import export
 from echousd.stage import read_graph, update_graph
 from echousd.stage.read import StatedTwice
 
@@ -40,7 +40,7 @@ def test_units_come_from_the_layer_that_defines_the_room(root):
     stage = stronger(root)
     assert UsdGeom.GetStageMetersPerUnit(stage) == 0.01  # what USD makes of it
     assert width(stage) == pytest.approx(width(Usd.Stage.Open(str(root))))
-    report = check_room(stage)
+    report = check(stage)
     assert not report.broken
     assert not report.placement
     told = [fault.message for fault in report.warnings if fault.rule == "echo:Units"]
@@ -60,7 +60,7 @@ def test_what_is_made_of_a_layer_without_units_says_them(root, tmp_path):
 def test_other_units_than_the_layers_below_are_an_error(root):
     stage = stronger(root, "wrong.usda")
     UsdGeom.SetStageMetersPerUnit(stage, 0.01)
-    (fault,) = [fault for fault in check_room(stage).errors if fault.rule == "echo:Units"]
+    (fault,) = [fault for fault in check(stage).errors if fault.rule == "echo:Units"]
     assert (
         fault.message
         == "metersPerUnit is 0.01 in wrong.usda, but metersPerUnit is 1 in bedroom.usda, allowed: the same"
@@ -85,7 +85,7 @@ def test_a_fact_stated_under_another_name_is_one_fact_with_the_stronger_confiden
         graph = read_graph(stage)
     assert [r.confidence for r in graph.relations if r.predicate == "taller_than"] == [0.5]
     assert len(graph.relations) == len(small_graph().relations)
-    report = check_room(stage)
+    report = check(stage)
     assert not [fault for fault in report.errors if fault.rule.startswith("echo:")]
     assert ["one fact, confidence 0.5" in fault.message for fault in report.warnings if "Consistent" in fault.rule] == [
         True

@@ -14,7 +14,7 @@ from pxr import Usd, UsdGeom, UsdShade
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.check import check_room
+from echousd.checks import check
 from echousd.room.edit import edit
 from echousd.room.reading import read_room
 from echousd.stage import open_stage
@@ -99,7 +99,7 @@ def test_what_changed_is_shown_as_made_and_told(room):
     assert "looks/oil.usda: pendant changed or gone since painted; shown as made, export and paint again" in told[0]
     assert (room.parent / "looks/oil.usda").read_bytes() == layer
     assert material(room, "wardrobe") == "oil_wardrobe"
-    assert not check_room(room).errors
+    assert not check(room).errors
     assert generated(room, small_graph()) == []  # it is back as it was
     assert material(room, "pendant") == "oil_pendant"
     assert not (room.parent / "layers/unfit.usda").exists()
@@ -113,7 +113,7 @@ def test_edits_mute_what_they_change(room):
         edit(room, graph, model=StandIn(), shapes="boxes", repair=False).save(room.parent, preview=False)
     assert material(room, "pendant") != "oil_pendant"
     assert material(room, "wardrobe") == "oil_wardrobe"
-    assert not check_room(room).errors
+    assert not check(room).errors
     with pytest.raises(ValueError, match="pendant has other meshes; export again, or leave out with --skip"):
         import_look(room, job_of(room), name="oil", force=True, preview=False)
     look = import_look(room, job_of(room), name="oil", force=True, skip=("pendant",), preview=False)
@@ -137,7 +137,7 @@ def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
     }
     assert material(other, "wardrobe") == "oil_wardrobe"
     assert material(other, "pendant") != "oil_pendant"
-    assert not check_room(other).errors
+    assert not check(other).errors
     assert "looks/" not in str(json.loads((other.parent / "away.json").read_text())["files"])  # the user's own
     (other.parent / "looks/oil.usda").write_text("#usda 1.0\n")
     with pytest.warns(UserWarning, match=r"far/away/looks/oil.usda: is another look; that of .*bedroom is not taken"):

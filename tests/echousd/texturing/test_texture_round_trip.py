@@ -12,8 +12,8 @@ from pxr import UsdShade, UsdValidation
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.check import check_room
-from echousd.export import export
+from echousd.checks import check
+from echousd.exporting import export
 from echousd.room import RoomOptions
 from echousd.room.paintings import primvar
 from echousd.stage import open_stage
@@ -59,7 +59,7 @@ def test_every_point_gets_its_colour_back(room, tool, dressing, tmp_path, small_
     assert len(wrong) > 400 * len(job.objects) / 2
     assert np.quantile(wrong, 0.99) < 0.75  # half a texel's diagonal: pictures are looked up at the nearest texel
     assert wrong.max() < 2.5  # where a chart ends
-    report = check_room(root)
+    report = check(root)
     assert not report.errors
     assert not report.warnings
 
@@ -198,7 +198,7 @@ def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
     binding = UsdShade.MaterialBindingAPI(mesh)
     assert str(binding.GetDirectBinding().GetMaterialPath()) == "/Room/Looks/second_wardrobe"
     assert not any(UsdShade.MaterialBindingAPI(p).GetCollectionBindingRels() for p in flat.TraverseAll())
-    assert not check_room(tmp_path / "room.usdz").errors
+    assert not check(tmp_path / "room.usdz").errors
 
 
 def test_shared_instances_get_a_picture_each(small, tmp_path):
@@ -232,4 +232,4 @@ def test_rooms_with_z_up_are_painted_alike(tmp_path):
     paint(tmp_path / "job")
     import_look(root, tmp_path / "job", preview=False)
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
-    assert not check_room(root).errors
+    assert not check(root).errors

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdValidation
 
-from echousd.check import RULES, check_room, register
-from echousd.check.collisions import DEEP, find_collisions, mesh_depth, winding_number
-from echousd.check.living import find_living
+from echousd.checks import RULES, check, register
+from echousd.checks.collisions import DEEP, find_collisions, mesh_depth, winding_number
+from echousd.checks.living import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec
 from echousd.stage.contents import RoomContents, RoomObject
@@ -71,7 +71,7 @@ FOUND = {
 
 
 def found_in(stage: Path | Usd.Stage) -> set[str]:
-    report = check_room(stage)
+    report = check(stage)
     assert report.ok == (report.to_json()["ok"]) == (not found(report))
     return found(report) | {fault.rule for fault in report.warnings}
 
@@ -93,7 +93,7 @@ def test_each_broken_file_is_caught_by_its_rule_alone(name: str) -> None:
 
 def test_what_is_not_loaded_is_called_so() -> None:
     stage = Usd.Stage.Open(str(BAD / "unloaded.usda"), Usd.Stage.LoadNone)
-    report = check_room(stage)
+    report = check(stage)
     assert [(fault.rule, fault.prim) for fault in report.errors] == [("echo:PayloadsLoaded", "/Room")]
     assert "not loaded" in report.errors[0].message
 
@@ -115,7 +115,7 @@ def test_our_rules_are_validators_of_usd() -> None:
 
 def test_messages_name_what_was_found_and_what_is_allowed() -> None:
     def message(name: str) -> str:
-        (fault,) = check_room(BAD / f"{name}.usda").errors
+        (fault,) = check(BAD / f"{name}.usda").errors
         return f"{fault.prim} {fault.message}"
 
     assert message("short_uvs").endswith("primvars:st has 20 texture coordinates, faceVarying interpolation needs 24")
@@ -145,11 +145,11 @@ def wrapped(up: str, metres: float, turn: bool, tmp_path: Path) -> Usd.Stage:
 
 @pytest.mark.parametrize(("up", "metres", "turn"), [("Y", 0.01, False), ("Z", 1.0, True), ("Z", 0.01, True)])
 def test_axes_units_and_place_do_not_matter(up: str, metres: float, turn: bool, tmp_path: Path) -> None:
-    report = check_room(wrapped(up, metres, turn, tmp_path))
+    report = check(wrapped(up, metres, turn, tmp_path))
     assert {fault.rule for fault in report.errors} == {"echo:RelativePaths"}  # the test's own reference
     assert not report.placement
     assert not report.collisions
-    plain = check_room(BAD / "good.usda")
+    plain = check(BAD / "good.usda")
     assert [j.margin for j in report.relations] == pytest.approx([j.margin for j in plain.relations], abs=1e-4)
 
 
@@ -264,7 +264,7 @@ def test_living_rules_are_warnings_unless_strict(capsys: pytest.CaptureFixture[s
     found = {(fault.object, fault.rule): fault for fault in find_living(contents)}
     assert found["wardrobe", "at_wall"].says == "wardrobe stands 2.20 m off the wall behind it"
     assert found["wardrobe", "at_wall"].to_json()["object"] == "wardrobe"
-    report = check_room(BAD / "good.usda")
+    report = check(BAD / "good.usda")
     assert run(["check", str(BAD / "good.usda"), "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["living"]) == len(report.living)
     assert run(["check", str(BAD / "good.usda"), "--strict"]) == int(bool(report.living))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pxr import Tf, Usd
 
 from echomodel.vocabulary import UnknownWord, normalised
-from echousd.check.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, prims
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 from echousd.stage.labels import is_structure, known_category, spaced

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pxr import Usd, UsdGeom
 
-from echousd.check.findings import Finding, Rule, applied, is_guide, prims
+from echousd.checks.findings import Finding, Rule, applied, is_guide, prims
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph

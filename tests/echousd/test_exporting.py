@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import OBJECTS, StandIn, small_graph
 
 import echousd
-from echousd.export import export
+from echousd.exporting import export
 from echousd.room import RoomOptions
 
 

@@ -26,7 +26,7 @@ class RenderUnavailable(ImportError, ValueError):
     """Embree is not installed; the message says how to get it."""
 
 
-def render_file(
+def render(
     path: str | Path,
     *,
     view: str = "perspective",
@@ -50,9 +50,9 @@ def render_file(
 def render_cameras(
     path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None
 ) -> dict[str, Image.Image]:
-    """A picture of the room in a file through each of its cameras, by the camera's name; see `render_file`.
+    """A picture of the room in a file through each of its cameras, by the camera's name; see `render`.
 
-    Raises ValueError as `render_file` does, and where the stage holds no camera.
+    Raises ValueError as `render` does, and where the stage holds no camera.
     """
     from echousd.stage import open_stage
     from echousd.stage.layouts import showing_layout

@@ -8,7 +8,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echousd.drawables import read_drawables
-from echousd.render import BACKGROUND, outside, render_file, render_stage, smooth_light
+from echousd.rendering import BACKGROUND, outside, render, render_stage, smooth_light
 from echousd.room import RoomOptions
 from echousd.scenery import class_color, read_scenery
 
@@ -50,7 +50,7 @@ def test_up_axis_and_units_are_taken_care_of(up, unit):
 
 
 def test_top_view_shows_things_where_they_are(root):
-    image = pixels(render_file(root, view="top", size=96, colors="class"))
+    image = pixels(render(root, view="top", size=96, colors="class"))
     assert image.shape == (96, 96, 3)
     metre = 96 / (4.0 * 1.06)  # the floor is 4 m wide and fills the picture
     hue = image - image.mean(-1, keepdims=True)
@@ -68,13 +68,13 @@ def test_top_view_shows_things_where_they_are(root):
 
 
 def test_same_stage_gives_same_picture_and_materials_differ_from_classes(root):
-    first, second = (pixels(render_file(root, size=48)) for _ in range(2))
+    first, second = (pixels(render(root, size=48)) for _ in range(2))
     np.testing.assert_array_equal(first, second)
-    assert np.abs(first - pixels(render_file(root, size=48, colors="class"))).max() > 0.1
+    assert np.abs(first - pixels(render(root, size=48, colors="class"))).max() > 0.1
 
 
 def test_a_thing_throws_a_shadow_and_nothing_is_blown_out(root):
-    image = pixels(render_file(root, view="top", size=96))
+    image = pixels(render(root, view="top", size=96))
     metre = 96 / (4.0 * 1.06)
     shadow, lit = (
         image[int(48 - 0.2 * metre), int(48 - 1.7 * metre)],
@@ -162,7 +162,7 @@ def test_a_small_picture_is_quick(root):
 )
 def test_bad_arguments_are_named(root, arguments, text):
     with pytest.raises(ValueError, match=text):
-        render_file(root, **arguments)
+        render(root, **arguments)
 
 
 def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
@@ -170,7 +170,7 @@ def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
         render_stage(Usd.Stage.CreateInMemory())
     monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(ValueError, match=r'pip install "echousd\[render\]"'):
-        render_file(root, size=16)
+        render(root, size=16)
 
 
 def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
-from echousd.check.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, prims
 from echousd.stage.encoding import StageError
 from echousd.stage.values import MeshArrays, array, mesh_arrays
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd
 
-from echousd.check.collisions import Collision, find_collisions
-from echousd.check.living import find_living
-from echousd.check.placement import Misplacement, find_misplaced
-from echousd.check.relations import MeasuredRelation, measured_relations
-from echousd.check.validity import Fault, find_faults
+from echousd.checks.collisions import Collision, find_collisions
+from echousd.checks.living import find_living
+from echousd.checks.placement import Misplacement, find_misplaced
+from echousd.checks.relations import MeasuredRelation, measured_relations
+from echousd.checks.validity import Fault, find_faults
 from echousd.repair.living import LivingFault
 from echousd.stage.contents import RoomContents, read_contents
 from echousd.stage.encoding import StageError
@@ -143,7 +143,7 @@ class CheckReport:
         }
 
 
-def check_room(
+def check(
     stage: Usd.Stage | str | os.PathLike[str],
     *,
     rules: str = "strict",

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Tf, Usd, UsdGeom, UsdPhysics
 
-from echousd.check.findings import Finding, Rule, is_guide, prims
+from echousd.checks.findings import Finding, Rule, is_guide, prims
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.units import metres_per_unit, up_axis

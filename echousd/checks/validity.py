@@ -9,7 +9,7 @@ from typing import Any
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 import echousd
-from echousd.check import (
+from echousd.checks import (
     file_rules,
     geometry_rules,
     graph_rules,
@@ -19,7 +19,7 @@ from echousd.check import (
     physics_rules,
     value_rules,
 )
-from echousd.check.findings import Finding, Rule
+from echousd.checks.findings import Finding, Rule
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said
 

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 
 from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
 
-from echousd.check.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, prims
 from echousd.packing import Reach
 from echousd.stage.encoding import StageError
 from echousd.stage.units import unit_faults

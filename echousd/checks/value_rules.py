@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
-from echousd.check.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, prims
 from echousd.stage.files import said
 from echousd.stage.values import LARGEST, misfit, shown
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from echousd.check.findings import Finding, Rule, applied, is_guide, prims
+from echousd.checks.findings import Finding, Rule, applied, is_guide, prims
 from echousd.stage.encoding import NODE_API, StageError
 from echousd.stage.values import array, matrix, targets
 

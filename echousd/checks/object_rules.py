@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
-from echousd.check.findings import Finding, Rule
+from echousd.checks.findings import Finding, Rule
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage import encoding as usd
 from echousd.stage.contents import read_contents, room_frame

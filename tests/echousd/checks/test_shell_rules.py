@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Usd, Vt
 
-from echousd.check.validity import RULES, safely
+from echousd.checks.validity import RULES, safely
 
 GOOD = Path(__file__).parents[1] / "bad/good.usda"
 LABELS = "semantics:labels:category"
