@@ -14,8 +14,8 @@ from echousd.batches.devices import CPU, network_processes
 from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
-from echousd.batches.plan import PACK, STATE, Plan, difference, load_plan, make_plan, save_plan
-from echousd.batches.remote import SCHEME, Remote, complete
+from echousd.batches.plan import PACK, STATE, URL, Plan, difference, load_plan, make_plan, save_plan
+from echousd.batches.remote import Remote, complete
 from echousd.batches.run import Run, RunOptions
 from echousd.naming import free_name
 from echousd.room.folder import check_writable
@@ -90,8 +90,8 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
-    if SCHEME.match(out.as_posix()) or (how.to and not SCHEME.match(how.to)):
-        what = out if SCHEME.match(out.as_posix()) else how.to
+    if URL.match(out.as_posix()) or (how.to and not URL.match(how.to)):
+        what = out if URL.match(out.as_posix()) else how.to
         raise ValueError(f"{what}: allowed: -o a folder on a disk, --to a URL such as s3://bucket/night, or none")
     if how.to:
         Remote(how.to).sizes(STATE)  # who cannot reach it is told before the first room

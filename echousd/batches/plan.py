@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -21,6 +22,8 @@ from echousd.room.within import inside
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
+# of a URL, though `Path` made one slash of its two; no drive, and no chain of file systems (`zip://a::file:///b`)
+URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/(?!.*::)")
 PACK = 32  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
 SHELF = 1000  # rooms in one folder
 
@@ -189,6 +192,9 @@ def _head(raw: Any) -> dict[str, Any]:
     kinds = {"version": str, "weights": str, "rooms": int, "request": dict, "sets": list}
     if not isinstance(raw, dict) or any(type(raw.get(key)) is not kind for key, kind in kinds.items()):
         raise ValueError("line 1 is no head of a plan")
+    to = raw.get("to", "")
+    if not isinstance(to, str) or (to and not URL.match(to)):
+        raise ValueError(f"line 1: to is {to!r:.200}, allowed: a URL such as s3://bucket/night")
     return raw
 
 

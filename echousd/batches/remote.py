@@ -9,7 +9,6 @@ appended to or locked.
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -19,9 +18,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from echousd.batches.plan import STORE
-from echousd.store import MARK, Store
-
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")  # of a URL, though `Path` made one slash of its two; no drive
+from echousd.room.within import inside
+from echousd.store import KEY, MARK, Store
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +65,13 @@ class Remote:
                 files.put_file(str(top / path), target)
 
     def get(self, path: str, top: Path) -> None:
-        """Copy all files at or below `path` to the same paths below a folder."""
+        """Copy all files at or below `path` to the same paths below a folder, refused where a name leads out of it."""
         files, root = self._place
         for name in self.sizes(path):
-            (top / name).parent.mkdir(parents=True, exist_ok=True)
+            target = inside(top, name, f"{self.url}: a file")  # who filled the bucket may be anybody
+            target.parent.mkdir(parents=True, exist_ok=True)
             with self._told("read"):
-                files.get_file(f"{root}/{name}", str(top / name))
+                files.get_file(f"{root}/{name}", str(target))
 
     @contextmanager
     def _told(self, what: str) -> Iterator[None]:
@@ -82,18 +81,22 @@ class Remote:
             raise ValueError(f"{self.url}: cannot be {what} ({str(error) or type(error).__name__})") from None
 
 
-def deliver(top: Path, room: str, url: str) -> None:
+def deliver(top: Path, room: str, url: str) -> dict[str, int]:
     """Put a room and what it has in its store (both below `top`) on a file system: assets, files, the manifest last.
 
     Arguments:
         room: path of its folder below `top`, the same below `url`.
+
+    Returns: key of each of its stored assets -> bytes.
     """
     remote = Remote(url)
+    stored: dict[str, int] = {}
     if (top / STORE).is_dir():
         keys = list(Store.open(top / STORE).keys())
         for key in keys:
             place = f"{STORE}/{key[:2]}/{key}"
             files = {path: (top / path).stat().st_size for path in _below(top, place)}
+            stored[key] = sum(files.values())
             if remote.sizes(place) != files:  # another room has put it there, or was cut short
                 remote.put(top, list(files))
         mark = f"{STORE}/{MARK}"
@@ -102,21 +105,33 @@ def deliver(top: Path, room: str, url: str) -> None:
     name = PurePosixPath(room).name
     manifest = f"{room}/{name}.json"
     remote.put(top, [*(path for path in _below(top, room) if path != manifest), manifest])
+    return stored
 
 
 def complete(url: str, rows: dict[str, dict[str, Any]], paths: dict[str, str]) -> set[str]:
-    """Ids of the rooms of journal lines that lie on a file system with as many bytes as they were made of.
+    """Ids of the rooms of journal lines that lie on a file system, assets and all, with as many bytes as they were
+    made of; what was changed to something as long is told by `verify` alone, which reads everything.
 
     Arguments:
         paths: id -> path of its folder below the URL.
     """
+    remote = Remote(url)
+    held, stored = _held(remote, "rooms"), {Path(path).name: size for path, size in _held(remote, STORE).items()}
+    return {
+        name
+        for name, row in rows.items()
+        if row["state"] == "done" and name in paths and held.get(paths[name]) == row.get("bytes", 0)
+        if all(stored.get(key) == size for key, size in row.get("stored", {}).items())
+    }
+
+
+def _held(remote: Remote, place: str) -> dict[str, int]:
+    """Path of every folder of a shelf (`rooms/0000/<id>`, `store/3f/<key>`) -> bytes below it."""
     held: dict[str, int] = {}
-    names = {path: name for name, path in paths.items()}
-    for path, size in Remote(url).sizes("rooms").items():
-        name = names.get("/".join(PurePosixPath(path).parts[:3]), "")
+    for path, size in remote.sizes(place).items():
+        name = "/".join(PurePosixPath(path).parts[:3])
         held[name] = held.get(name, 0) + size
-    done = {name: row["bytes"] for name, row in rows.items() if row["state"] == "done"}
-    return {name for name, size in held.items() if done.get(name) == size}
+    return held
 
 
 @contextmanager
@@ -139,7 +154,7 @@ def _stored(folder: Path) -> set[str]:
     from echousd.room.manifest import find_manifest
 
     manifest = find_manifest(folder, folder.name) or {} if folder.is_dir() else {}
-    return set((manifest.get("stored") or {}).values())
+    return {key for key in (manifest.get("stored") or {}).values() if KEY.fullmatch(key)}
 
 
 def _below(top: Path, place: str) -> list[str]:

@@ -25,6 +25,8 @@ def is_row(row: Any) -> bool:
         return False
     if not all(_fits(row.get(name, default), default) for name, default in COLUMNS.items()):
         return False
+    if type(row.get("rounds", 1)) is not int or not _fits(row.get("stored", {}), {}):
+        return False
     if row.get("state") == "failed":
         return "error" in row and not row.get("root")
     whole = len(row.get("bounds", ())) == 6 and all(map(_is_number, row["bounds"])) and bool(row.get("sha256"))

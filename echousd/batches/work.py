@@ -134,7 +134,7 @@ def room(job: Job) -> dict[str, Any] | Best | Wanted:
             store = f"{name}/{job.store}" if job.store else ""
             made = room(replace(job, folder=f"{name}/{job.folder}", store=store, to=""))
             if isinstance(made, dict):
-                deliver(Path(name), job.folder, job.to)
+                made["stored"] = deliver(Path(name), job.folder, job.to)
             return made
     started = time.perf_counter()
     folder = Path(job.folder)

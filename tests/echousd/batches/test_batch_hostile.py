@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
+import zipfile
 
 import pytest
 
 from echousd.batches.options import BatchRequest
 from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.remote import Remote, complete
+from echousd.batches.rows import is_row
 from echousd.batches.sources import find_graphs
 
 WRONG = (None, 5, -1, 1e300, "x", "\0", [], {}, [1], {"a": 1}, True)
@@ -49,6 +53,32 @@ def test_any_value_in_the_files_of_a_run(made, name, tmp_path, echousd_command):
             done = echousd_command("batch", command, tmp_path / "run")
             assert done.code in (0, 1, 2), (mutant, done.err)
             assert done.code != 2 or str(tmp_path / "run") in done.err, (mutant, done.err)
+
+
+@pytest.mark.parametrize("extra", [{"rounds": "x"}, {"rounds": None}, {"stored": ["a"]}, {"stored": {"a": "b"}}])
+def test_lines_that_a_resumed_run_would_fall_over_are_none(made, extra):
+    row = json.loads((made / ".batch/shard_0_of_1/journal.jsonl").read_text())
+    assert is_row(row)
+    assert is_row({**row, "rounds": 2, "stored": {"a": 5}})
+    assert not is_row({**row, **extra})
+    assert "bytes" not in row
+    assert complete("memory://nobody", {row["room"]: row}, {row["room"]: "rooms/0000/bedroom_000000"}) == set()
+
+
+def test_a_bucket_of_somebody_else_writes_nothing_outside(tmp_path, echousd_command):
+    with zipfile.ZipFile(tmp_path / "evil.zip", "w") as packed:
+        packed.writestr("night/rooms/0000/bedroom_000000/../../../../escaped/owned.txt", "x")
+    url = f"zip://night::file://{tmp_path}/evil.zip"
+    with pytest.raises(ValueError, match=r"a file names '.*/escaped/owned.txt', outside of"):
+        Remote(url).get("rooms", tmp_path / "here/copy")
+    assert not list(tmp_path.rglob("owned.txt"))
+    for to, said in ((url, "zip://night::"), ("../bucket", "../bucket"), (5, "5")):
+        run = tmp_path / f"run_{len(said)}"
+        save_plan(make_plan(BatchRequest(sources=[], sample={"bedroom": 1}), "0" * 12, to), run)
+        done = echousd_command("batch", "verify", run)
+        assert done.code == 2
+        assert re.search(rf"to is .*{re.escape(said)}", done.err)
+        assert "allowed: a URL such as s3://bucket/night" in done.err
 
 
 @pytest.mark.parametrize("name", ["plan.jsonl", "graphs.jsonl", "shard_0_of_1/journal.jsonl"])

@@ -61,6 +61,12 @@ def test_rooms_go_to_a_bucket_and_are_those_of_a_folder(bucket, graphs, tmp_path
     assert batch(graphs, out, executor=again, to=URL, resume=True, **QUICK).complete
     assert sorted(key for key in again.calls if key.startswith("room")) == ["room graphs_000000", "room graphs_000001"]
     assert list(verify(out)) == []
+    lost = next(path for path in bucket.find("/bucket/night/store") if path.endswith(".usdc"))
+    bucket.rm(lost)
+    assert {"missing in the store" in wrong.problem for wrong in verify(out)} == {True}
+    assert batch(graphs, out, executor=Inline(), to=URL, resume=True, **QUICK).complete
+    assert bucket.exists(lost)
+    assert list(verify(out)) == []
     assert batch(graphs, out, executor=(idle := Inline()), to=URL, resume=True, **QUICK).complete
     assert idle.calls == []
     with pytest.raises(ValueError, match=r'another plan \(to was "memory://bucket/night", now null\)'):
