@@ -40,8 +40,6 @@ def linearise(
     position: np.ndarray,
     yaw: np.ndarray,
     *,
-    rules: str,
-    centre: np.ndarray,
     handicap: np.ndarray,
     slack: float,
 ) -> Linearised:
@@ -49,7 +47,7 @@ def linearise(
 
     Arguments:
         size, position: (n, 3) float, metres; yaw: (n,) float, radians.
-        rules, centre: as `relation_margins`; handicap: (p, 5) float as `geometry.separation_rows`.
+        handicap: (p, 5) float as `geometry.separation_rows`.
         slack: metres or ratio by which relations are to hold, so that rounding does not break them.
     """
     n = len(size)
@@ -65,7 +63,7 @@ def linearise(
         kinds.append(np.broadcast_to(np.asarray(kind, int), len(value)))
 
     margin, by_pair = relation_margins(
-        size, position, yaw, problem.triplets, rules=rules, centre=centre, fronts=problem.fronts
+        size, position, yaw, problem.triplets, rules=problem.rules, centre=problem.centre, fronts=problem.fronts
     )
     add(margin - slack, spread(by_pair, problem.triplets[:, [0, 2]], n), RELATION)
 

@@ -32,6 +32,7 @@ class Problem:
     Arguments:
         categories: n canonical category words.
         triplets: (e, 3) int, [subject, predicate id, object], those that the rules measure.
+        rules: `strict` or `sgfront`. centre: (2,) float, x and z of the room's centre.
         fixed: (n,) bool, boxes that must not move; rigid: (n,) bool, boxes that must keep their size.
         floor: the floor polygon, or None where the room has none.
         height: height of the ceiling in metres, or None.
@@ -46,6 +47,8 @@ class Problem:
 
     categories: tuple[str, ...]
     triplets: np.ndarray
+    rules: str
+    centre: np.ndarray
     fixed: np.ndarray
     rigid: np.ndarray
     floor: Floor | None
@@ -78,6 +81,20 @@ class Problem:
         return np.array([vocabulary().category(word).front for word in self.categories], bool)
 
 
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A problem and boxes to start from.
+
+    Arguments:
+        size, position: (n, 3) float, metres; yaw: (n,) float, radians.
+    """
+
+    problem: Problem
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+
 def pose(
     categories: Sequence[str],
     size: np.ndarray,
@@ -91,15 +108,16 @@ def pose(
     rigid: np.ndarray,
     turned: np.ndarray,
     stated: tuple[Stated, ...] = (),
-) -> tuple[Problem, np.ndarray, np.ndarray]:
+    rules: str = "strict",
+) -> Posed:
     """The problem of a room, with its boxes put at their height and wall furniture turned square to its wall.
 
     Arguments:
         turned: (n,) bool, boxes that must keep their yaw.
         The others as `echousd.repair.repair_boxes`.
-
-    Returns: the problem, position (n, 3) and yaw (n,) to start from.
     """
+    from echomodel.rules import measured
+
     words = tuple(vocabulary().category(word).name for word in categories)
     floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
     n = len(words)
@@ -118,7 +136,9 @@ def pose(
     pairs = pairs[apart]
     problem = Problem(
         words,
-        triplets,
+        triplets[np.isin(triplets[:, 1], sorted(measured(rules)))],
+        rules,
+        np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2,
         fixed,
         rigid,
         floor,
@@ -131,7 +151,7 @@ def pose(
         axis_handicap(size, position, yaw, pairs, wall),
         stated,
     )
-    return problem, position, yaw
+    return Posed(problem, size, position, yaw)
 
 
 def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.ndarray:

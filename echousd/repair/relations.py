@@ -70,7 +70,7 @@ def relation_margins(
         value[chosen], gradient[chosen] = margin(every.take(chosen), relations, strict)
     chosen = _of(predicate, [number for number, row in rows.items() if row.name not in CLOSED])
     if len(chosen):
-        value[chosen], gradient[chosen] = _automatic(size, position, yaw, triplets[chosen], rules, centre, slopes)
+        value[chosen], gradient[chosen] = _automatic((size, position, yaw), triplets[chosen], rules, centre, slopes)
     return value, gradient
 
 
@@ -99,13 +99,7 @@ def _where(chosen: np.ndarray, one: Values, two: Values) -> Values:
 
 
 def _automatic(
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    triplets: np.ndarray,
-    rules: str,
-    centre: np.ndarray,
-    slopes: bool,
+    placed: Sequence[np.ndarray], triplets: np.ndarray, rules: str, centre: np.ndarray, slopes: bool
 ) -> Values:
     """Margins (e,) by `echomodel.rules` and torch's gradients (e, 2, 6) by the two boxes of each relation."""
     import torch
@@ -114,7 +108,7 @@ def _automatic(
     from echomodel.rules import margins
 
     ends, row = triplets[:, [0, 2]].ravel(), torch.arange(len(triplets))
-    boxes = Boxes(*(torch.from_numpy(np.asarray(values[ends], float)) for values in (size, position, yaw)))
+    boxes = Boxes(*(torch.from_numpy(np.asarray(values[ends], float)) for values in placed))
     apart = torch.stack([2 * row, torch.from_numpy(triplets[:, 1].astype(np.int64)), 2 * row + 1], 1)
     if not slopes:
         with torch.no_grad():

@@ -15,10 +15,10 @@ from echomodel.rules.living.sizes import laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
 from echousd.repair.placements import stated_placements
-from echousd.repair.problem import Problem, pose, stacked
+from echousd.repair.problem import Posed, pose, stacked
 from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
-from echousd.repair.solver import RepairConfig, Solution, solve, violation
+from echousd.repair.solver import RepairConfig, solve, violation
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
@@ -145,16 +145,6 @@ def repair(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Start:
-    """A posed problem and the boxes to start from: size, position (n, 3) and yaw (n,)."""
-
-    problem: Problem
-    size: np.ndarray
-    position: np.ndarray
-    yaw: np.ndarray
-
-
 def floor_of_room(room: RoomSpec) -> np.ndarray | None:
     """(k, 2) float, the room's floor polygon, the rectangle around the origin of its size, or None."""
     if room.floor_polygon is not None:
@@ -214,19 +204,14 @@ def repair_boxes(
     triplets = np.asarray(triplets, int).reshape(-1, 3)
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
-    centre = np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2
     asked = np.isin(triplets[:, 1], sorted(measured(rules)))
     config = config or RepairConfig()
 
-    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Start:
-        problem, start, turn = pose(
-            categories, size, position, yaw, triplets,
-            floor_polygon=floor_polygon, height=height, fixed=fixed, rigid=rigid, turned=turned, stated=stated,
+    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Posed:
+        return pose(
+            categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
+            fixed=fixed, rigid=rigid, turned=turned, stated=stated, rules=rules,
         )  # fmt: skip
-        return Start(replace(problem, triplets=triplets[asked]), size, start, turn)
-
-    def solved(at: Start) -> Solution:
-        return solve(at.problem, at.size, at.position, at.yaw, rules=rules, centre=centre, config=config)
 
     drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw)
     if floor_polygon is not None and config.arrange:
@@ -240,18 +225,14 @@ def repair_boxes(
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         laid = laid_tables(at.problem.categories, at.size, anchor, ~rigid & ~np.isin(np.arange(n), told))
         at = replace(at, size=laid)
-        setting = setting_of(
-            at.problem, at.position, at.yaw, at.size, turned,
-            openings=openings, outline=floor_polygon, rules=rules, centre=centre,
-        )  # fmt: skip
-        chosen = arrange(setting)
+        chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
         at = posed(at.size, chosen.position, chosen.yaw)
-    found = solved(at)
+    found = solve(at, config)
     if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
-        plain = solved(drawn)
+        plain = solve(drawn, config)
         if violation(plain.at) < violation(found.at) - UNMET:
             found, at = plain, drawn
-    problem, turn = at.problem, at.yaw
+    problem, turn, centre = at.problem, at.yaw, at.problem.centre
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
     end = stacked(found.size, found.position, problem.carrier, None, fixed)
     ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)

@@ -25,7 +25,7 @@ from echousd.repair.constraints import (
     linearise,
 )
 from echousd.repair.geometry import COLUMNS
-from echousd.repair.problem import Problem
+from echousd.repair.problem import Posed
 
 
 @dataclass(frozen=True)
@@ -86,29 +86,15 @@ class Solution:
     rounds: int
 
 
-def solve(
-    problem: Problem,
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    *,
-    rules: str,
-    centre: np.ndarray,
-    config: RepairConfig,
-) -> Solution:
-    """Move and size boxes until the constraints hold; the best attempt where they cannot all hold.
-
-    Arguments:
-        size, position: (n, 3) float, metres, boxes to start from; yaw: (n,) float, radians.
-        rules, centre: as `constraints.relation_margins`.
-    """
-    handicap = problem.handicap.copy()
+def solve(start: Posed, config: RepairConfig) -> Solution:
+    """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
+    handicap = start.problem.handicap.copy()
     best: Solution | None = None
     through = 0
     spent = 0
     while best is None or spent < config.budget:
         left = replace(config, rounds=min(config.rounds, max(config.budget - spent - 1, 1)))
-        found = _descend(problem, size, position, yaw, handicap, through, rules=rules, centre=centre, config=left)
+        found = _descend(start, handicap, through, left)
         spent += found.rounds
         if best is None or found.score < best.score:
             best = found
@@ -124,22 +110,11 @@ def solve(
     return best
 
 
-def _descend(
-    problem: Problem,
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    handicap: np.ndarray,
-    through: int,
-    *,
-    rules: str,
-    centre: np.ndarray,
-    config: RepairConfig,
-) -> Solution:
-    n = len(size)
+def _descend(start: Posed, handicap: np.ndarray, through: int, config: RepairConfig) -> Solution:
+    problem, n = start.problem, len(start.size)
     free = np.stack([~problem.fixed] * 3 + [~problem.rigid] * 3, 1).ravel()
     weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]
-    origin = np.concatenate((position, np.log(size)), 1)
+    origin = np.concatenate((start.position, np.log(start.size)), 1)
     stiffnesses = np.array([STIFFNESS[kind] for kind in range(len(STIFFNESS))])
     sides = np.eye(n * COLUMNS).reshape(n, COLUMNS, -1)[:, 3:].reshape(3 * n, -1)
     bounds = np.concatenate((-sides, sides))
@@ -148,9 +123,7 @@ def _descend(
     before, last = np.inf, 0
     for number in range(config.rounds + 1):
         now_size, now_position = np.exp(state[:, 3:]), state[:, :3].copy()
-        at = linearise(
-            problem, now_size, now_position, yaw, rules=rules, centre=centre, handicap=handicap, slack=config.slack
-        )
+        at = linearise(problem, now_size, now_position, start.yaw, handicap=handicap, slack=config.slack)
         hard, soft = violation(at), unmet(at)
         score = hard + SOFT * soft
         if best is None or score < best.score - 1e-9:

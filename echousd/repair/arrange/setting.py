@@ -16,7 +16,7 @@ from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
 from echousd.repair.geometry import Floor, axes
-from echousd.repair.problem import ON_FLOOR, Problem, required_order
+from echousd.repair.problem import ON_FLOOR, Posed, required_order
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
@@ -251,43 +251,24 @@ class Setting:
         return bool(self.carrier[i] == ON_FLOOR)
 
 
-def setting_of(
-    problem: Problem,
-    position: np.ndarray,
-    yaw: np.ndarray,
-    size: np.ndarray,
-    turned: np.ndarray,
-    *,
-    openings: Sequence[Opening],
-    outline: np.ndarray,
-    rules: str,
-    centre: np.ndarray,
-) -> Setting:
-    """The setting of a posed problem with a floor, whose boxes were drawn at these places.
+def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], outline: np.ndarray) -> Setting:
+    """The setting of a posed problem with a floor, whose boxes were drawn where they stand.
 
     Arguments:
-        position: (n, 3) float, metres; yaw: (n,) float, radians; size: (n, 3) float, metres.
-        turned: (n,) bool, headings that are stated. openings, outline, rules, centre: as in `Setting`.
+        turned: (n,) bool, headings that are stated. openings, outline: as in `Setting`.
     """
     from echomodel.rules.living import plan_of
 
+    problem = at.problem
     assert problem.floor is not None
     assert problem.surroundings is not None
-    boxes = _Boxes(size, position, yaw)
-    plan = plan_of(boxes, problem.categories, problem.floor.polygon, (), problem.triplets)
-    top = float((position[:, 1] + size[:, 1]).max(initial=0.0))
+    plan = plan_of(at, problem.categories, problem.floor.polygon, (), problem.triplets)
+    top = float((at.position[:, 1] + at.size[:, 1]).max(initial=0.0))
     return Setting(
-        problem.categories, size, position, yaw, problem.triplets, rules, centre, problem.fixed, turned,
-        problem.floor, problem.height or top, problem.carrier, problem.behind, plan.anchor.numpy(), plan.stance,
-        plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
+        problem.categories, at.size, at.position, at.yaw, problem.triplets, problem.rules, problem.centre,
+        problem.fixed, turned, problem.floor, problem.height or top, problem.carrier, problem.behind,
+        plan.anchor.numpy(), plan.stance, plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
     )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class _Boxes:
-    size: np.ndarray
-    position: np.ndarray
-    yaw: np.ndarray
 
 
 @dataclass(eq=False)
