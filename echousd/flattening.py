@@ -32,6 +32,8 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
                 _as_float(attribute)  # some web loaders cannot read doubles of whole numbers from a crate file
     _bind_directly(stage)
     _drop_unused_materials(stage)
+    if package is None:
+        _drop_materialx(stage)
     images = [prim for prim in stage.TraverseAll() if _is_image(prim)]
     take_assets(layer, package)
     for image in images:
@@ -53,6 +55,16 @@ def _is_image(prim: Usd.Prim) -> bool:
     """Whether a prim is a shader that reads an image."""
     file = prim.GetAttribute("inputs:file")
     return prim.GetTypeName() == "Shader" and bool(file) and file.HasAuthoredValue()
+
+
+def _drop_materialx(stage: Usd.Stage) -> None:
+    """Networks of MaterialX that stand beside others: their images have no plain colour to fall back to."""
+    for material in [UsdShade.Material(prim) for prim in stage.TraverseAll() if prim.IsA(UsdShade.Material)]:
+        if material.GetSurfaceOutput("mtlx") and material.GetSurfaceOutput():
+            material.GetPrim().RemoveProperty("outputs:mtlx:surface")
+            for child in material.GetPrim().GetChildren():
+                if str(UsdShade.Shader(child).GetShaderId() or "").startswith("ND_"):
+                    stage.RemovePrim(child.GetPath())
 
 
 def _paint_plain(image: Usd.Prim) -> None:

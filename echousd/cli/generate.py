@@ -93,6 +93,9 @@ def generate(
         bool, typer.Option("--merge", help="One mesh for what moves together, not one for legs, top, back ...")
     ] = False,
     closed: Annotated[bool, typer.Option("--closed", help="The same as one closed surface, without insides.")] = False,
+    materialx: Annotated[
+        bool, typer.Option("--materialx", help="Give materials a MaterialX network beside UsdPreviewSurface.")
+    ] = False,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
     ] = True,
@@ -148,7 +151,7 @@ def generate(
         finally:
             gc.enable()
         meshes = "closed" if closed else "bodies" if merge else "parts"
-        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes)
+        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes, materialx=materialx)
         wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []

@@ -12,7 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
-from echousd.room import assets, cameras, coverings, joints, lights, looks, materials, physics, structure
+from echousd.room import assets, cameras, coverings, joints, lights, looks, materials, materialx, physics, structure
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
@@ -216,6 +216,8 @@ def materials_layer(
     tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
     materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     materials.write_palettes(stage, harmony, tables)
+    if room.options.materialx:
+        materialx.write_networks(stage, harmony, tables)
     return stage.GetRootLayer()
 
 

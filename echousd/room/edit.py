@@ -169,6 +169,7 @@ def edit(
             manifest.get("dress", "none"),
             manifest.get("palette", ""),
             manifest.get("merge", "parts"),
+            manifest.get("materialx", False),
         ),
         timings=timer.seconds,
         edited=Path(root),

@@ -54,6 +54,7 @@ class Manifest(BaseModel):
     dress: Literal["none", "some", "full"] = "none"
     palette: str = ""
     merge: Literal["parts", "bodies", "closed"] = "parts"
+    materialx: bool = False
     faces: Annotated[int, Field(ge=1)] = FACES
     meshes: dict[str, dict[str, Any]] = {}
     history: list[Step] = []

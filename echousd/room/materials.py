@@ -17,13 +17,13 @@ def texture_files(looks: Mapping[str, Look], harmony: str) -> dict[str, bytes]:
     """Path in the room's folder -> image, for all patterns of some looks; equal ones are one file."""
     files: dict[str, bytes] = {}
     for look in looks.values():
-        for path, content in _images(look, harmony).values():
+        for path, content in look_images(look, harmony).values():
             files[path] = content
     return files
 
 
-def _images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
-    """Input of the surface -> (path, image) of a look with a pattern."""
+def look_images(look: Look, harmony: str) -> dict[str, tuple[str, bytes]]:
+    """Input of a UsdPreviewSurface -> (path in the room's folder, image) of a look with a pattern; {} without one."""
     if not look.pattern:
         return {}
     tint = harmony if look.pattern.startswith("painting_") else baking.hexadecimal(look.color)
@@ -51,7 +51,7 @@ def define_material(
     UsdSemantics.LabelsAPI.Apply(material.GetPrim(), "material").CreateLabelsAttr([slot])
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
-    images = _images(look, harmony) if harmony else {}
+    images = look_images(look, harmony) if harmony else {}
     if images:
         reader = UsdShade.Shader.Define(stage, f"{path}/st")
         reader.CreateIdAttr("UsdPrimvarReader_float2")

@@ -38,6 +38,7 @@ class RoomOptions:
         merge: `parts`, a mesh for every part (legs, top, drawers), `bodies`, one for all that moves together,
             or `closed`, likewise, as a single closed surface without insides (`echousd.room.merging`).
         palette: harmony that is selected at first, one of `echousd.room.finishes.harmonies`; "" = the seed chooses.
+        materialx: give the room's materials a MaterialX network beside their UsdPreviewSurface.
     """
 
     up_axis: str = "Y"
@@ -47,6 +48,7 @@ class RoomOptions:
     dress: str = "none"
     palette: str = ""
     merge: str = "parts"
+    materialx: bool = False
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):

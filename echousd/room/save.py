@@ -239,6 +239,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         **({"palette": room.options.palette} if room.options.palette else {}),
         **({"faces": room.provenance.faces} if room.provenance.faces != FACES else {}),
         **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
+        **({"materialx": True} if room.options.materialx else {}),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

@@ -84,6 +84,18 @@ def test_nvidia_validator_reports_no_issues(rooms: list[Path], tmp_path: Path) -
             assert "No issues found" in run(command, "--no-variants", file, accepted=(0, 1)), file
 
 
+def test_materialx_knows_every_node(tmp_path: Path) -> None:
+    options = echousd.RoomOptions(walls=True, dress="some", materialx=True)
+    made = echousd.generate("samples/study.usda", seed=5, shapes="boxes", options=options)
+    room = made.save(tmp_path / "study", preview=False)
+    found = json.loads(run(python_of("simready"), HERE / "materialx_check.py", room))
+    assert found["nodes"] > 50
+    assert found["wrong"] == []
+    # it runs on usd-core, which comes without UsdMtlx and knows no node of MaterialX
+    said = run(python_of("nvidia").with_name("nvidia_usd_validate"), "--no-variants", room, accepted=(0, 1))
+    assert all("shaderId 'ND_" in line for line in said.splitlines() if "validation:[" in line)
+
+
 def blender(room: Path, client: str = "blender") -> dict[str, dict]:
     """What Blender makes of a room, by paths of names without the numbers that keep Blender's names apart."""
     lines = run(python_of(client), HERE / "blender_import.py", room).splitlines()

@@ -1,10 +1,13 @@
 """Patterns, their images, and the harmonies of a room."""
 
 import io
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from echousd.check.validity import find_faults
+from echousd.export import export
 from PIL import Image
 from pxr import Usd, UsdShade
 from small_room import StandIn, small_graph
@@ -99,3 +102,38 @@ def test_images_are_there_and_small(root):
         shader = UsdShade.Shader(prim)
         if shader and shader.GetInput("file"):
             assert shader.GetInput("file").Get().resolvedPath, prim
+
+
+def test_materialx_stands_beside_preview_surfaces(root, tmp_path):
+    plain = Usd.Stage.Open(str(root))
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes")
+    room = replace(room, options=RoomOptions(dress="full", walls=True, materialx=True))
+    made = room.save(tmp_path / "bedroom", preview=False)
+    assert json.loads(made.with_suffix(".json").read_text())["materialx"] is True
+    stage = Usd.Stage.Open(str(made))
+    assert stage.GetCompositionErrors() == []
+    tints = {name: _tint_of(stage, name) for name in sorted(HARMONIES)}
+    assert len(set(tints.values())) >= 8
+    for prim in stage.GetPrimAtPath("/Room/Looks").GetChildren():
+        material = UsdShade.Material(prim)
+        assert not UsdShade.Material(plain.GetPrimAtPath(prim.GetPath())).GetSurfaceOutput("mtlx")
+        assert material.ComputeSurfaceSource("mtlx")[0].GetShaderId() == "ND_UsdPreviewSurface_surfaceshader"
+        assert material.ComputeSurfaceSource()[0].GetShaderId() == "UsdPreviewSurface"
+        for child in prim.GetChildren():
+            shader = UsdShade.Shader(child)
+            if shader.GetShaderId().startswith("ND_image") and shader.GetInput("file").Get():
+                assert shader.GetInput("file").Get().resolvedPath, child
+            if shader.GetShaderId() == "ND_multiply_color3":
+                scale = UsdShade.Shader(prim.GetChild("image")).GetInput("scale").Get()
+                factor = shader.GetInput("in2").Get()
+                assert tuple(factor) == pytest.approx(tuple(scale)[:3] if scale else (1, 1, 1))
+    assert find_faults(stage) == ((), ())
+    flat = Usd.Stage.Open(str(export(made, tmp_path / "flat.usdc", pictures=False)))
+    floor = UsdShade.Material(flat.GetPrimAtPath("/Room/Looks/floor"))
+    assert not floor.GetSurfaceOutput("mtlx")
+    assert {child.GetName() for child in floor.GetPrim().GetChildren()} == {"surface", "st"}
+
+
+def _tint_of(stage, harmony):
+    stage.GetPrimAtPath("/Room").GetVariantSet("palette").SetVariantSelection(harmony)
+    return tuple(UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/floor/mtlx_tint")).GetInput("in2").Get())
