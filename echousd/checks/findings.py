@@ -35,6 +35,18 @@ def prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
     return iter(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()))
 
 
+def distinct_prims(stage: Usd.Stage) -> Iterator[Usd.Prim]:
+    """The same prims, those of an instance's prototype once."""
+    seen: set[Sdf.Path] = set()
+    for prim in prims(stage):
+        if prim.IsInstanceProxy():
+            prototype = prim.GetPrimInPrototype().GetPath()
+            if prototype in seen:
+                continue
+            seen.add(prototype)
+        yield prim
+
+
 def applied(prim: Usd.Prim) -> list[str]:
     """Applied API schemas as authored, known to this process or not."""
     return list(prim.GetPrimTypeInfo().GetAppliedAPISchemas())

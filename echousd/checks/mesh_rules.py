@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Tf, Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, distinct_prims, prims
 from echousd.stage.encoding import StageError
 from echousd.stage.values import MeshArrays, array, mesh_arrays
 
@@ -125,15 +125,7 @@ def winding(stage: Usd.Stage) -> Iterator[Finding]:
 
 def meshes(stage: Usd.Stage) -> Iterator[UsdGeom.Mesh]:
     """All meshes of a stage, those of an instance's prototype once."""
-    seen: set[Sdf.Path] = set()
-    for prim in prims(stage):
-        if prim.IsInstanceProxy():
-            prototype = prim.GetPrimInPrototype().GetPath()
-            if prototype in seen:
-                continue
-            seen.add(prototype)
-        if prim.IsA(UsdGeom.Mesh):
-            yield UsdGeom.Mesh(prim)
+    return (UsdGeom.Mesh(prim) for prim in distinct_prims(stage) if prim.IsA(UsdGeom.Mesh))
 
 
 def corners_of(arrays: MeshArrays) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule, distinct_prims, prims
 from echousd.stage.files import said
 from echousd.stage.values import LARGEST, misfit, shown
 
@@ -45,13 +45,7 @@ def finite_values(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _authored(stage: Usd.Stage) -> Iterator[Usd.Attribute]:
-    seen = set()
-    for prim in prims(stage):
-        if prim.IsInstanceProxy():
-            prototype = prim.GetPrimInPrototype().GetPath()
-            if prototype in seen:
-                continue
-            seen.add(prototype)
+    for prim in distinct_prims(stage):
         yield from prim.GetAuthoredAttributes()
 
 

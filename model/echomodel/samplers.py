@@ -1,7 +1,7 @@
-"""Samplers as pure functions: from noise to a sample, any subset of nodes held fixed at level 0.
+"""Samplers: from noise to a sample, any subset of nodes held fixed at level 0.
 
-Every sampler has the same arguments. `predict(x, level)` returns the clean sample that the denoiser sees in x (N, ...)
-at a noise level per node (N,); `levels` (K + 1,) falls from 1 to 0.
+A sampler makes the steps of one run: `step(x, clean, start, end)` takes x (N, ...) from level `start` to level `end`,
+given the clean sample that the denoiser sees in it, which `predict(x, level)` returns for a noise level per node (N,).
 """
 
 from __future__ import annotations
@@ -24,37 +24,17 @@ Predict = Callable[[Tensor, Tensor], Tensor]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
 
 
-def ddim(
-    predict: Predict,
-    x: Tensor,
-    levels: Tensor,
-    objective: Objective,
-    *,
-    known: Tensor | None = None,
-    known_mask: Tensor | None = None,
-    generator: Randomness | None = None,
-    progress: StepListener | None = None,
-) -> Tensor:
+def ddim(objective: Objective, generator: Randomness | None = None) -> Step:
     """Deterministic DDIM (Song et al. 2021, Eq. 12 with eta 0); with rectified flow this is the Euler method."""
 
     def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
         (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
         return b * clean + r * (x - a * clean) / s
 
-    return _march(step, predict, x, levels, known, known_mask, progress)
+    return step
 
 
-def ancestral(
-    predict: Predict,
-    x: Tensor,
-    levels: Tensor,
-    objective: Objective,
-    *,
-    known: Tensor | None = None,
-    known_mask: Tensor | None = None,
-    generator: Randomness | None = None,
-    progress: StepListener | None = None,
-) -> Tensor:
+def ancestral(objective: Objective, generator: Randomness | None = None) -> Step:
     """DDPM ancestral sampling from the posterior q(x_s | x_t, x0) (Ho et al. 2020, Eq. 7)."""
 
     def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
@@ -67,20 +47,10 @@ def ancestral(
         noise = normal(x.shape, generator, x.device, x.dtype)
         return mean + math.sqrt(max(between, 0.0)) * r / s * noise
 
-    return _march(step, predict, x, levels, known, known_mask, progress)
+    return step
 
 
-def dpm2m(
-    predict: Predict,
-    x: Tensor,
-    levels: Tensor,
-    objective: Objective,
-    *,
-    known: Tensor | None = None,
-    known_mask: Tensor | None = None,
-    generator: Randomness | None = None,
-    progress: StepListener | None = None,
-) -> Tensor:
+def dpm2m(objective: Objective, generator: Randomness | None = None) -> Step:
     """DPM-Solver++(2M) (Lu et al. 2022, Algorithm 2), first order in the first and the last step."""
     last: list[tuple[Tensor, float]] = []
 
@@ -95,10 +65,14 @@ def dpm2m(
         last[:] = [(clean, h)]
         return (r / s) * x + b * (1 - shrink) * direction
 
-    return _march(step, predict, x, levels, known, known_mask, progress)
+    return step
 
 
-SAMPLERS: dict[Sampler, Callable[..., Tensor]] = {"ddim": ddim, "ancestral": ancestral, "dpm2m": dpm2m}
+SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {
+    "ddim": ddim,
+    "ancestral": ancestral,
+    "dpm2m": dpm2m,
+}
 
 
 def sample(
@@ -138,8 +112,7 @@ def sample(
     if draft is not None and start < 1:
         levels = sampling_levels(max(FEWEST, round(steps * start))) * start
         x = add_noise(draft, x, torch.full((len(x),), start, dtype=x.dtype, device=x.device), objective)
-    options = {"known": known, "known_mask": known_mask, "generator": generator, "progress": progress}
-    return SAMPLERS[sampler](predict, x, levels, objective, **options)
+    return _march(SAMPLERS[sampler](objective, generator), predict, x, levels, known, known_mask, progress)
 
 
 def guided(conditional: Predict, unconditional: Predict, scale: float) -> Predict:
