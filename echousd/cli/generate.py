@@ -82,7 +82,7 @@ def generate(
     fit: Annotated[str, typer.Option(help="keep: all that is asked for; drop: leave out what has no place.")] = "keep",
     steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
     faces: Annotated[int, typer.Option(help="Face budget of each mesh.", min=100)] = 5000,
-    up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z.")] = "Y",
+    up_axis: Annotated[str, typer.Option("--up-axis", help="Y or Z, assets included.")] = "Y",
     walls: Annotated[
         bool, typer.Option("--walls/--no-walls", help="Walls around the floor, with doors and windows.")
     ] = True,

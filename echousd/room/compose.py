@@ -27,6 +27,7 @@ from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.files import layer_bytes
 from echousd.stage.taxonomy import ade20k, word_of
+from echousd.turning import turn_up
 
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
@@ -81,9 +82,9 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         if shelf is not None:
             shelf.redirect(layer)
         path = layer_file(name)
-        files[path] = layer_bytes(layer, path[-5:])
+        files[path] = _bytes(room, layer, path)
     files |= lights.image_files(room)
-    files[f"{room.name}.usda"] = layer_bytes(root_layer(room, dressing.hung), ".usda")
+    files[f"{room.name}.usda"] = _bytes(room, root_layer(room, dressing.hung), ".usda")
     return files
 
 
@@ -127,6 +128,7 @@ def graph_layer(room: RoomData) -> Sdf.Layer:
 def layout_layer(room: RoomData) -> Sdf.Layer:
     """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
     stage = _room_stage(room, "layout")
+    UsdGeom.SetStageUpAxis(stage, room.options.up_axis)  # its places are so already
     stage.OverridePrim("/Room")
     place_layouts(stage, room)
     return stage.GetRootLayer()
@@ -136,7 +138,7 @@ def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
     """Author the objects' xformOps (replacing those there are), as variants `layout_0` ... where there are several."""
     for name in room.names:
         prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
-        for property_name in ("xformOpOrder", "xformOp:translate", "xformOp:rotateY"):
+        for property_name in ("xformOpOrder", "xformOp:translate", "xformOp:rotateY", "xformOp:rotateZ"):
             if prim and prim.HasProperty(property_name):
                 prim.RemoveProperty(property_name)
     layouts = room.layouts or (room.boxes,)
@@ -163,7 +165,6 @@ def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.L
     for part in built:
         if part.joint and part.mass:
             joints.write_hinge(stage, part.path, part.joint, part.mass)
-    physics.set_gravity(stage, room.options.up_axis)
     return stage.GetRootLayer()
 
 
@@ -227,13 +228,9 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     layer = stage.GetRootLayer()
     layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
     layer.documentation = "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten."
-    UsdGeom.SetStageUpAxis(stage, room.options.up_axis)
-    root = UsdGeom.Xform.Define(stage, "/Room")
-    prim = root.GetPrim()
+    prim = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
     Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
     Usd.ModelAPI(prim).SetAssetName(room.name)
-    if room.options.up_axis == "Z":
-        root.AddRotateXOp().Set(90.0)  # without a suffix: three.js reads no other
     seen = room_volume(room)
     low, high = (Gf.Vec3f(*map(float, corner)) for corner in (seen.lower, seen.upper))
     UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
@@ -266,7 +263,8 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         if name in room.carried:
             return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)
-        return Asset(name, {}, component.files(name, word_of(room.graph.node(user)), geometry, data, folder))
+        word, axis = word_of(room.graph.node(user)), room.options.up_axis
+        return Asset(name, {}, component.files(name, word, geometry, data, folder, axis))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
@@ -294,13 +292,18 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
         piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
         for part in geometry.coarse
     }
-    low = {coarse_file(name): layer_bytes(assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
+    low = {coarse_file(name): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
     files = {
         **low,
-        payload_file(name): layer_bytes(payload, ".usdc"),
-        component_file(name): layer_bytes(layer, ".usda"),
+        payload_file(name): _bytes(room, payload, ".usdc"),
+        component_file(name): _bytes(room, layer, ".usda"),
     }
     return Asset(name, slots, files)
+
+
+def _bytes(room: RoomData, layer: Sdf.Layer, path: str) -> bytes:
+    """A layer of the room as it lies on disk, with the room's up axis; `path` ends as its file does."""
+    return layer_bytes(turn_up(layer) if room.options.up_axis == "Z" else layer, path[-5:])
 
 
 def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]:
@@ -333,8 +336,10 @@ def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:
     for number, name in enumerate(room.names):
         xform = UsdGeom.Xformable(stage.OverridePrim(f"{OBJECTS}/{name}"))
         x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
-        xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
-        xform.AddRotateYOp().Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
+        z_up = room.options.up_axis == "Z"
+        xform.AddTranslateOp().Set(Gf.Vec3d(x, 0.0 - z, y) if z_up else Gf.Vec3d(x, y, z))
+        turn = xform.AddRotateZOp() if z_up else xform.AddRotateYOp()
+        turn.Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
 
 
 def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:

@@ -17,6 +17,7 @@ from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.read import find_rooms
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import matrix
+from echousd.turning import turn_up
 
 MARK = "echousd_house"
 GAP = 1.0  # metres between rooms that stand nowhere in particular
@@ -89,6 +90,8 @@ def write_house(root: Path, rooms: Sequence[Place], made: Mapping[str, Path], *,
     for room in rooms:
         file = made[room.name].relative_to(root.parent).as_posix()
         layer.GetPrimAtPath(f"/House/{room.name}").referenceList.prependedItems.append(Sdf.Reference(f"./{file}"))
+    if any(up_axis(open_stage(made[room.name])) == "Z" for room in rooms):
+        turn_up(layer)
     layer.customLayerData = {MARK: 1, "generator": f"echousd {echousd.__version__}"}
     write_whole(root, layer_bytes(layer, ".usda"))
     return root

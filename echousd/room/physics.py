@@ -101,15 +101,11 @@ def write_physics(stage: Usd.Stage, shell: Mapping[str, str]) -> None:
         stage: receives the opinions; its units are metres and kilograms, its up axis is Y below `/Room`.
         shell: path of a solid mesh -> how it collides, a token of `physics:approximation`.
     """
-    UsdPhysics.Scene.Define(stage, SCENE).CreateGravityMagnitudeAttr(GRAVITY)
+    scene = UsdPhysics.Scene.Define(stage, SCENE)
+    scene.CreateGravityMagnitudeAttr(GRAVITY)
+    scene.CreateGravityDirectionAttr(Gf.Vec3f(0, -1, 0))
     for path, form in shell.items():
         prim = stage.OverridePrim(path)
         UsdPhysics.CollisionAPI.Apply(prim)
         UsdPhysics.MeshCollisionAPI.Apply(prim).CreateApproximationAttr(form)
     bind_contact(stage, SHELL, f"{SHELL}/contact", WOODEN)
-
-
-def set_gravity(stage: Usd.Stage, up_axis: str) -> None:
-    """Gravity's direction is in world space, so it follows the stage's up axis, not `/Room`."""
-    direction = Gf.Vec3f(0, -1, 0) if up_axis == "Y" else Gf.Vec3f(0, 0, -1)
-    UsdPhysics.Scene(stage.GetPrimAtPath(SCENE)).CreateGravityDirectionAttr(direction)

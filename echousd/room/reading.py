@@ -23,8 +23,10 @@ from echousd.room.masses import read_mass
 from echousd.room.originals.reading import read_original
 from echousd.room.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_of
 from echousd.room.stored import asset_from, shelf_of
+from echousd.room.upright import as_y_up, stands_z_up
 from echousd.room.within import inside
 from echousd.stage import open_stage, read_graph
+from echousd.stage.contents import Z_TO_Y
 from echousd.stage.values import matrix, reading
 
 
@@ -68,6 +70,7 @@ def read_room(root: str | Path) -> SavedRoom:
     carried: dict[str, Mapping[str, bytes]] = {}
     assets: dict[str, str] = {}
     made: dict[str, Geometry] = {}
+    z_up = stands_z_up(stage.GetPrimAtPath("/Room"))
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
         read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
@@ -84,7 +87,7 @@ def read_room(root: str | Path) -> SavedRoom:
         if asset is None or found is None:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:
-            made[asset] = found
+            found = made[asset] = as_y_up(found) if z_up else found
             if shelf is not None and f"assets/{asset}" in shelf.keys:
                 carried[asset] = asset_from(shelf, asset)
             else:
@@ -103,13 +106,14 @@ def read_room(root: str | Path) -> SavedRoom:
 def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
     """Boxes of the objects as the stage places them now."""
     position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath("/Room")
+    turn, ahead = (Z_TO_Y, (0, -1, 0)) if stands_z_up(room) else (np.eye(3), (0, 0, 1))
     for name in graph.names:
         prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
         with reading(stage):
             pose, _ = cache.ComputeRelativeTransform(prim, room)
         matrix(pose, prim)
-        front = pose.TransformDir((0, 0, 1))
-        position.append(tuple(pose.ExtractTranslation()))
+        front, place = (np.array(v) @ turn.T for v in (pose.TransformDir(ahead), pose.ExtractTranslation()))
+        position.append(place)
         yaw.append(np.arctan2(front[0], front[2]))
     return Boxes(size, *(torch.tensor(np.array(v), dtype=torch.float32) for v in (position, yaw)))
 

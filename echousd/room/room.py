@@ -30,7 +30,7 @@ class RoomOptions:
     """How a room is written.
 
     Arguments:
-        up_axis: `Y`, or `Z` (metadata and one rotation on the root prim; everything below stays as it is).
+        up_axis: `Y`, or `Z`: assets, shell, places, lights and cameras are written so (`echousd.turning`).
         walls: add walls around the floor, with doors and windows in their openings.
         ceiling: add a ceiling.
         dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`.

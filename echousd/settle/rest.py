@@ -82,7 +82,7 @@ def _in_room(room: Room, place: np.ndarray) -> np.ndarray:
     if room.options.up_axis == "Y":
         return place
     turn = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # (x, y, z) with Z up -> (x, z, -y)
-    return np.asarray(turn @ place)
+    return np.asarray(turn @ place @ turn.T)
 
 
 def _left(report: SettleReport) -> list[tuple[str, str]]:
