@@ -18,6 +18,7 @@ from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
 from echousd.room.originals import attribution, component
 from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, layer_file, payload_file, piece_path
+from echousd.room.placing import place_layouts
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
@@ -132,27 +133,6 @@ def layout_layer(room: RoomData) -> Sdf.Layer:
     stage.OverridePrim("/Room")
     place_layouts(stage, room)
     return stage.GetRootLayer()
-
-
-def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
-    """Author the objects' xformOps (replacing those there are), as variants `layout_0` ... where there are several."""
-    for name in room.names:
-        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
-        for property_name in ("xformOpOrder", "xformOp:translate", "xformOp:rotateY", "xformOp:rotateZ"):
-            if prim and prim.HasProperty(property_name):
-                prim.RemoveProperty(property_name)
-    layouts = room.layouts or (room.boxes,)
-    if len(layouts) == 1:
-        _place(stage, room, 0)
-        return
-    variants = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
-    for number in range(len(layouts)):
-        name = f"layout_{number}"
-        variants.AddVariant(name)
-        variants.SetVariantSelection(name)
-        with variants.GetVariantEditContext():
-            _place(stage, room, number)
-    variants.SetVariantSelection("layout_0")
 
 
 def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
@@ -329,17 +309,6 @@ def _slugs(room: RoomData) -> dict[str, str]:
 def _slots(made: Mapping[str, Asset]) -> list[str]:
     """Material slots of assets, each once, in an order that no hash seed changes."""
     return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
-
-
-def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:
-    boxes = room.layouts[layout] if room.layouts else room.boxes
-    for number, name in enumerate(room.names):
-        xform = UsdGeom.Xformable(stage.OverridePrim(f"{OBJECTS}/{name}"))
-        x, y, z = (round(float(v), 5) + 0.0 for v in boxes.position[number])
-        z_up = room.options.up_axis == "Z"
-        xform.AddTranslateOp().Set(Gf.Vec3d(x, 0.0 - z, y) if z_up else Gf.Vec3d(x, y, z))
-        turn = xform.AddRotateZOp() if z_up else xform.AddRotateYOp()
-        turn.Set(round(float(np.degrees(float(boxes.yaw[number]))), 4) + 0.0)
 
 
 def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:

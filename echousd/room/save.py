@@ -21,12 +21,13 @@ from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
 from echousd.room import ownership, paintings
-from echousd.room.compose import LAYERS, place_layouts, room_files
+from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.history import remembered
 from echousd.room.lock import locked
 from echousd.room.manifest import FACES, MANIFEST_KEY
 from echousd.room.paths import layer_file
+from echousd.room.placing import place_layouts
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
 from echousd.room.stored import Shelf, shelf_of

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from echousd.export import export
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
 from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.openings import Opening
-from echousd.check import check_room
-from echousd.export import export
+from echousd.checks import check_room
 from echousd.graph import RoomSpec
 from echousd.room import RoomOptions
 from echousd.room.reading import read_room
