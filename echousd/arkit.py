@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
 
 from echousd.bare import strip
@@ -21,8 +23,9 @@ def for_arkit(layer: Sdf.Layer) -> None:
     for prim in list(stage.TraverseAll()):
         if prim.IsValid() and (prim.GetTypeName().startswith(OURS) or _is_light(prim)):
             stage.RemovePrim(prim.GetPath())
-    for path in [prim.GetPath() for prim in stage.TraverseAll() if _is_empty_scope(prim)]:
-        stage.RemovePrim(path)
+    for prim in reversed(list(stage.TraverseAll())):  # what a scope holds before the scope
+        if _is_empty_scope(prim):
+            stage.RemovePrim(prim.GetPath())
     strip(layer, PROPERTIES, OURS)
 
 
@@ -35,21 +38,29 @@ def _is_empty_scope(prim: Usd.Prim) -> bool:
 
 
 def _turn(stage: Usd.Stage) -> None:
-    """Z up to Y up by a matrix on every root prim that has a place; gravity turns along."""
+    """Z up to Y up by a matrix on every prim that has a place and none above it that counts; gravity turns along."""
     turn = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d.XAxis(), -90.0))
-    for prim in stage.GetPseudoRoot().GetChildren():
-        placed = UsdGeom.Xformable(prim)
-        if not placed:
-            continue
-        matrix = placed.GetLocalTransformation() * turn
+    for placed in list(_outermost(stage.GetPseudoRoot())):
+        matrix, alone = placed.GetLocalTransformation() * turn, placed.GetResetXformStack()
         placed.ClearXformOpOrder()
-        for attribute in prim.GetAttributes():
+        for attribute in placed.GetPrim().GetAttributes():
             if attribute.GetName().startswith("xformOp:"):
-                prim.RemoveProperty(attribute.GetName())
+                placed.GetPrim().RemoveProperty(attribute.GetName())
         if not Gf.IsClose(matrix, Gf.Matrix4d(1.0), 1e-9):
             placed.AddTransformOp().Set(matrix)
+        if alone:
+            placed.SetResetXformStack(True)
     for prim in stage.Traverse():
         scene = UsdPhysics.Scene(prim)
         if scene and scene.GetGravityDirectionAttr().HasAuthoredValue():
             scene.GetGravityDirectionAttr().Set(Gf.Vec3f(turn.TransformDir(scene.GetGravityDirectionAttr().Get())))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+
+
+def _outermost(top: Usd.Prim, turned: bool = False) -> Iterator[UsdGeom.Xformable]:
+    """The first prims with a place on every branch below `top`, and all that ignore what is above them."""
+    for prim in top.GetChildren():
+        placed = UsdGeom.Xformable(prim)
+        if placed and (not turned or placed.GetResetXformStack()):
+            yield placed
+        yield from _outermost(prim, turned or bool(placed))

@@ -97,6 +97,49 @@ def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, ph
         np.testing.assert_allclose(scene.GetGravityDirectionAttr().Get(), (0, -1, 0), atol=1e-6)
 
 
+def test_usdz_for_arkit_turns_all_of_a_foreign_stage(tmp_path):
+    """Roots without a place of their own (untyped, Scope), prims below them, and prims that ignore what is above."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "foreign.usda"))
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    UsdGeom.SetStageMetersPerUnit(stage, 1)
+    stage.SetDefaultPrim(stage.DefinePrim("/World"))
+    stage.DefinePrim("/World/Deep", "Scope")
+    stage.DefinePrim("/Scope", "Scope")
+    UsdGeom.Xform.Define(stage, "/Placed").AddTranslateOp().Set((0, 0, 5))
+    free = UsdGeom.Xform.Define(stage, "/Placed/Free")
+    free.AddTranslateOp().Set((0, 7, 0))
+    free.SetResetXformStack(True)
+    for number, above in enumerate(("/World", "/World/Deep", "/Scope", "", "/Placed", "/Placed/Free")):
+        box = UsdGeom.Mesh.Define(stage, f"{above}/box")
+        shape = trimesh.creation.box((1, 2, 3))
+        box.CreatePointsAttr(shape.vertices)
+        box.CreateFaceVertexIndicesAttr(shape.faces.ravel())
+        box.CreateFaceVertexCountsAttr([3] * len(shape.faces))
+        box.AddTranslateOp().Set((number, 10 * number, 2))
+    stage.Save()
+    turned = Usd.Stage.Open(str(export(tmp_path / "foreign.usda", tmp_path / "out.usdz", arkit=True)))
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            was, box = world_bounds(stage, prim.GetPath()), world_bounds(turned, prim.GetPath())
+            (x, y, z), (x2, y2, z2) = was.GetMin(), was.GetMax()
+            np.testing.assert_allclose([*box.GetMin()], [x, z, -y2], atol=1e-4, err_msg=str(prim.GetPath()))
+            np.testing.assert_allclose([*box.GetMax()], [x2, z2, -y], atol=1e-4, err_msg=str(prim.GetPath()))
+    assert UsdGeom.Xformable(turned.GetPrimAtPath("/Placed/Free")).GetResetXformStack()
+
+
+def test_usdz_for_arkit_has_no_empty_scopes(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "foreign.usda"))
+    stage.SetDefaultPrim(stage.DefinePrim("/World", "Xform"))
+    UsdGeom.Cube.Define(stage, "/World/Things/box")
+    for path in ("/World/Lights/Inner", "/World/Things"):
+        UsdGeom.Scope.Define(stage, path)
+    UsdGeom.Scope.Define(stage, "/World/Lights")
+    stage.DefinePrim("/World/Lights/Inner/sun", "DistantLight")
+    stage.Save()
+    made = Usd.Stage.Open(str(export(tmp_path / "foreign.usda", tmp_path / "out.usdz", arkit=True)))
+    assert [str(prim.GetPath()) for prim in made.TraverseAll()] == ["/World", "/World/Things", "/World/Things/box"]
+
+
 @pytest.mark.parametrize("ending", [".usda", ".usdc"])
 def test_flat_usd_keeps_the_graph_and_its_images(root, room, tmp_path, ending):
     path = export(root, tmp_path / "out" / f"room{ending}")
