@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.output import safe, say, say_json
+from echousd.cli.output import one_line, safe, say, say_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,12 +40,13 @@ def check(
 ) -> None:
     """Check rooms: relations, collisions, placement, living rules in all their layouts, and their USD.
 
-    Of several rooms each gets a line, with --json an entry of one list.
+    Of several rooms each gets a line, with --json an entry of one list, those that cannot be read as well.
     """
     from echousd.room.found import rooms_at
 
     found = [path for place in room for path in rooms_at(place)]
     reports = [_one(path, json, rules, layout, strict, settle, alone=len(found) == 1) for path in found]
+    unread = sum("error" in told for _, told in reports)
     if json:
         say_json(
             reports[0][1]
@@ -55,7 +56,9 @@ def check(
         )
     elif len(found) > 1:
         good = sum(ok for ok, _ in reports)
-        say(f"{good} of {len(found)} rooms are good")
+        say(f"{good} of {len(found)} rooms are good" + f", {unread} cannot be read" * bool(unread))
+    if unread:
+        raise typer.Exit(2)
     if not all(ok for ok, _ in reports):
         raise typer.Exit(1)
 
@@ -63,10 +66,21 @@ def check(
 def _one(
     room: Path, json: bool, rules: str, layout: int | None, strict: bool, settle: bool, *, alone: bool
 ) -> tuple[bool, dict[str, Any]]:
-    """Check one room and show what was found, in a line unless it is alone: whether it is good, and the report."""
+    """Check one room and show what was found, in a line unless it is alone: whether it is good, and the report.
+
+    Raises ValueError for one that cannot be read if it is alone; of several, that is its report.
+    """
     from echousd.checks import check as checked
 
-    report = checked(room, rules=rules, layout=layout, settle=settle)
+    try:
+        report = checked(room, rules=rules, layout=layout, settle=settle)
+    except (ValueError, OSError) as error:
+        if alone:
+            raise
+        why = str(error).removeprefix(f"{room}: ")
+        if not json:
+            say(f"no  {room}  {one_line(why)}")
+        return False, {"ok": False, "error": why}
     good = report.good(strict=strict)
     if not json and alone:
         _show(report, strict)

@@ -30,6 +30,25 @@ def test_a_folder_and_a_pattern_of_rooms(rooms, echousd_command):
     assert "ok" in json.loads(echousd_command("check", rooms / "a", "--json").out)
 
 
+def test_a_room_that_cannot_be_read_costs_no_other_its_report(rooms, echousd_command):
+    good = json.loads(echousd_command("check", rooms / "b", "--json").out)
+    broken = rooms / "a" / "a.usda"
+    broken.write_text("#usda 1.0\ndef (")
+    done = echousd_command("check", rooms)
+    lines = done.out.splitlines()
+    assert done.code == 2
+    assert lines[0].startswith(f"no  {broken}  not a USD file that can be read (")
+    assert lines[1].startswith(f"ok  {rooms / 'b' / 'b.usda'}") == good["ok"]
+    assert lines[2] == f"{int(good['ok'])} of 2 rooms are good, 1 cannot be read"
+    done = echousd_command("check", rooms, rooms / "gone.usda", "--json")
+    first, second, third = json.loads(done.out)
+    assert done.code == 2
+    assert (first["room"], first["ok"]) == (str(broken), False)
+    assert first["error"].startswith("not a USD file that can be read (")
+    assert second == {"room": str(rooms / "b" / "b.usda"), **good}
+    assert third == {"room": str(rooms / "gone.usda"), "ok": False, "error": "no such file"}
+
+
 def test_commands_of_one_room_take_its_folder(rooms, echousd_command):
     done = echousd_command("render", rooms / "a", "-o", rooms / "a.png", "--size", "32")
     assert done.code == 0, done.err
