@@ -42,8 +42,10 @@ def check(
 
     Of several rooms each gets a line, with --json an entry of one list, those that cannot be read as well.
     """
+    from echomodel.rules import rule_set
     from echousd.room.found import rooms_at
 
+    rule_set(rules)  # known, before each room tells that it is not
     found = [path for place in room for path in rooms_at(place)]
     reports = [_one(path, json, rules, layout, strict, settle, alone=len(found) == 1) for path in found]
     unread = sum("error" in told for _, told in reports)

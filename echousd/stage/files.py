@@ -213,14 +213,18 @@ def write_all(files: Mapping[Path, bytes], *, left: str = "nothing was changed")
     Raises ValueError where that is impossible, and takes folders that it made away again.
     """
     path, made = Path(), list[Path]()
+    for taken in (path for path in files if path.is_dir()):  # found out by the rename alone, after others
+        raise ValueError(f"{taken}: cannot be written (a folder has that name); {left}")
     try:
         with ExitStack() as held:
             for path, content in files.items():
                 made += [place for place in path.parents if not place.exists()]
                 path.parent.mkdir(parents=True, exist_ok=True)
                 held.enter_context(whole_file(path)).write_bytes(content)
+            if len(files) > 1:  # from here on they take their names, one after the other
+                left = "others that belong to it may have been"
     except OSError as error:
         for place in sorted(made, key=lambda place: len(place.parts), reverse=True):
             with suppress(OSError):  # somebody else has put something into it
                 place.rmdir()
-        raise ValueError(f"{path}: cannot be written ({error.strerror or error}); {left}") from None
+        raise ValueError(f"{error.filename or path}: cannot be written ({error.strerror or error}); {left}") from None

@@ -46,6 +46,8 @@ def test_a_room_that_cannot_be_read_costs_no_other_its_report(rooms, echousd_com
     assert (first["room"], first["ok"]) == (str(broken), False)
     assert first["error"].startswith("not a USD file that can be read (")
     assert second == {"room": str(rooms / "b" / "b.usda"), **good}
+    done = echousd_command("check", rooms, "--rules", "lax")
+    assert (done.code, done.out) == (2, "")
     assert third == {"room": str(rooms / "gone.usda"), "ok": False, "error": "no such file"}
 
 
