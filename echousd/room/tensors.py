@@ -11,9 +11,10 @@ from echousd.graph import SceneGraph
 
 
 def graph_batch(graph: SceneGraph) -> GraphBatch:
-    """The graph as tensors; relations in their order."""
+    """The graph as tensors; relations and placements in their order."""
     words = vocabulary()
     index = {node.name: i for i, node in enumerate(graph.nodes)}
+    kinds = [row.name for row in words.placements]
     return GraphBatch.single(
         [words.category_id(node.category) for node in graph.nodes],
         [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations],
@@ -21,6 +22,10 @@ def graph_batch(graph: SceneGraph) -> GraphBatch:
         floor=graph.room.floor_polygon or graph.room.size,
         names=[node.name for node in graph.nodes],
         openings=graph.room.openings,
+        placements=[
+            (index[one.subject], kinds.index(one.placement), *([index[name] for name in one.others] or (-1, -1)))
+            for one in graph.placements
+        ],
     )
 
 

@@ -29,6 +29,8 @@ class GraphBatch:
             with NaN, all NaN = unknown.
         names: N node names, or None.
         openings: (S, O, ROW) float32, doors and windows (`echomodel.openingrows`), padded with NaN; None = none.
+        placements: (P, 4) int64, [subject, position in the vocabulary's placements, and the two other nodes that it
+            names, -1 where it names none]; None = none.
 
     Raises:
         ValueError: a tensor has the wrong shape, dtype or device.
@@ -41,14 +43,18 @@ class GraphBatch:
     floor: Tensor
     names: tuple[str, ...] | None = None
     openings: Tensor = None  # type: ignore[assignment]
+    placements: Tensor = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         nodes, scenes = len(self.category), len(self.room_type)
         if self.openings is None:
             object.__setattr__(self, "openings", self.floor.new_zeros(scenes, 0, ROW))
+        if self.placements is None:
+            object.__setattr__(self, "placements", self.triplets.new_zeros(0, 4))
         expected: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
             "category": ((nodes,), torch.int64),
             "triplets": ((len(self.triplets), 3), torch.int64),
+            "placements": ((len(self.placements), 4), torch.int64),
             "scene": ((nodes,), torch.int64),
             "room_type": ((scenes,), torch.int64),
             "floor": ((scenes, max(1, self.floor.shape[1] if self.floor.ndim == 3 else 4), 2), torch.float32),
@@ -74,6 +80,7 @@ class GraphBatch:
         floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None = None,
         names: Sequence[str] | None = None,
         openings: Sequence[Opening] = (),
+        placements: Sequence[Sequence[int]] | Tensor = (),
     ) -> GraphBatch:
         """One scene graph from plain lists; arguments as in the class.
 
@@ -89,6 +96,7 @@ class GraphBatch:
             floor=(corners := centred(floor))[None],
             names=None if names is None else tuple(names),
             openings=opening_rows(() if floor is None else openings, corners.numpy())[None],
+            placements=torch.as_tensor(placements, dtype=torch.int64).reshape(-1, 4),
         )
 
     @classmethod
@@ -110,9 +118,10 @@ class GraphBatch:
         graphs = list(graphs)
         if not graphs:
             raise ValueError("GraphBatch.pack needs at least one graph, got none")
-        triplets, scenes, nodes, count = [], [], 0, 0
+        triplets, placements, scenes, nodes, count = [], [], [], 0, 0
         for graph in graphs:
             triplets.append(graph.triplets + graph.triplets.new_tensor([nodes, 0, nodes]))
+            placements.append(_shifted(graph.placements, nodes))
             scenes.append(graph.scene + count)
             nodes += graph.num_nodes
             count += graph.num_scenes
@@ -125,12 +134,13 @@ class GraphBatch:
             floor=padded([graph.floor for graph in graphs]),
             names=None if any(n is None for n in names) else tuple(name for n in names for name in n or ()),
             openings=padded_rows([graph.openings for graph in graphs]),
+            placements=torch.cat(placements),
         )
 
     def unpack(self) -> list[GraphBatch]:
         """One graph per scene, the inverse of `pack`."""
         counts = self.node_counts.tolist()
-        owner = self.scene[self.triplets[:, 0]]
+        owner, placed = self.scene[self.triplets[:, 0]], self.scene[self.placements[:, 0]]
         out, start = [], 0
         for number, count in enumerate(counts):
             triplets = self.triplets[owner == number]
@@ -143,6 +153,7 @@ class GraphBatch:
                     floor=trimmed(self.floor[number : number + 1]),
                     names=None if self.names is None else self.names[start : start + count],
                     openings=_there(self.openings[number : number + 1]),
+                    placements=_shifted(self.placements[placed == number], -start),
                 )
             )
             start += count
@@ -192,6 +203,9 @@ class GraphBatch:
         _within("predicate of triplet", self.triplets[:, 1], predicates)
         _within("subject of triplet", self.triplets[:, 0], self.num_nodes)
         _within("object of triplet", self.triplets[:, 2], self.num_nodes)
+        _within("subject of placement", self.placements[:, 0], self.num_nodes)
+        _within("word of placement", self.placements[:, 1], len(words.placements))
+        _within("other object of placement", self.placements[:, 2:].clamp_min(0), self.num_nodes)
         subject, target = self.triplets[:, 0], self.triplets[:, 2]
         for text, wrong in (
             ("relates a node to itself", subject == target),
@@ -210,6 +224,12 @@ class GraphBatch:
             middle = (used.amax(0) + used.amin(0)) / 2 if len(used) else used.new_zeros(2)
             if float(middle.abs().max()) > 1e-3:
                 raise ValueError(f"floor of scene {at} has its middle at {middle.tolist()} m, expected [0.0, 0.0]")
+
+
+def _shifted(placements: Tensor, nodes: int) -> Tensor:
+    """Placements whose nodes are counted from elsewhere."""
+    moved = placements + placements.new_tensor([nodes, 0, nodes, nodes])
+    return torch.where(placements < 0, placements, moved)
 
 
 def _there(rows: Tensor) -> Tensor:

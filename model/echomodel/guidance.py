@@ -1,14 +1,20 @@
-"""Relation guidance: at every step boxes are nudged towards the relations, onto the floor and out of doorways."""
+"""Guidance: at every step boxes are nudged towards relations and placements, onto the floor, out of doorways."""
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.floors import footprint, signed_distance
 from echomodel.openingrows import kept_free
-from echomodel.rules import margins, measured
+from echomodel.rules import fronts, margins, measured
+from echomodel.rules.placements import Spread, Stated, Walls, margin_of
 from echomodel.samplers import Predict
 from echomodel.vocabulary import vocabulary
 
@@ -25,8 +31,10 @@ def relation_guided(
     rounds: int = 2,
     floor: Tensor | None = None,
     openings: Tensor | None = None,
+    category: Tensor | None = None,
+    placements: Tensor | None = None,
 ) -> Predict:
-    """Follow `predict` by gradient steps on the missed margins of the relations, in the normalised box space.
+    """Follow `predict` by gradient steps on the missed margins of relations and placements, in the normalised space.
 
     This is reconstruction guidance (Chung et al. 2023, posterior sampling) with the rules' margins as the measurement;
     nodes at level 0 stay as they are, and the noisier a node the smaller its step.
@@ -42,12 +50,19 @@ def relation_guided(
             unknown.
         openings: (N, O, ROW) float32, what each node must keep out of the way of (`echomodel.openingrows`), NaN = none;
             None = no node of any.
+        category: (N,) int64, whose fronts `symmetrical_to` and the placements ask for; None = none has one.
+        placements: (P, 4) int64 (`GraphBatch.placements`), which need `category`; None = none.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
     wanted = triplets[torch.isin(triplets[:, 1], known)]
-    if not len(wanted) and floor is None and openings is None:
+    stated = [] if placements is None or category is None else _stated(placements, category, floor)
+    if not len(wanted) and floor is None and openings is None and not stated:
         return predict
-    weights = [entry.emphasis for entry in vocabulary().predicates]
+    words = vocabulary()
+    headed = None
+    if category is not None:
+        headed = fronts(words.categories[k].name for k in category.tolist()).to(category.device)
+    weights = [entry.emphasis for entry in words.predicates]
     emphasis = torch.tensor(weights, device=wanted.device)[wanted[:, 1]]
 
     def guided(x: Tensor, level: Tensor) -> Tensor:
@@ -57,7 +72,7 @@ def relation_guided(
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()
                 boxes = Boxes.decode(free, scale)
-                missed = (SLACK - margins(boxes, wanted, rules=rules, rigid=True)).clamp(min=0)
+                missed = (SLACK - margins(boxes, wanted, rules=rules, fronts=headed, rigid=True)).clamp(min=0)
                 # the logarithm bounds the pull of a relation that is missed by far
                 pull = (torch.log1p(missed / SLACK) * emphasis).sum()
                 if floor is not None:
@@ -68,12 +83,43 @@ def relation_guided(
                     rigid = Boxes(boxes.size.detach(), boxes.position, boxes.yaw)  # none is asked to shrink
                     blocked = (SLACK - kept_free(rigid, openings)).clamp_min(0)
                     pull = pull + torch.log1p(blocked / SLACK).sum()
+                for group in stated:
+                    pull = pull + torch.log1p((SLACK - group(boxes)).clamp_min(0) / SLACK).sum()
                 (slope,) = torch.autograd.grad(pull * SLACK, free)
             norm = slope.norm(dim=1, keepdim=True).clamp_min(1e-6)
             clean = clean - strength * weight * slope * (1 / norm).clamp(max=1 / 0.05)
         return clean
 
     return guided
+
+
+def _stated(placements: Tensor, category: Tensor, floor: Tensor | None) -> list[Callable[[Boxes], Tensor]]:
+    """The margins (K,) of all placements as functions of the boxes; those of one kind and floor are measured at once.
+
+    What needs walls where none are known is left out.
+    """
+    words, groups = vocabulary(), defaultdict(list)
+    for row in placements.tolist():
+        corners = None if floor is None else floor[row[0]].double().cpu().numpy()
+        key = b"" if corners is None else corners[np.isfinite(corners).all(1)].tobytes()
+        groups[row[1], int(category[row[0]]), key].append(row)
+    out: list[Callable[[Boxes], Tensor]] = []
+    for (kind, number, key), rows in groups.items():
+        corners = np.frombuffer(key).reshape(-1, 2).copy()
+        walls = Walls(corners).to(category.device) if len(corners) else None
+        if walls is None and not words.placements[kind].others:
+            continue
+        nodes = [torch.tensor(column, device=category.device) for column in zip(*rows, strict=True)]
+        named = [n for n in (nodes[0], *nodes[2:]) if int(n[0]) >= 0]
+        told = Stated(words.placements[kind].name, 0, tuple(range(1, len(named))))
+        out.append(partial(_placement_margin, told, named, walls, words.categories[number].name))
+    return out
+
+
+def _placement_margin(told: Stated, nodes: list[Tensor], walls: Walls | None, word: str, boxes: Boxes) -> Tensor:
+    size = boxes.size.detach()  # none is asked to shrink
+    every = [Spread(size[n].double(), boxes.position[n].double(), boxes.yaw[n].double()) for n in nodes]
+    return margin_of(told, every, walls, [word]).float()
 
 
 def outside(boxes: Boxes, floor: Tensor) -> Tensor:

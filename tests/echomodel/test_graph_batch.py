@@ -22,13 +22,18 @@ def graphs(draw: st.DrawFn) -> GraphBatch:
     corner = ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 3.0), (2.0, 2.0), (0.0, 2.0))
     floor = draw(st.one_of(st.none(), st.just((4.0, 3.0)), st.just(corner)))
     categories = draw(st.lists(st.integers(0, 45), min_size=nodes, max_size=nodes))
+    places = draw(st.lists(st.tuples(st.integers(0, nodes - 1), st.just(0), st.just(-1), st.just(-1)), max_size=3))
+    if nodes > 2:
+        places += draw(st.lists(st.just((nodes - 1, 2, 0, 1)), max_size=1))
     return GraphBatch.single(
-        categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, names=[f"n{i}" for i in range(nodes)]
-    )
+        categories, triplets, room_type=draw(st.integers(0, 4)), floor=floor, names=[f"n{i}" for i in range(nodes)],
+        placements=places,
+    )  # fmt: skip
 
 
 def equal(a: GraphBatch, b: GraphBatch) -> bool:
-    same = all(torch.equal(getattr(a, k), getattr(b, k)) for k in ("category", "triplets", "scene", "room_type"))
+    fields = ("category", "triplets", "scene", "room_type", "placements")
+    same = all(torch.equal(getattr(a, k), getattr(b, k)) for k in fields)
     return same and torch.equal(a.floor.nan_to_num(-1), b.floor.nan_to_num(-1)) and a.names == b.names
 
 

@@ -11,7 +11,9 @@ from echomodel.floors import rectangle
 from echomodel.guidance import outside, relation_guided
 from echomodel.openingrows import kept_free, opening_rows
 from echomodel.openings import Opening
-from echomodel.rules import verdicts
+from echomodel.rules import fronts, verdicts
+from echomodel.rules.placements import Stated, placement_margins
+from echomodel.vocabulary import vocabulary
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 # 0 is to the right of 1 (larger z), close by it, and bigger than it
@@ -104,3 +106,54 @@ def test_furniture_is_pulled_out_of_the_way_of_doors() -> None:
     assert kept_free(guided, rows).min() > 0
     torch.testing.assert_close(guided.position[1], boxes.position[1])
     torch.testing.assert_close(guided.size, boxes.size)
+
+
+def test_placements_are_guided_to() -> None:
+    words = vocabulary()
+    kinds = [row.name for row in words.placements]
+    category = torch.tensor([words.category_id(word) for word in ("wardrobe", "plant", "coffee_table", "sofa")])
+    boxes = Boxes(
+        torch.full((4, 3), 0.5),
+        torch.tensor([[0.7, 0.0, 0.4], [0.8, 0.0, -0.8], [-1.2, 0.0, 1.2], [1.2, 0.0, 1.2]]),
+        torch.tensor([3.0, 0.0, 0.0, 0.0]),
+    )
+    rows = [[0, kinds.index("against_wall"), -1, -1], [1, kinds.index("in_corner"), -1, -1],
+            [2, kinds.index("between"), 1, 3]]  # fmt: skip
+    stated = [Stated("against_wall", 0), Stated("in_corner", 1), Stated("between", 2, (1, 3))]
+    floor = rectangle(4.0, 4.0)
+    words_of = [words.categories[k].name for k in category.tolist()]
+    assert (placement_margins(boxes, stated, floor.numpy(), words_of) < 0).all()
+    x, none = boxes.encode(STATISTICS.scale()), torch.zeros(0, 3, dtype=torch.int64)
+    pull = relation_guided(
+        lambda x, level: x, none, STATISTICS.scale(), rules="strict", strength=0.05, rounds=300,
+        floor=floor.expand(4, -1, -1), category=category, placements=torch.tensor(rows),
+    )  # fmt: skip
+    guided = Boxes.decode(pull(x, torch.full((4,), 0.1)), STATISTICS.scale())
+    assert (placement_margins(guided, stated, floor.numpy(), words_of) > -0.01).all()
+    torch.testing.assert_close(guided.size, boxes.size)
+
+
+def test_without_walls_only_what_needs_none_is_guided() -> None:
+    kinds = [row.name for row in vocabulary().placements]
+    rows = torch.tensor([[0, kinds.index("against_wall"), -1, -1]])
+    x, none = start().encode(STATISTICS.scale()), torch.zeros(0, 3, dtype=torch.int64)
+    pull = relation_guided(
+        lambda x, level: x, none, STATISTICS.scale(), rules="strict", strength=0.2, category=torch.zeros(2).long(),
+        placements=rows,
+    )  # fmt: skip
+    torch.testing.assert_close(pull(x, torch.full((2,), 0.1)), x)
+
+
+def test_beds_that_mirror_each_other_are_turned_alike() -> None:
+    words = vocabulary()
+    category = torch.tensor([words.category_id("single_bed")] * 2)
+    triplets = torch.tensor([[0, words.predicate_id("symmetrical_to"), 1]])
+    size = torch.tensor([[0.9, 0.5, 2.0]] * 2)
+    boxes = Boxes(size, torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]), torch.tensor([torch.pi / 2, torch.pi]))
+    headed = fronts(["single_bed"] * 2)
+    assert verdicts(boxes, triplets, fronts=headed).tolist() == [0]
+    pull = relation_guided(
+        lambda x, level: x, triplets, STATISTICS.scale(), rules="strict", strength=0.1, rounds=100, category=category
+    )
+    guided = Boxes.decode(pull(boxes.encode(STATISTICS.scale()), torch.full((2,), 0.1)), STATISTICS.scale())
+    assert verdicts(guided, triplets, fronts=headed).tolist() == [1]

@@ -105,7 +105,7 @@ def _denoised(
         conditional = relation_guided(
             conditional, graph.triplets, scale,
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
-            openings=_in_the_way(graph),
+            openings=_in_the_way(graph), category=graph.category, placements=graph.placements,
         )  # fmt: skip
     vectors = sample(
         how.sampler or config.sampler, conditional,

@@ -1,10 +1,11 @@
 """Placements as rules: against a wall, in a corner, between two others, each with a margin in metres.
 
-As relations beyond SG-FRONT they are measured, repaired and checked; the networks do not know them.
+As relations beyond SG-FRONT they are measured, guided to, repaired and checked; the networks do not know them.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
@@ -71,6 +72,13 @@ class Walls:
         self.normal = sign * torch.stack([-self.along[:, 1], self.along[:, 0]], 1)
         before = self.along.roll(1, 0)
         self.inner = sign * (before[:, 0] * self.along[:, 1] - before[:, 1] * self.along[:, 0]) > 0.1
+
+    def to(self, device: torch.device | str) -> Walls:
+        """The same walls on another device."""
+        moved = copy.copy(self)
+        for name, values in vars(self).items():
+            setattr(moved, name, values.to(device))
+        return moved
 
     def away(self, points: Tensor) -> Tensor:
         """(..., E) distance of points (..., 2) from the line of every wall, inwards positive."""
