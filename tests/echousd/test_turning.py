@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from echousd.export import export
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
 from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.openings import Opening
-from echousd.checks import check_room
+from echousd.checks import check
+from echousd.exporting import export
 from echousd.graph import RoomSpec
 from echousd.room import RoomOptions
 from echousd.room.reading import read_room
@@ -84,7 +84,7 @@ def test_every_prim_is_where_it_was_turned(roots):
 
 
 def test_it_passes_check_and_is_read_and_edited_like_the_other(roots, tmp_path):
-    assert not check_room(roots["Z"]).errors
+    assert not check(roots["Z"]).errors
     y_up, z_up = (read_room(roots[up]) for up in ("Y", "Z"))
     np.testing.assert_allclose(z_up.boxes.position, y_up.boxes.position, atol=1e-5)
     np.testing.assert_allclose(z_up.boxes.yaw, y_up.boxes.yaw, atol=1e-5)

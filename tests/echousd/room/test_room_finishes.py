@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from echousd.check.validity import find_faults
-from echousd.export import export
 from PIL import Image
 from pxr import Usd, UsdShade
 from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.data.furniture.solids import Block
+from echousd.checks.validity import find_faults
+from echousd.exporting import export
 from echousd.room import RoomOptions
 from echousd.room.finishes import baking
 from echousd.room.finishes.harmonies import HARMONIES, linear
