@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from echomodel.boxes import Boxes
-from echousd.graph import SceneGraph
+from echousd.graph import Relation, SceneGraph
 from echousd.repair.living import living_faults
 from echousd.room.clearing.scene import REACH, Scene, scene_of
 from echousd.room.geometry import Geometry
@@ -170,10 +170,15 @@ def _unbroken(graph: SceneGraph, boxes: Boxes) -> set[int]:
 
 
 def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: set[int] | frozenset[int]) -> list[int]:
-    """A group and what it would leave behind: the free other ends of some relations, with all that stands on them."""
+    """A group and what it would leave behind: all whom some relations name and who are free, with what stands on them.
+
+    Arguments:
+        broken: numbers of verdicts, those of the relations and after them those of the placements.
+    """
     out = list(group)
-    for row in sorted(broken):
-        for name in (graph.relations[row].subject, graph.relations[row].object):
+    told = (*graph.relations, *graph.placements)
+    for one in (told[row] for row in sorted(broken)):
+        for name in (one.subject, one.object) if isinstance(one, Relation) else (one.subject, *one.others):
             number = graph.names.index(name)
             if number not in out and not scene.fixed[number]:
                 out += [one for one in scene.carried(number) if one not in out]

@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 from echomodel.boxes import Boxes
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.openings import Opening
+from echousd.graph.sentences import stating
 from echousd.room.clearing import cleared
 from echousd.room.clearing.nofit import depth, forbidden, forbidden_moves
 from echousd.room.geometry import Collider, Geometry, Origin, Part
@@ -132,6 +133,18 @@ def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
     found = cleared(fixed, boxes, geometry, FLOOR, walls=False)
     assert verdicts_of(fixed, found.boxes) == ["kept"]
     assert {found.collisions[0].first, found.collisions[0].second} == {"wardrobe", "bed"}
+
+
+def test_what_stands_in_a_corner_still_does_when_it_is_moved_apart():
+    plant, shelf = piece(board((0.4, 1.0, 0.4), (0, 0, 0))), piece(board((0.8, 1.8, 0.3), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("fern", "plant", plant, (-1.75, 0, -1.75), 0.0, False),
+        ("bookshelf", "bookshelf", shelf, (-1.2, 0, -1.8), 0.0, False),
+    )
+    graph = stating(graph, "fern in corner")
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert verdicts_of(graph, found.boxes) == ["kept"]
 
 
 def verdicts_of(graph, boxes):
