@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Gf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echousd.checks.findings import Finding, Rule, distinct_prims, prims
 from echousd.stage.encoding import StageError
@@ -13,7 +13,8 @@ from echousd.stage.values import MeshArrays, array, mesh_arrays
 
 UNIT = 0.05  # how far the length of a normal may be from 1
 EXTENT = 1e-3  # how far an extent may be from the points, in shares of their diagonal
-HINT = 0.1  # the same of a component, whose parts open and have levels of detail
+HINT = 0.1  # the same of a component, which has levels of detail
+ARTICULATION = "articulation"  # variant set of what has doors and drawers
 AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
@@ -87,14 +88,50 @@ def _hints(stage: Usd.Stage) -> Iterator[Finding]:
         try:
             hint = array(attribute, 3)[:2]
             found = cache.ComputeUntransformedBound(prim).ComputeAlignedRange()
+            box = np.array([found.GetMin(), found.GetMax()])
+            still = _still(cache, prim, box)
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
         if found.IsEmpty():
             continue
-        box = np.array([found.GetMin(), found.GetMax()])
         slack = HINT * np.linalg.norm(box[1] - box[0])
-        if hint.shape != (2, 3) or np.abs(hint - box).max() > slack:
+        low, high = np.stack([box, still], 1)  # of what is seen, and of what must be in the hint
+        within = hint.shape == (2, 3) and (low[0] - slack <= hint[0]).all() and (hint[1] <= high[0] + slack).all()
+        if not within or (hint[0] > low[1] + slack).any() or (hint[1] < high[1] - slack).any():
             yield Finding(prim.GetPath(), f"extentsHint is {_shown(hint)}, its meshes reach {_shown(box)}")
+
+
+def _still(cache: UsdGeom.BBoxCache, component: Usd.Prim, box: np.ndarray) -> np.ndarray:
+    """(2, 3) float, a component's box without its doors and drawers, which may stand open.
+
+    Arguments:
+        box: that of all of it; the result where nothing moves. Where nothing else is, the result has its sides swapped.
+    """
+    below = list(Usd.PrimRange(component, Usd.TraverseInstanceProxies()))
+    joints = [UsdPhysics.Joint(prim) for prim in below if prim.IsA(UsdPhysics.Joint)]
+    moving = {path for joint in joints for path in joint.GetBody1Rel().GetTargets()}
+    frames = {component.GetPath(), *(path for joint in joints for path in joint.GetBody0Rel().GetTargets())}
+    for prim in below:
+        if prim.HasAPI(UsdPhysics.RigidBodyAPI) and prim.GetPath() not in frames:
+            moving.add(prim.GetPath())
+        if prim.GetVariantSets().HasVariantSet(ARTICULATION):  # not articulated, they are moved all the same
+            moving |= {each.GetPath() for each in below if each != prim and _placed(each, prim)}
+    if not moving:
+        return box
+    found = Gf.Range3d()
+    walk = iter(Usd.PrimRange(component, Usd.TraverseInstanceProxies()))
+    for prim in walk:
+        if prim.GetPath() in moving:
+            walk.PruneChildren()
+        elif prim.IsA(UsdGeom.Gprim):
+            found.UnionWith(cache.ComputeRelativeBound(prim, component).ComputeAlignedRange())
+    return np.array([found.GetMin(), found.GetMax()])  # an empty one has the least after the greatest
+
+
+def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
+    """Whether a prim below another is a group with a transform of its own."""
+    own = prim.IsA(UsdGeom.Xform) and prim.GetPath().HasPrefix(above.GetPath())
+    return bool(own and UsdGeom.Xformable(prim).GetXformOpOrderAttr().HasAuthoredValue())
 
 
 def winding(stage: Usd.Stage) -> Iterator[Finding]:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from pxr import Sdf, Usd, Vt
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
 from echousd.checks.validity import RULES, safely
 
@@ -68,6 +68,28 @@ def test_hints_are_the_boxes_of_what_is_shown(stage, thing):
     ((rule, path, message),) = found(stage)
     assert (rule, path) == ("echo:Extents", f"/Room/{thing}")
     assert message.startswith("extentsHint is (0, 0, 0) to (9, 9, 9), its meshes reach (-")
+
+
+@pytest.mark.parametrize("mark", ["", "joint", "body", "variants"])
+def test_what_stands_open_is_not_in_the_hint_of_what_it_belongs_to(stage, mark):
+    layer, wall = stage.GetRootLayer(), "/Room/Shell/Wall"
+    leaf = Sdf.CreatePrimInLayer(layer, f"{wall}/leaf")
+    leaf.specifier, leaf.typeName = Sdf.SpecifierDef, "Xform"
+    Sdf.CopySpec(layer, f"{wall}/nightstand_mesh", layer, f"{wall}/leaf/nightstand_mesh")
+    Sdf.CopySpec(layer, f"{wall}/nightstand_collider", layer, f"{wall}/leaf/nightstand_collider")
+    assert found(stage) == []
+    UsdGeom.Xformable(stage.GetPrimAtPath(leaf.path)).AddTranslateOp().Set((0, 0, 0.5))
+    if mark == "joint":
+        UsdPhysics.RevoluteJoint.Define(stage, f"{wall}/hinge").CreateBody1Rel().SetTargets([leaf.path])
+    elif mark == "body":
+        stage.GetPrimAtPath(wall).RemoveAPI(UsdPhysics.RigidBodyAPI)
+        UsdPhysics.RigidBodyAPI.Apply(stage.GetPrimAtPath(leaf.path))
+    elif mark == "variants":
+        stage.GetPrimAtPath(wall).GetVariantSets().AddVariantSet("articulation").AddVariant("static")
+    findings = [(rule, path) for rule, path, _ in found(stage) if rule == "echo:Extents"]
+    assert findings == ([] if mark else [("echo:Extents", wall)])
+    author(stage, f"{wall}.extentsHint", Vt.Vec3fArray([(0, 0, 0), (9, 9, 9)]))
+    assert ("echo:Extents", wall) in [(rule, path) for rule, path, _ in found(stage)]
 
 
 def test_indices_of_normals_name_normals(stage):

@@ -91,6 +91,7 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     from pxr import Usd, UsdGeom, UsdPhysics
 
     import echousd
+    from echousd.checks.mesh_rules import extents
     from echousd.graph import Node, RoomSpec, SceneGraph
 
     graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("chest", "dresser", size=(0.9, 1.0, 0.45)),), ())
@@ -118,3 +119,8 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
         assert str(ends[0]).endswith("_frame")
         slide = UsdPhysics.PrismaticJoint(joint)
         assert 0 == slide.GetLowerLimitAttr().Get() < slide.GetUpperLimitAttr().Get() < 0.45
+    drawer = UsdGeom.Xformable(stage.GetPrimAtPath(joints[0].GetBody1Rel().GetTargets()[0]))
+    drawer.AddTranslateOp().Set((0.0, 0.0, 0.4))
+    for state in ("articulated", "static"):  # pulled out, it is as good
+        chest.GetVariantSet("articulation").SetVariantSelection(state)
+        assert [str(found.path) for found in extents(stage)] == []

@@ -12,6 +12,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
 from echousd.checks import check
+from echousd.checks.mesh_rules import extents
 from echousd.graph import RoomSpec
 from echousd.room.room import RoomOptions
 from echousd.room.walls import WALL, ceiling, outline, walls
@@ -144,3 +145,7 @@ def test_doors_articulate(tmp_path) -> None:
         validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
         assert [e.GetMessage() for e in UsdValidation.ValidationContext(validators).Validate(stage)] == []
         assert check(tmp_path / up / f"{up}.usda").ok
+        for state in ("articulated", "static"):  # opened, it is as good
+            door.GetVariantSets().SetSelection("articulation", state)
+            leaf.GetAttribute("xformOp:rotateY").Set(90.0)
+            assert [one.message for one in extents(stage)] == []
