@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from echomodel.boxes import Boxes
-from echousd.graph import Relation, SceneGraph
+from echousd.graph import Placed, Relation, SceneGraph
 from echousd.repair.living import living_faults
 from echousd.room.clearing.scene import REACH, Scene, scene_of
 from echousd.room.geometry import Geometry
@@ -176,7 +176,7 @@ def _with_partners(scene: Scene, graph: SceneGraph, group: list[int], broken: se
         broken: numbers of verdicts, those of the relations and after them those of the placements.
     """
     out = list(group)
-    told = (*graph.relations, *graph.placements)
+    told: tuple[Relation | Placed, ...] = (*graph.relations, *graph.placements)
     for one in (told[row] for row in sorted(broken)):
         for name in (one.subject, one.object) if isinstance(one, Relation) else (one.subject, *one.others):
             number = graph.names.index(name)
