@@ -21,6 +21,7 @@ WINDOW_DEPTH = 0.35  # metres before a window where nothing tall stands
 STEP = 0.6  # metres before a door that a person needs to stand
 HIGHEST = 100.0  # metres of an opening's height and sill: more than any room has
 LONGEST = 10_000.0  # metres of its offset and width: longer than any wall
+PROPOSED = 12.0  # metres along a wall of a floor that nobody stated: so far a proposed floor grows for its openings
 TOUCH = 1e-6  # metres: neighbouring openings may share a jamb
 ARC = 9  # points on the arc of a swing
 
@@ -101,8 +102,8 @@ def check_openings(openings: Sequence[Opening], polygon: Any = None, height: flo
 
     Arguments:
         openings: of one room.
-        polygon: (k, 2) float, corners (x, z) of the floor in metres; None where it is unknown, then nothing is said
-            about the length of walls.
+        polygon: (k, 2) float, corners (x, z) of the floor in metres; None where it is unknown, then walls are taken
+            to be as long as any that is proposed.
         height: of the room, metres, None where it is unknown.
     """
     lengths = None if polygon is None else edge_lengths(polygon)
@@ -123,6 +124,11 @@ def check_openings(openings: Sequence[Opening], polygon: Any = None, height: flo
                     f"{said}: reaches from {opening.offset:.2f} to {opening.end:.2f} m along wall {opening.edge}, "
                     f"which is {length:.2f} m long; allowed: offset and width within it"
                 )
+        elif opening.end > PROPOSED:
+            raise ValueError(
+                f"{said}: ends at {opening.end:.2f} m along wall {opening.edge} of a floor that nobody stated, "
+                f"allowed: up to {PROPOSED:g} m, or say the size of the room"
+            )
         top = opening.sill + opening.height
         if height is not None and top > height + 1e-6:
             raise ValueError(f"{said}: its top is at {top:.2f} m, allowed: up to the room's height, {height:.2f} m")

@@ -52,6 +52,7 @@ def window(name: str = "window", edge: int = 1, offset: float = 0.5, **fields: o
         ({"width": float("nan")}, "opening 'door': width is nan, allowed: 0.1 or more, metres"),
         ({"offset": 1e300}, "opening 'door': offset is 1e+300, allowed: 0 to 10000, metres"),
         ({"height": 1e300}, "opening 'door': height is 1e+300, allowed: 0.1 to 100, metres"),
+        ({"offset": 1e300}, "opening 'door': offset is 1e+300, allowed: 0 to 10000, metres"),
         ({"width": 0}, "opening 'door': width is 0, allowed: 0.1 or more, metres"),
         ({"sill": 0.2}, "opening 'door': sill is 0.2, allowed: 0 for a door"),
     ],
@@ -83,6 +84,16 @@ def test_values_that_no_opening_has(fields: dict, said: str) -> None:
 def test_openings_that_do_not_fit(openings: list[Opening], height: float | None, said: str) -> None:
     with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
         check_openings(openings, ROOM, height)
+
+
+def test_no_proposed_floor_grows_endlessly_for_an_opening() -> None:
+    check_openings([door(offset=10.0)])
+    said = (
+        "door 'door': ends at 30.90 m along wall 0 of a floor that nobody stated, allowed: up to 12 m, "
+        "or say the size of the room"
+    )
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
+        check_openings([door(offset=30.0)])
 
 
 def test_openings_side_by_side_fit() -> None:
