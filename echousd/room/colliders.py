@@ -1,6 +1,8 @@
-"""Colliders of furniture that is one mesh: a hull, or the shape itself with few faces."""
+"""Colliders of furniture that is one mesh: a hull, or convex pieces that follow the shape."""
 
 from __future__ import annotations
+
+from importlib.util import find_spec
 
 import fast_simplification
 import numpy as np
@@ -8,14 +10,60 @@ import trimesh
 
 from echomodel.vocabulary import vocabulary
 from echousd.room.geometry import Collider
+from echousd.room.meshing import decimate
 
-FACES, HULL_FACES = 400, 120
+FACES, HULL_FACES, PIECES_FACES = 400, 120, 1200
+PIECES, CORNERS = 16, 32  # convex pieces of a shape at most, corners of each
+COARSE = 0.08  # CoACD's concavity: what is left of a shape's hollows, of its size
+SEARCH = {"mcts_iterations": 20, "mcts_nodes": 10, "resolution": 500}  # a second a piece rather than ten
+LEAST_VOLUME = 1e-7  # m³ of a piece that is one
 FLAT = 0.012  # metres: what is as near to the top or the bottom belongs to it
 
 
 def approximation(category: str) -> str:
     """The UsdPhysics approximation of a category's collider, `convexHull` or `convexDecomposition`."""
     return "convexHull" if vocabulary().category(category).solid else "convexDecomposition"
+
+
+def colliders_of(mesh: trimesh.Trimesh, category: str) -> tuple[Collider, ...]:
+    """What a piece of furniture collides with: one hull of what is solid or convex, else convex pieces.
+
+    Arguments:
+        mesh: in the object's frame, metres. category: its word.
+    """
+    if approximation(category) == "convexHull" or mesh.is_convex:
+        return (standing_hull(mesh),)
+    if not find_spec("coacd"):  # no wheel for this machine
+        return (collider(mesh, category),)
+    pieces = convex_pieces(mesh)
+    low, high = np.min([p.bounds[0] for p in pieces], axis=0), np.max([p.bounds[1] for p in pieces], axis=0)
+    out = []
+    for number, piece in enumerate(pieces):
+        share = (np.asarray(piece.vertices) - low) / np.maximum(high - low, 1e-9)
+        hull = trimesh.convex.convex_hull(snapped(mesh.bounds[0] + share * np.ptp(mesh.bounds, axis=0), mesh.bounds))
+        out.append(Collider("collider" if len(pieces) == 1 else f"collider_{number + 1}", hull, "convexHull"))
+    return tuple(out)
+
+
+def convex_pieces(mesh: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+    """Hulls that follow a shape together (CoACD, Wei et al. 2022), the same ones each time; its hull where it is flat.
+
+    Arguments:
+        mesh: any; one that is not closed is closed by voxels.
+    """
+    import coacd
+
+    coacd.set_log_level("error")
+    closed = mesh.copy()
+    closed.merge_vertices(merge_tex=True, merge_norm=True)
+    light = decimate(closed, PIECES_FACES)
+    way = "off" if light.is_watertight else "on"
+    found = coacd.run_coacd(
+        coacd.Mesh(np.asarray(light.vertices, float), np.asarray(light.faces, np.int32)), threshold=COARSE,
+        max_convex_hull=PIECES, preprocess_mode=way, decimate=True, max_ch_vertex=CORNERS, seed=0, **SEARCH,
+    )  # fmt: skip
+    hulls = [trimesh.Trimesh(points, faces).convex_hull for points, faces in found]
+    return [hull for hull in hulls if hull.volume > LEAST_VOLUME] or [mesh.convex_hull]
 
 
 def collider(mesh: trimesh.Trimesh, category: str) -> Collider:
@@ -40,12 +88,17 @@ def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:
     """
     low, high = mesh.bounds
     share = (np.asarray(mesh.vertices) - low) / np.maximum(high - low, 1e-9)
-    points = bounds[0] + share * (bounds[1] - bounds[0])
+    points = snapped(bounds[0] + share * (bounds[1] - bounds[0]), bounds)
+    return trimesh.Trimesh(points, mesh.faces, process=False)
+
+
+def snapped(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
+    """(n, 3) float: points with those near the lowest or the highest plane of `bounds` (2, 3) on it."""
     bottom, top = bounds[0][1], bounds[1][1]
     reach = min(FLAT, 0.1 * (top - bottom))
-    points[:, 1] = np.where(points[:, 1] < bottom + reach, bottom, points[:, 1])
-    points[:, 1] = np.where(points[:, 1] > top - reach, top, points[:, 1])
-    return trimesh.Trimesh(points, mesh.faces, process=False)
+    height = points[:, 1]
+    height = np.where(height < bottom + reach, bottom, np.where(height > top - reach, top, height))
+    return np.column_stack([points[:, 0], height, points[:, 2]])
 
 
 def soles(mesh: trimesh.Trimesh, directions: int = 16) -> np.ndarray:

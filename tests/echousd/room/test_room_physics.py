@@ -7,7 +7,7 @@ from pxr import Usd, UsdGeom
 
 from echomodel.vocabulary import vocabulary
 from echousd.room.ballast import ballasted
-from echousd.room.colliders import collider
+from echousd.room.colliders import collider, colliders_of
 from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.room.masses import mass_of, read_mass
 from echousd.room.meshing import box_mesh
@@ -80,3 +80,24 @@ def test_what_would_topple_has_ballast_in_its_base():
     assert ballasted(found, solids) is found
     steady = Mass(4.0, np.array([0.05, 0.3, 0.0]), light.inertia, light.axes)
     assert ballasted(steady, solids) is steady
+
+
+def test_what_is_hollow_collides_by_convex_pieces():
+    pytest.importorskip("coacd")
+    legs = [trimesh.creation.box((0.05, 0.7, 0.05)) for _ in range(4)]
+    for leg, (x, z) in zip(legs, ((-0.4, -0.3), (0.4, -0.3), (-0.4, 0.3), (0.4, 0.3)), strict=True):
+        leg.apply_translation((x, 0.35, z))
+    top = trimesh.creation.box((0.9, 0.05, 0.7))
+    top.apply_translation((0, 0.71, 0))
+    table = trimesh.boolean.union([top, *legs], engine="manifold")
+    found = colliders_of(table, "dining_table")
+    assert len(found) >= 5
+    assert {piece.approximation for piece in found} == {"convexHull"}
+    assert len({piece.name for piece in found}) == len(found)
+    assert all(piece.mesh.is_convex and piece.mesh.is_watertight for piece in found)
+    corners = np.concatenate([piece.mesh.vertices for piece in found])
+    np.testing.assert_allclose([corners.min(0), corners.max(0)], table.bounds, atol=1e-6)
+    assert sum(piece.mesh.volume for piece in found) == pytest.approx(table.volume, rel=0.3)  # its hull: ten times
+    again = colliders_of(table, "dining_table")
+    assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
+    assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
