@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from scipy.spatial import cKDTree
 from trimesh.triangles import closest_point
 
@@ -60,9 +61,8 @@ def _reach(surface: RoomObject, solid: RoomObject) -> float:
     within = points[winding_number(points, solid.points[solid.faces]) > 0.5]
     if not len(within):
         return 0.0
-    rng = np.random.default_rng(0)
     triangles = solid.points[solid.faces]
-    skin = np.concatenate((solid.points, _scatter(triangles, 4000, rng)))
+    skin = np.concatenate((solid.points, _scatter(solid.points, solid.faces, 4000)))
     deepest = 0.0
     # A sample of the skin is further away than the skin itself: deepest first, until no point can be deeper.
     at_most = cKDTree(skin).query(within)[0]
@@ -77,25 +77,21 @@ def _reach(surface: RoomObject, solid: RoomObject) -> float:
 
 def surface_points(surface: RoomObject, solid: RoomObject) -> np.ndarray:
     """(s, 3) float: vertices and scattered points of a surface that lie in the other object's box."""
-    rng = np.random.default_rng(0)
-    triangles = surface.points[surface.faces]
-    near = triangles[_touches(triangles, solid)]
+    near = surface.faces[_touches(surface.points[surface.faces], solid)]
     if not len(near):
         return np.zeros((0, 3))
-    points = np.concatenate((near.reshape(-1, 3), _scatter(near, 4 * SAMPLES, rng)))
+    points = np.concatenate((surface.points[near].reshape(-1, 3), _scatter(surface.points, near, 4 * SAMPLES)))
     points = points[_within(points, solid)]
-    return points if len(points) <= SAMPLES else points[rng.choice(len(points), SAMPLES, replace=False)]
+    if len(points) <= SAMPLES:
+        return points
+    return points[np.random.default_rng(0).choice(len(points), SAMPLES, replace=False)]
 
 
-def _scatter(triangles: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
-    if area.sum() <= 0:
+def _scatter(points: np.ndarray, faces: np.ndarray, count: int) -> np.ndarray:
+    mesh = trimesh.Trimesh(points, faces, process=False)
+    if not mesh.area_faces.sum() > 0:
         return np.zeros((0, 3))
-    chosen = triangles[rng.choice(len(triangles), count, p=area / area.sum())]
-    u, v = rng.random((2, count, 1))
-    flip = u + v > 1
-    u, v = np.where(flip, 1 - u, u), np.where(flip, 1 - v, v)
-    return chosen[:, 0] + u * (chosen[:, 1] - chosen[:, 0]) + v * (chosen[:, 2] - chosen[:, 0])
+    return np.asarray(trimesh.sample.sample_surface(mesh, count, seed=0)[0])
 
 
 def _local(points: np.ndarray, solid: RoomObject) -> np.ndarray:

@@ -11,6 +11,7 @@ import shapely
 
 from echomodel.data.dressing import KINDS
 from echomodel.openings import Opening, free_area
+from echomodel.roomboxes import footprints
 from echomodel.vocabulary import Category, vocabulary
 from echousd.room.geometry import Geometry
 
@@ -174,11 +175,9 @@ def standing(
 
 def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
     """A rectangle in plan (x, z), `size` along its own x and z, turned by `yaw` about +Y."""
-    half = np.asarray(size, float) / 2
-    signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])
-    x, z = (signs * half).T
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return shapely.Polygon(np.stack([cos * x + sin * z, cos * z - sin * x], 1) + np.asarray(centre, float))
+    (wide, deep), (x, z) = size, centre
+    plan = footprints(np.array([[wide, 0.0, deep]]), np.array([[x, 0.0, z]]), np.array([yaw]))
+    return shapely.Polygon(plan[0])
 
 
 def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:

@@ -69,12 +69,6 @@ def room_figures(rooms: Sequence[RoomBoxes]) -> dict:
     }
 
 
-def polygon_area(polygon: np.ndarray) -> float:
-    """Area of a polygon (k, 2), square metres."""
-    x, z = polygon.T
-    return float(abs(np.dot(x, np.roll(z, -1)) - np.dot(z, np.roll(x, -1))) / 2)
-
-
 def _by_type(rooms: Iterable[RoomBoxes]) -> dict[str, list[RoomBoxes]]:
     groups: dict[str, list[RoomBoxes]] = defaultdict(list)
     for room in rooms:
@@ -83,9 +77,11 @@ def _by_type(rooms: Iterable[RoomBoxes]) -> dict[str, list[RoomBoxes]]:
 
 
 def _type_figures(rooms: list[RoomBoxes]) -> dict:
+    from shapely import Polygon
+
     extents = np.sort([np.ptp(room.floor_polygon, axis=0) for room in rooms], axis=-1)
     counts = [Counter(room.categories) for room in rooms]
-    area = np.array([polygon_area(room.floor_polygon) for room in rooms])
+    area = np.array([Polygon(room.floor_polygon).area for room in rooms])
     number = np.array([len(room) for room in rooms])
     presence = {}
     for category in sorted({c for count in counts for c in count}):
