@@ -18,14 +18,14 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
-from echousd.room.layouts import DraftsWanted, Drawn, Judged, most_drafts
+from echousd.room.layouts import BestDraft, DraftsWanted, Drawn, most_drafts
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
 
 
 @dataclass(frozen=True)
 class Best:
-    """`echousd.room.layouts.Judged` in numbers that any process can be sent."""
+    """`echousd.room.layouts.BestDraft` in numbers that any process can be sent."""
 
     of: str
     boxes: Rows
@@ -164,7 +164,7 @@ def generated(job: Job, *, here: bool = False) -> Any:
 
     drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
     found = job.best
-    best = None if found is None else Judged(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
+    best = None if found is None else BestDraft(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
     drawn = Drawn(drafts, elsewhere=True, best=best) if drafts else None
     asked = job.options
     model = load_model(asked.weights or None, asked.preset, device=asked.device if here else CPU)

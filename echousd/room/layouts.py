@@ -47,7 +47,7 @@ def usual_drafts(objects: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class BestDraft:
     """The best of some drafts after repair.
 
     Arguments:
@@ -64,7 +64,7 @@ class Judged:
 class DraftsWanted(Exception):  # no error: the caller draws them and asks again
     """What was drawn leaves something to be wished for, and further ones are drawn elsewhere; `best` of them."""
 
-    def __init__(self, best: Judged) -> None:
+    def __init__(self, best: BestDraft) -> None:
         super().__init__()
         self.best = best
 
@@ -76,12 +76,12 @@ class Drawn:
     Arguments:
         rounds: the first draft alone, then those of the following rounds (`draft_rounds`) that were wanted.
         elsewhere: raise `DraftsWanted` in place of drawing further ones.
-        best: of all rounds but the last, where those were judged; None = they are judged again.
+        best: of all rounds but the last, where those were valued; None = they are valued again.
     """
 
     rounds: tuple[tuple[Boxes, ...], ...]
     elsewhere: bool = False
-    best: Judged | None = None
+    best: BestDraft | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,18 +152,18 @@ def best_boxes(
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    of, judged = graph.to_json() if drawn is not None else "", 0
+    of, valued = graph.to_json() if drawn is not None else "", 0
     if drawn is not None and drawn.best is not None and drawn.best.of == of:
         best, worth = (drawn.best.boxes, drawn.best.conflicts), drawn.best.wishes
-        judged = len(drawn.rounds) - 1
+        valued = len(drawn.rounds) - 1
     for at, (start, count) in enumerate(draft_rounds(drafts)):
-        if at < judged:
+        if at < valued:
             continue
         if best is not None and not any(worth):
             break
         given = drawn.rounds[at] if drawn is not None and at < len(drawn.rounds) else ()
         if not given and best is not None and drawn is not None and drawn.elsewhere:
-            raise DraftsWanted(Judged(of, *best, worth))
+            raise DraftsWanted(BestDraft(of, *best, worth))
         for draft in given or sample_boxes(
             model, graph, replace(draws, number=draws.number + start), count=count, timer=timer
         ):

@@ -136,11 +136,11 @@ class CompiledEcho:
             return embedding.new_zeros(len(embedding), 0)
         return embedding @ self.time_weight.t()
 
-    def bind(self, objects: Tensor, edges: Tensor) -> tuple[Tensor, Tensor]:
+    def bind(self, objects: Tensor, edge_attr: Tensor) -> tuple[Tensor, Tensor]:
         """First-layer products of the constant inputs: conditions (N, objects) and edge features (E, edges)."""
         first = self.layers[0]
         node = objects @ self.condition.float().t() + self.bias.float()
-        return node, edges @ first.edge_weight.float().t() + first.edge_bias.float()
+        return node, edge_attr @ first.edge_weight.float().t() + first.edge_bias.float()
 
     def __call__(self, bound: tuple[Tensor, Tensor], state: Tensor, time: Tensor, graph: GraphIndex) -> Tensor:
         """Context of the denoiser.

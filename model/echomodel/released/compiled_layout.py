@@ -166,9 +166,9 @@ class CompiledLayout:
             rows.append(self.echo.time_rows(embedding))
         return torch.cat(rows, dim=1)
 
-    def bind(self, objects: Tensor, triples: Tensor, edges: Tensor | None = None) -> BoundLayout:
+    def bind(self, objects: Tensor, triples: Tensor, edge_attr: Tensor | None = None) -> BoundLayout:
         """Compute what a graph fixes; arguments as in `LayoutNet.forward`, errors too (at the first call)."""
-        return BoundLayout(self, objects, triples, edges)
+        return BoundLayout(self, objects, triples, edge_attr)
 
     def denoise(self, x: Tensor, time: Tensor, context: Tensor) -> Tensor:
         """(N, 8) state, (N, W) table rows and (N, C) contexts of all transformer blocks -> (N, 8) noise."""
@@ -177,10 +177,10 @@ class CompiledLayout:
 
 
 class BoundLayout:
-    """A compiled layout denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
+    """A compiled layout denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edge_attr)`."""
 
     @torch.no_grad()
-    def __init__(self, compiled: CompiledLayout, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
+    def __init__(self, compiled: CompiledLayout, objects: Tensor, triples: Tensor, edge_attr: Tensor | None) -> None:
         self.compiled, self.nodes = compiled, len(objects)
         config = compiled.config
         check_inputs(
@@ -190,7 +190,7 @@ class BoundLayout:
             self.context = compiled.context(objects)
             return
         self.graph = GraphIndex.of(triples, len(objects))
-        self.bound = compiled.echo.bind(objects, edge_input(compiled.table, triples, edges, config))
+        self.bound = compiled.echo.bind(objects, edge_input(compiled.table, triples, edge_attr, config))
 
     @torch.inference_mode()
     def __call__(self, x: Tensor, t: Tensor) -> Tensor:

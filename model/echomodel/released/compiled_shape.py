@@ -175,9 +175,9 @@ class CompiledShape:
                 parts.append(_Plain(_Direct(part)))
         return parts
 
-    def bind(self, objects: Tensor, triples: Tensor, edges: Tensor | None = None) -> BoundShape:
+    def bind(self, objects: Tensor, triples: Tensor, edge_attr: Tensor | None = None) -> BoundShape:
         """Compute what a graph fixes; arguments and errors as in `ShapeUNet.forward`."""
-        return BoundShape(self, objects, triples, edges)
+        return BoundShape(self, objects, triples, edge_attr)
 
     def denoise(self, x: Tensor, time: Tensor, context: Tensor) -> Tensor:
         """(N, 3, D, H, W) state, (N, .) time shifts and (N, .) contexts of all blocks -> (N, 3, D, H, W) noise."""
@@ -187,17 +187,19 @@ class CompiledShape:
 
 
 class BoundShape:
-    """A compiled shape denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edges)`."""
+    """A compiled shape denoiser with its graph: `bound(x, t)` is `net(x, objects, triples, t, edge_attr)`."""
 
     @torch.no_grad()
-    def __init__(self, compiled: CompiledShape, objects: Tensor, triples: Tensor, edges: Tensor | None) -> None:
+    def __init__(self, compiled: CompiledShape, objects: Tensor, triples: Tensor, edge_attr: Tensor | None) -> None:
         self.compiled, self.objects = compiled, objects
         config = compiled.config
         count = len(objects)
         check_inputs(objects.new_zeros(count, config.channels), objects, triples, triples.new_zeros(count), config)
         if compiled.echo is not None:
             self.graph = GraphIndex.of(triples, count)
-            self.bound = compiled.echo.bind(objects, edge_input(compiled.net.pred_embeddings, triples, edges, config))
+            self.bound = compiled.echo.bind(
+                objects, edge_input(compiled.net.pred_embeddings, triples, edge_attr, config)
+            )
 
     @torch.inference_mode()
     def __call__(self, x: Tensor, t: Tensor) -> Tensor:

@@ -30,7 +30,7 @@ class LayoutNet(UNet):
             edges = config.predicate + config.edge_features
             self.box_graph_cov = TripletGCN(nodes, edges, config.hidden, config.layers, config.context, config.residual)
 
-    def echo(self, x: Tensor, objects: Tensor, triples: Tensor, embedding: Tensor, edges: Tensor | None) -> Tensor:
+    def echo(self, x: Tensor, objects: Tensor, triples: Tensor, embedding: Tensor, edge_attr: Tensor | None) -> Tensor:
         """Exchange of the noisy boxes along the relations, the context of the denoiser: (N, context).
 
         Arguments:
@@ -38,17 +38,19 @@ class LayoutNet(UNet):
             objects: (N, objects) float32, node conditions.
             triples: (E, 3) int64.
             embedding: (N, 4 width) float32, time.
-            edges: (E, edge_features) float32, or None where the config has none.
+            edge_attr: (E, edge_features) float32, or None where the config has none.
         """
         if not self.config.echo:
             return objects
         node = [objects, self.box_embeddings(x)]
         if self.config.time_in_echo:
             node.append(self.box_time_emb(embedding))
-        edge = edge_input(self.pred_embeddings, triples, edges, self.config)
+        edge = edge_input(self.pred_embeddings, triples, edge_attr, self.config)
         return self.box_graph_cov(torch.cat(node, dim=1), edge, triples[:, [0, 2]])[0]
 
-    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
+    def forward(
+        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edge_attr: Tensor | None = None
+    ) -> Tensor:
         """Predict the noise in boxes.
 
         Arguments:
@@ -56,7 +58,7 @@ class LayoutNet(UNet):
             objects: (N, objects) float32, node conditions.
             triples: (E, 3) int64 [subject, predicate, object].
             t: (N,) int64, step of each node, 0..999.
-            edges: (E, edge_features) float32, further edge features (`paper` preset).
+            edge_attr: (E, edge_features) float32, further edge features (`paper` preset).
 
         Returns:
             (N, 8) float32.
@@ -66,16 +68,16 @@ class LayoutNet(UNet):
         """
         check_inputs(x, objects, triples, t, self.config)
         embedding = self.embed_time(t)
-        return self.denoise(x, embedding, self.echo(x, objects, triples, embedding, edges))
+        return self.denoise(x, embedding, self.echo(x, objects, triples, embedding, edge_attr))
 
 
-def edge_input(table: nn.Embedding, triples: Tensor, edges: Tensor | None, config: UNetConfig) -> Tensor:
-    """Edge features of an echo: the predicate's embedding, and `edges` where the config has further features."""
-    if (edges is None) != (config.edge_features == 0):
-        found = "none" if edges is None else f"width {edges.shape[-1]}"
+def edge_input(table: nn.Embedding, triples: Tensor, edge_attr: Tensor | None, config: UNetConfig) -> Tensor:
+    """Edge features of an echo: the predicate's embedding, and `edge_attr` where the config has further features."""
+    if (edge_attr is None) != (config.edge_features == 0):
+        found = "none" if edge_attr is None else f"width {edge_attr.shape[-1]}"
         raise ValueError(f"edge features: {found} given, config wants width {config.edge_features}")
     embedded = table(triples[:, 1])
-    return embedded if edges is None else torch.cat([edges, embedded], dim=1)
+    return embedded if edge_attr is None else torch.cat([edge_attr, embedded], dim=1)
 
 
 def check_inputs(x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, config: UNetConfig) -> None:

@@ -40,7 +40,7 @@ class Conditions:
 
     layout: Tensor
     shape: Tensor | None
-    edges: Tensor | None
+    edge_attr: Tensor | None
 
 
 class ReleasedModel(GraphEncoder):
@@ -124,16 +124,16 @@ class ReleasedModel(GraphEncoder):
         """
         graph.check(self.encoder_config)
         nodes, _ = self.embed(graph)
-        edges = None
+        edge_attr = None
         if self.config.preset == "paper":
             if graph.edge_text is None:
                 raise ValueError("the paper preset needs text features on edges, edge_text is None")
-            edges = graph.edge_text
+            edge_attr = graph.edge_text
             latent, _ = self.encode(change.before if change else graph)
             added, touched = (change.added, change.touched) if change else ((), ())
             latent, _, _ = self.manipulate(latent, graph, added=added, touched=touched, generator=generator)
             nodes = torch.cat([nodes, latent], dim=1)
-        return Conditions(nodes, self.rel_s_mlp(nodes) if self.config.shape is not None else None, edges)
+        return Conditions(nodes, self.rel_s_mlp(nodes) if self.config.shape is not None else None, edge_attr)
 
     @torch.no_grad()
     def sample_layout(
@@ -167,11 +167,11 @@ class ReleasedModel(GraphEncoder):
         tables, chosen = tables.to(device), chosen.to(device)
 
         def as_trained(x: Tensor, t: Tensor) -> Tensor:
-            return net(x, conditions.layout, graph.triples, t, conditions.edges)
+            return net(x, conditions.layout, graph.triples, t, conditions.edge_attr)
 
         bound: Denoiser = as_trained
         if device.type == "cpu":
-            bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edges)
+            bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edge_attr)
         shape = (len(graph.classes), net.config.channels)
         start = normal(shape, generator, device)
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
@@ -222,13 +222,13 @@ class ReleasedModel(GraphEncoder):
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
         def as_trained(x: Tensor, t: Tensor) -> Tensor:
-            return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edges)
+            return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edge_attr)
 
         denoise: Denoiser = as_trained
         compiled = self.device.type == "cpu" and self.config.shape.conditioning == "crossattn"
         if compiled and conditions.shape is not None:
             net = self.shape_df.diffusion_net
-            denoise = CompiledShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edges)
+            denoise = CompiledShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edge_attr)
         return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
 
     def _here(self, change: GraphChange | None) -> GraphChange | None:
@@ -261,14 +261,14 @@ class ReleasedModel(GraphEncoder):
         noise = normal(boxes.shape, generator, device)
         tables = self.layout_tables.to(device)
         losses = layout_loss(
-            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, tables, conditions.edges
+            self.layout_net, boxes, conditions.layout, graph.triples, t, noise, tables, conditions.edge_attr
         )
         losses["layout"] = losses.pop("loss")
         losses["loss"] = losses["layout"]
         if latents is not None and conditions.shape is not None:
             kept, triples = node_budget(graph.triples, scene, budget)
             inside = (graph.triples[:, 0] < kept) & (graph.triples[:, 2] < kept)
-            edges = None if conditions.edges is None else conditions.edges[inside]
+            edge_attr = None if conditions.edge_attr is None else conditions.edge_attr[inside]
             t = torch.randint(count, (kept,), generator=generator).to(device)
             clean = latents[:kept].to(device)
             noise = normal(clean.shape, generator, device)
@@ -279,7 +279,7 @@ class ReleasedModel(GraphEncoder):
                 t,
                 noise,
                 self.shape_tables.to(device),
-                edges,
+                edge_attr,
             )
             losses["shape"] = shape_loss(self.shape_df, *args)
             losses["loss"] = losses["layout"] + losses["shape"]

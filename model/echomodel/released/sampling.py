@@ -99,14 +99,14 @@ def layout_loss(
     t: Tensor,
     noise: Tensor,
     tables: LayoutTables,
-    edges: Tensor | None = None,
+    edge_attr: Tensor | None = None,
 ) -> dict[str, Tensor]:
     """Noise prediction loss of the layout branch (EchoScene, equation 4).
 
     Arguments:
         net: `LayoutNet`.
         boxes: (N, 8) float32, normalised boxes (or (N, 7) with the angle in radians in the last place).
-        objects, triples, edges: as `LayoutNet.forward`.
+        objects, triples, edge_attr: as `LayoutNet.forward`.
         t: (N,) int64; the published training draws one step per scene.
         noise: (N, 8) float32.
         tables: schedule.
@@ -116,7 +116,7 @@ def layout_loss(
     """
     if boxes.shape[1] == 7:
         boxes = torch.cat([boxes[:, :6], boxes[:, 6:].sin(), boxes[:, 6:].cos()], dim=1)
-    error = (net(noised(boxes, t, noise, tables), objects, triples, t, edges) - noise).square()
+    error = (net(noised(boxes, t, noise, tables), objects, triples, t, edge_attr) - noise).square()
     size, trans, angle = error[:, :3], error[:, 3:6], error[:, 6:]
     return {"loss": error.mean(1).mean(), "size": size.mean(), "trans": trans.mean(), "angle": angle.mean()}
 
@@ -129,7 +129,7 @@ def shape_loss(
     t: Tensor,
     noise: Tensor,
     tables: ShapeTables,
-    edges: Tensor | None = None,
+    edge_attr: Tensor | None = None,
 ) -> Tensor:
     """Noise prediction loss of the shape branch (EchoScene, equation 6): mean square over everything, a scalar.
 
@@ -139,7 +139,7 @@ def shape_loss(
         t: (N,) int64; the published training draws one step per object.
         others: as `layout_loss`.
     """
-    return (net(noised(latents, t, noise, tables), objects, triples, t, edges) - noise).square().mean()
+    return (net(noised(latents, t, noise, tables), objects, triples, t, edge_attr) - noise).square().mean()
 
 
 def node_budget(triples: Tensor, scene: Tensor, budget: int = 64) -> tuple[int, Tensor]:

@@ -44,17 +44,19 @@ class ShapeUNet(UNet):
         out = volume if concat else config.context
         self.shape_code_graph_cov = TripletGCN(nodes, edges, config.hidden, config.layers, out, config.residual)
 
-    def echo(self, x: Tensor, objects: Tensor, triples: Tensor, embedding: Tensor, edges: Tensor | None) -> Tensor:
+    def echo(self, x: Tensor, objects: Tensor, triples: Tensor, embedding: Tensor, edge_attr: Tensor | None) -> Tensor:
         """Exchange of the noisy latents along the relations: (N, context), arguments as in `forward`."""
         if not self.config.echo:
             return objects
         node = [objects, self.shape_embeddings(x)]
         if self.config.time_in_echo:
             node.append(self.shape_time_emb(embedding))
-        edge = edge_input(self.pred_embeddings, triples, edges, self.config)
+        edge = edge_input(self.pred_embeddings, triples, edge_attr, self.config)
         return self.shape_code_graph_cov(torch.cat(node, dim=1), edge, triples[:, [0, 2]])[0]
 
-    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
+    def forward(
+        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edge_attr: Tensor | None = None
+    ) -> Tensor:
         """Predict the noise in shape latents.
 
         Arguments:
@@ -62,7 +64,7 @@ class ShapeUNet(UNet):
             objects: (N, objects) float32, node conditions.
             triples: (E, 3) int64 [subject, predicate, object].
             t: (N,) int64, step of each node, 0..999.
-            edges: (E, edge_features) float32, further edge features (`paper` preset).
+            edge_attr: (E, edge_features) float32, further edge features (`paper` preset).
 
         Returns:
             (N, 3, 16, 16, 16) float32.
@@ -75,7 +77,7 @@ class ShapeUNet(UNet):
             raise ValueError(f"shape latents are {tuple(x.shape)}, expected (N, {self.config.channels}, {grid})")
         check_inputs(x, objects, triples, t, self.config)
         embedding = self.embed_time(t)
-        context = self.echo(x, objects, triples, embedding, edges)
+        context = self.echo(x, objects, triples, embedding, edge_attr)
         if self.config.conditioning == "concat":
             return self.denoise(torch.cat([x, context.reshape(-1, 1, *grid)], dim=1), embedding, None)
         return self.denoise(x, embedding, context)
@@ -88,6 +90,8 @@ class ShapeNet(nn.Module):
         super().__init__()
         self.diffusion_net = ShapeUNet(config)
 
-    def forward(self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edges: Tensor | None = None) -> Tensor:
+    def forward(
+        self, x: Tensor, objects: Tensor, triples: Tensor, t: Tensor, edge_attr: Tensor | None = None
+    ) -> Tensor:
         """As `ShapeUNet.forward`."""
-        return self.diffusion_net(x, objects, triples, t, edges)
+        return self.diffusion_net(x, objects, triples, t, edge_attr)
