@@ -15,8 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import echousd
-from echousd.rendering import QUICK, render
+from echousd.rendering import render
 from echousd.room import RoomOptions
+from echousd.tracing import QUICK
 
 
 def bytes_of(folder: Path) -> float:

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from echousd.naming import free_name
 from echousd.scenery import Scenery
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.views import APERTURE, EYES, FOCAL_LENGTH, WIDE, inside_view, perspective_view
+from echousd.views import APERTURE, EYES, FOCAL_LENGTH, WIDE, framed, inside_view, perspective_views, turning_matrices
 
 if TYPE_CHECKING:
     from pxr import Usd
@@ -72,9 +72,24 @@ def eye_view(scenery: Scenery) -> View:
     return View(matrix, APERTURE / 2 / WIDE, False)
 
 
-def corner_view(scenery: Scenery) -> View:
-    """From above a corner, the one where least is hidden, the whole scene in the picture."""
+def corner_views(scenery: Scenery) -> list[tuple[View, Scenery]]:
+    """From above each corner, the view where least is hidden first, and what it shows: near walls are left out."""
+    views = []
+    for matrix in perspective_views(_outermost(scenery), scenery.furniture):
+        shown = scenery.without_near_walls(matrix[:3, 3])
+        if shown is not scenery:
+            matrix = framed(_outermost(shown), matrix[:3, 2])
+        views.append((View(matrix, APERTURE / 2 / FOCAL_LENGTH, False), shown))
+    return views
 
+
+def turning_views(scenery: Scenery, count: int) -> list[View]:
+    """`count` views around the whole scene, all from as far away, each as far on as the last from the one before."""
+    matrices = turning_matrices(_outermost(scenery), count)
+    return [View(matrix, APERTURE / 2 / FOCAL_LENGTH, False) for matrix in matrices]
+
+
+def _outermost(scenery: Scenery) -> np.ndarray:
+    """(n, 3) float corners of the scene; nothing else reaches the border of a picture of all of it."""
     points = scenery.triangles.reshape(-1, 3).astype(float)
-    points = points[ConvexHull(points, qhull_options="QJ").vertices]  # nothing else reaches the picture's border
-    return View(perspective_view(points, scenery.furniture), APERTURE / 2 / FOCAL_LENGTH, False)
+    return np.asarray(points[ConvexHull(points, qhull_options="QJ").vertices])

@@ -14,6 +14,7 @@ EYES = 0.62  # of the height of the walls: where a camera inside is
 BEFORE, BESIDE = 1.6, 1.0  # metres: what stands, what hangs nearer to the eye fills the picture
 STEPS = (0.3, 0.5)  # metres from a corner that a camera inside may stand
 MARGIN = 1.06
+RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
 
 
@@ -29,7 +30,12 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
-    """(4, 4) float camera to world of a view from the corner where least furniture is hidden, fronts preferred.
+    """(4, 4) float camera to world: the first of `perspective_views`."""
+    return perspective_views(points, furniture)[0]
+
+
+def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarray]:
+    """(4, 4) float camera to world of the views from the four corners, least hidden first, fronts preferred.
 
     Arguments:
         points: (n, 3) float, metres, what must be in the picture.
@@ -37,13 +43,27 @@ def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
     """
     corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
     facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
-    views = [_framed(points, np.array([0.55 * x, 0.62, 0.85 * z])) for x, z in corners]
+    views = [framed(points, np.array([0.55 * x, RISE, 0.85 * z])) for x, z in corners]
     hidden = [furniture.hidden(view[:3, 3]) for view in views]
-    return views[int(np.argmin(np.array(hidden) - FRONTS * facing))]
+    return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
 
 
-def _framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(4, 4) float camera to world of the nearest camera in that direction that has all points in its picture."""
+def turning_matrices(points: np.ndarray, count: int) -> list[np.ndarray]:
+    """(4, 4) float camera to world of `count` views around the points (n, 3), metres, all from as far away."""
+    middle = (points.min(0) + points.max(0)) / 2
+    reach = float(np.linalg.norm((points - middle)[:, [0, 2]], axis=1).max())
+    turn = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+    x, z = middle[0] + reach * np.cos(turn), middle[2] + reach * np.sin(turn)
+    drum = np.concatenate([np.stack([x, np.full(48, y), z], 1) for y in (points[:, 1].min(), points[:, 1].max())])
+    nearest = framed(drum, np.array([1.0, RISE, 0.0]))
+    away, eye = float(nearest[0, 3] - middle[0]), float(nearest[1, 3])
+    target = np.array([middle[0], eye - away * RISE, middle[2]])
+    spots = [(away * np.cos(t), away * RISE, away * np.sin(t)) for t in 2 * np.pi * np.arange(count) / count]
+    return [view_matrix(target + np.array(spot), target) for spot in spots]
+
+
+def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world: the nearest camera in a direction (3,) that has all points (n, 3) in its picture."""
     direction = direction / np.linalg.norm(direction)
     target = (points.min(0) + points.max(0)) / 2
     half = APERTURE / 2 / FOCAL_LENGTH / MARGIN

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
+TURN, TENTH = "turntable", 100  # milliseconds
+
+
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command(epilog="Example: echousd render out/bedroom/bedroom.usda -o top.png --view top")(render)
@@ -24,57 +28,83 @@ def render(
     room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)],
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help="Picture to write (.png); with --cameras a folder.", show_default=False),
+        typer.Option(
+            "-o",
+            "--output",
+            help="Picture to write (.png; .gif of a turntable); with --cameras a folder.",
+            show_default=False,
+        ),
     ],
     view: Annotated[
-        str, typer.Option(help="top, perspective, eye, or every-camera: those of --cameras side by side.")
+        str,
+        typer.Option(
+            help="top, perspective, eye, every-camera (those of --cameras side by side), sheet (six views), turntable "
+            "(a GIF)."
+        ),
     ] = "perspective",
     cameras: Annotated[
         bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
     ] = False,
-    size: Annotated[int, typer.Option(help="Pixels on each side.")] = 512,
+    size: Annotated[int, typer.Option(help="Pixels on each side of a picture.")] = 512,
+    samples: Annotated[int, typer.Option(help="Rays through a pixel, a square number.", min=1, max=256)] = 9,
+    frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
-    """Draw a room from above, from a corner, from inside, or through each of its cameras."""
+    """Draw a room from above, from a corner, from inside, from all around, or through each of its cameras."""
     from echousd.rendering import render as draw
-    from echousd.rendering import render_cameras
+    from echousd.rendering import render_cameras, render_turn
     from echousd.room.found import room_at
     from echousd.stage.files import write_all
 
     started = time.perf_counter()
-    room = room_at(room)
+    room, rays = room_at(room), math.isqrt(samples)
+    if rays**2 != samples:
+        raise ValueError(f"--samples is {samples}, allowed: a square number, such as {rays**2} or {(rays + 1) ** 2}")
     if cameras:
         if view != "perspective":
             raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")
         if output.suffix.lower() == ".png":
             raise ValueError(f"{output}: with --cameras the output is a folder, a picture for each camera")
-        drawn = render_cameras(room, size=size, colors=colors, layout=layout)
+        drawn = render_cameras(room, size=size, colors=colors, rays=rays, layout=layout)
         pictures = {output / f"{name}.png": picture for name, picture in drawn.items()}
         for path in pictures:
             check_picture(path, force=force)
+        files = {path: _encoded([picture], "PNG") for path, picture in pictures.items()}
     else:
-        if output.suffix.lower() != ".png":
-            raise ValueError(f"{output}: pictures are written as .png, found {output.suffix or 'no ending'!r}")
+        ending = ".gif" if view == TURN else ".png"
+        if output.suffix.lower() != ending:
+            kind = "a turntable is" if view == TURN else "pictures are"
+            raise ValueError(f"{output}: {kind} written as {ending}, found {output.suffix or 'no ending'!r}")
         check_picture(output, force=force)
-        pictures = {output: draw(room, view=view, size=size, colors=colors, layout=layout)}
-    write_all({path: _png(picture) for path, picture in pictures.items()})
+        if view == TURN:
+            turn = render_turn(room, frames=frames, size=size, colors=colors, rays=rays, layout=layout)
+            files = {output: _encoded(turn, "GIF")}
+        else:
+            files = {
+                output: _encoded([draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout)], "PNG")
+            }
+    write_all(files)
     if json:
-        say_written(list(pictures), started)
+        say_written(list(files), started)
         return
-    for path in pictures:
+    for path in files:
         say(str(path))
 
 
-def _png(picture: Image.Image) -> bytes:
-    """The picture's file, which says that it is ours."""
+def _encoded(pictures: list[Image.Image], kind: str) -> bytes:
+    """The pictures' file, which says that it is ours; several move, and begin again."""
     import io
 
     from PIL.PngImagePlugin import PngInfo
 
     buffer, mark = io.BytesIO(), PngInfo()
     mark.add_text("Software", "echousd")
-    picture.save(buffer, "PNG", pnginfo=mark)
+    if kind == "PNG":
+        pictures[0].save(buffer, kind, pnginfo=mark)
+    else:
+        small = [picture.quantize(128) for picture in pictures]
+        small[0].save(buffer, kind, save_all=True, append_images=small[1:], duration=TENTH, loop=0, comment=b"echousd")
     return buffer.getvalue()

@@ -156,7 +156,8 @@ def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
     from PIL.PngImagePlugin import PngInfo
 
-    from echousd.rendering import QUICK, RenderUnavailable, render
+    from echousd.rendering import render
+    from echousd.tracing import QUICK, RenderUnavailable
 
     out = root.with_suffix(".png")
     try:
@@ -185,7 +186,8 @@ def write_sheet(root: Path) -> Path | None:
     from PIL import Image, ImageDraw
     from PIL.PngImagePlugin import PngInfo
 
-    from echousd.rendering import QUICK, RenderUnavailable, render
+    from echousd.rendering import render
+    from echousd.tracing import QUICK, RenderUnavailable
 
     out = root.with_name(f"{root.stem}_layouts.png")
     names = layout_names(open_stage(root))

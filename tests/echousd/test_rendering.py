@@ -1,16 +1,19 @@
 import sys
 import time
+from itertools import combinations
 
 import numpy as np
 import pytest
+from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom
 from small_room import StandIn, small_graph
 
 import echousd
 from echousd.drawables import read_drawables
-from echousd.rendering import BACKGROUND, outside, render, render_stage, smooth_light
+from echousd.rendering import render, render_stage, render_turn
 from echousd.room import RoomOptions
 from echousd.scenery import class_color, read_scenery
+from echousd.tracing import BACKGROUND, outside, smooth_light
 
 
 @pytest.fixture(scope="module")
@@ -216,3 +219,43 @@ def test_every_camera_draws_what_it_sees(up, unit):
 def test_every_camera_needs_one():
     with pytest.raises(ValueError, match="no camera, which --cameras and the view every-camera need"):
         render_stage(cube_stage(), view="every-camera", size=32)
+
+
+def test_a_sheet_shows_six_views(root):
+    sheet = pixels(render(root, view="sheet", size=48, rays=1))
+    assert sheet.shape == (96, 144, 3)
+    for number, view in enumerate(("perspective", "eye", "top")):
+        alone = pixels(render(root, view=view, size=48, rays=1))
+        np.testing.assert_array_equal(sheet[:48, 48 * number : 48 * number + 48], alone)
+    cells = [sheet[48:, 48 * number : 48 * number + 48] for number in range(3)]
+    assert min(np.abs(a - b).mean() for a, b in combinations([sheet[:48, :48], *cells], 2)) > 0.01
+
+
+def test_a_turn_goes_all_around(root):
+    pictures = [pixels(picture) for picture in render_turn(root, frames=8, size=48, rays=1)]
+    assert len(pictures) == 8
+    assert min(np.abs(a - b).mean() for a, b in combinations(pictures, 2)) > 0.005
+    assert all(np.ptp(picture[0], axis=0).max() < 0.05 for picture in pictures)  # nothing reaches the upper border
+    with pytest.raises(ValueError, match="frames is 1, allowed: 2 to 360"):
+        render_turn(root, frames=1)
+
+
+def test_command_draws_turns_and_counts_samples(root, tmp_path, echousd_command):
+    path = tmp_path / "turn.gif"
+    done = echousd_command(
+        "render", root, "-o", path, "--view", "turntable", "--frames", 3, "--size", 32, "--samples", 1
+    )
+    assert done.code == 0, done.err
+    with Image.open(path) as moving:
+        assert (moving.format, moving.n_frames, moving.size) == ("GIF", 3, (32, 32))
+    assert (
+        echousd_command("render", root, "-o", path, "--view", "turntable", "--frames", 2, "--size", 32).code == 0
+    )  # ours
+    for words, told in (
+        (("-o", tmp_path / "turn.png", "--view", "turntable"), "a turntable is written as .gif, found '.png'"),
+        (("-o", tmp_path / "one.gif"), "pictures are written as .png, found '.gif'"),
+        (("-o", tmp_path / "one.png", "--samples", 8), "--samples is 8, allowed: a square number, such as 4 or 9"),
+    ):
+        done = echousd_command("render", root, *words)
+        assert (done.code, told in done.err) == (2, True), done.err
+    assert [one.name for one in tmp_path.iterdir()] == ["turn.gif"]
