@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -39,7 +40,7 @@ class Thing:
     variant: int = 0
     count: int = 1
 
-    @property
+    @cached_property
     def footprint(self) -> shapely.Polygon:
         """Its box in plan."""
         return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
@@ -56,10 +57,21 @@ class Standing:
     yaw: float
     geometry: Geometry
 
-    @property
+    @cached_property
     def footprint(self) -> shapely.Polygon:
         """Its box in plan."""
         return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+    @cached_property
+    def pieces(self) -> list[np.ndarray]:
+        """(n, 3, 3) triangles of its mesh and of each collider, in the room, metres."""
+        meshes = [self.geometry.mesh, *(collider.mesh for collider in self.geometry.colliders)]
+        return [self.to_room(mesh.vertices)[mesh.faces] for mesh in meshes]
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """(p, 2, 3) lower and upper corner of each of its pieces, metres."""
+        return np.array([(piece.min((0, 1)), piece.max((0, 1))) for piece in self.pieces])
 
     @property
     def top(self) -> float:
@@ -140,7 +152,7 @@ class Setting:
         for other in self.objects.values():
             if other.name == host or other.top < low + 1e-4 or other.position[1] > high + margin:
                 continue
-            if other.footprint.intersects(around) and reaches(other, low, high).intersects(around):
+            if other.footprint.intersects(around) and meets(other, low, high, around):
                 return False
         return not any(
             other.footprint.intersects(around)
@@ -182,9 +194,16 @@ def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polyg
 
 def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
     """What an object covers in plan between two heights: the hull of its mesh there, and its colliders; metres."""
-    pieces = [thing.geometry.mesh, *(collider.mesh for collider in thing.geometry.colliders)]
-    low, high = low + SKIN, high - SKIN  # a foot that stands at the lower height reaches over it
-    return shapely.union_all([_section(thing.to_room(mesh.vertices)[mesh.faces], low, high) for mesh in pieces])
+    # a foot that stands at the lower height reaches over it
+    return shapely.union_all([_section(piece, low + SKIN, high - SKIN) for piece in thing.pieces])
+
+
+def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> bool:
+    """Whether what an object covers between two heights (`reaches`) meets a shape in plan."""
+    least, most = np.array(plan.bounds).reshape(2, 2)
+    near = (thing.spans[:, 0, [0, 2]] <= most).all(1) & (thing.spans[:, 1, [0, 2]] >= least).all(1)
+    near &= (thing.spans[:, 0, 1] < high) & (thing.spans[:, 1, 1] > low)
+    return any(_section(thing.pieces[n], low + SKIN, high - SKIN).intersects(plan) for n in np.flatnonzero(near))
 
 
 def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
@@ -199,4 +218,4 @@ def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
         share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
         found.append(start[over] + share[:, None] * (end[over] - start[over]))
     inside = np.concatenate(found)
-    return shapely.MultiPoint(inside[:, [0, 2]]).convex_hull if len(inside) else shapely.Polygon()
+    return shapely.convex_hull(shapely.multipoints(inside[:, [0, 2]])) if len(inside) else shapely.Polygon()
