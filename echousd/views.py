@@ -63,7 +63,7 @@ def turning_matrices(points: np.ndarray, count: int) -> list[np.ndarray]:
 
 
 def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(4, 4) float camera to world: the nearest camera in a direction (3,) that has all points (n, 3) in its picture."""
+    """(4, 4) float camera to world: the nearest in a direction (3,) that has all points (n, 3) in its picture."""
     direction = direction / np.linalg.norm(direction)
     target = (points.min(0) + points.max(0)) / 2
     half = APERTURE / 2 / FOCAL_LENGTH / MARGIN
