@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from echousd.bare import without_physics
@@ -19,13 +22,15 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
         package: receives the images; without it textured materials get their plain colour.
         physics: keep bodies, colliders (and other guides), joints and the scene; all of it goes, or none.
     """
-    layer = stage.Flatten(False)
+    with _without_instances(stage):
+        layer = stage.Flatten(False)
     set_units(layer, stage)
     check_types(layer, source(stage))
     if not physics:
         without_physics(layer)
     stage = Usd.Stage.Open(layer)
     for prim in stage.TraverseAll():
+        prim.ClearMetadata("instanceable")
         prim.ClearMetadata("assetInfo")  # it holds the absolute path of a file that is no longer needed
         for attribute in prim.GetAttributes():
             if attribute.GetTypeName() == Sdf.ValueTypeNames.Double3 and attribute.GetName().startswith("xformOp:"):
@@ -41,6 +46,22 @@ def flat_layer(stage: Usd.Stage, *, package: Package | None = None, physics: boo
         if not getattr(file, "path", ""):
             _paint_plain(image)
     return layer
+
+
+@contextmanager
+def _without_instances(stage: Usd.Stage) -> Iterator[None]:
+    """Inside the block nothing on the stage is an instance: flat, the prototypes would be prims of their own."""
+    session = stage.GetSessionLayer()
+    before = Sdf.Layer.CreateAnonymous(".usda")
+    before.TransferContent(session)
+    try:
+        with Usd.EditContext(stage, session):
+            while found := [prim for prim in stage.TraverseAll() if prim.IsInstance()]:
+                for prim in found:
+                    prim.SetInstanceable(False)
+        yield
+    finally:
+        session.TransferContent(before)
 
 
 def _as_float(attribute: Usd.Attribute) -> None:

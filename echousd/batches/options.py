@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,7 +25,7 @@ class BatchOptions(BaseModel):
         device: what the network runs on, `cpu`, `cuda` or `mps`; it is part of the plan, as sums round by it.
         palette: harmony of the room, "" = the seed chooses.
         merge: what of a piece is one mesh, `parts`, `bodies` or `closed`, see `RoomOptions`.
-        materialx: materials have a MaterialX network as well.
+        materialx: materials have a MaterialX network as well. crate, instances, thumbnails: see `RoomOptions`.
         openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
     """
@@ -49,6 +50,9 @@ class BatchOptions(BaseModel):
     palette: str = ""
     merge: Literal["parts", "bodies", "closed"] = "parts"
     materialx: bool = False
+    crate: bool = False
+    instances: bool = False
+    thumbnails: bool = False
     openings: Literal["kept", "drawn"] = "kept"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5
@@ -57,9 +61,7 @@ class BatchOptions(BaseModel):
     @property
     def look(self) -> RoomOptions:
         """How a room is written; raises ValueError for a word that is not allowed."""
-        return RoomOptions(
-            self.up_axis, self.walls, self.atlas, self.ceiling, self.dress, self.palette, self.merge, self.materialx
-        )
+        return RoomOptions(**{field.name: getattr(self, field.name) for field in fields(RoomOptions)})
 
 
 class BatchRequest(BaseModel):

@@ -96,6 +96,13 @@ def generate(
     materialx: Annotated[
         bool, typer.Option("--materialx", help="Give materials a MaterialX network beside UsdPreviewSurface.")
     ] = False,
+    instances: Annotated[
+        bool, typer.Option("--instances", help="Pieces that share an asset are instances of it.")
+    ] = False,
+    thumbnails: Annotated[
+        bool, typer.Option("--thumbnails", help="A picture of every asset in its folder (extra: render).")
+    ] = False,
+    crated: Annotated[bool, typer.Option("--crate", help="Layers as usdc, which opens faster, not as text.")] = False,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size boxes until the graph is kept.")
     ] = True,
@@ -151,7 +158,10 @@ def generate(
         finally:
             gc.enable()
         meshes = "closed" if closed else "bodies" if merge else "parts"
-        options = RoomOptions(up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes, materialx=materialx)
+        options = RoomOptions(
+            up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes, materialx=materialx, crate=crated,
+            instances=instances, thumbnails=thumbnails,
+        )  # fmt: skip
         wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []

@@ -14,12 +14,10 @@ from echousd.room.geometry import Geometry
 from echousd.room.joints import write_joints
 from echousd.room.looks import look, palette_for
 from echousd.room.materials import write_looks, write_palettes
-from echousd.room.paths import DESCRIPTION, GEO, MTL, coarse_name, payload_name, piece_path
+from echousd.room.paths import CLASSES, DESCRIPTION, GEO, MTL, class_path, coarse_name, payload_name, piece_path
 from echousd.room.physics import write_asset_physics
 from echousd.room.surface import Surface, surface
 from echousd.stage.taxonomy import ade20k
-
-CLASSES = "_class_"  # the prim that an asset's class stands below
 
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
@@ -44,6 +42,12 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
     with Sdf.ChangeBlock():
         finish(layer)
     return layer
+
+
+def define_class(stage: Usd.Stage, name: str) -> None:
+    """Have a stage define the class of an asset, so that its opinions there reach all users of the asset."""
+    for path in (f"/{CLASSES}", class_path(name)):
+        stage.CreateClassPrim(path)
 
 
 def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
@@ -204,7 +208,7 @@ def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
     """The payloads, and a class whose opinions, in whatever stage, reach all users of the asset."""
     classes = Sdf.PrimSpec(layer, CLASSES, Sdf.SpecifierClass)
     Sdf.PrimSpec(classes, name, Sdf.SpecifierClass)
-    layer.GetPrimAtPath(f"/{name}").inheritPathList.prependedItems.append(Sdf.Path(f"/{CLASSES}/{name}"))
+    layer.GetPrimAtPath(f"/{name}").inheritPathList.prependedItems.append(Sdf.Path(class_path(name)))
     if geometry.theirs_collides:
         return
     if geometry.coarse:

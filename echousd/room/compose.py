@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,12 +18,22 @@ from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
 from echousd.room.geometry import LICENCE, Geometry
 from echousd.room.originals import attribution, component
-from echousd.room.paths import OBJECTS, SHELL, coarse_file, component_file, layer_file, payload_file, piece_path
+from echousd.room.paths import (
+    OBJECTS,
+    SHELL,
+    class_path,
+    coarse_file,
+    component_file,
+    layer_file,
+    payload_file,
+    piece_path,
+)
 from echousd.room.placing import place_layouts
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
 from echousd.room.styles import ROOM_STYLE, free_name
 from echousd.room.surface import surface
+from echousd.room.thumbnails import thumbnails
 from echousd.room.volume import room_points, room_volume
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
@@ -59,6 +70,8 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
     for asset in small.values():
         files.update(asset.files)
+    if room.options.thumbnails:
+        files |= thumbnails(files, [*made, *small])
     built = structure.shell_prims(room)
     harmony = room.options.palette or looks.palette_for(f"{ROOM_STYLE} {room.provenance.seed}")
     slots = _slots(small)
@@ -75,14 +88,16 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     if room.options.dress != "none":
         looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
         parts = {name: asset.slots for name, asset in small.items()}
-        layers["dressing"] = dressing_layer(dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"))
+        layers["dressing"] = dressing_layer(
+            dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"), instances=room.options.instances
+        )
     if shelf is not None:
         shelf.put(files)
         files = {path: content for path, content in files.items() if not shelf.holds(path)}
     for name, layer in layers.items():
         if shelf is not None:
             shelf.redirect(layer)
-        path = layer_file(name)
+        path = layer_file(name, crate=room.options.crate)
         files[path] = _bytes(room, layer, path)
     files |= lights.image_files(room)
     files[f"{room.name}.usda"] = _bytes(room, root_layer(room, dressing.hung), ".usda")
@@ -116,7 +131,16 @@ def geometry_layer(room: RoomData) -> Sdf.Layer:
     for node in room.graph.nodes:
         prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
         _label(prim, "ade20k", ade20k(word_of(node)))
+        if node.name in instanced(room):
+            prim.SetInstanceable(True)
     return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
+
+
+def instanced(room: RoomData) -> frozenset[str]:
+    """Names of the objects that are instances: those of ours whose asset has another user, where that is asked for."""
+    users = Counter(room.assets.values())
+    shared = {name for name, asset in room.assets.items() if users[asset] > 1 and room.geometry[name].original is None}
+    return frozenset(shared if room.options.instances else ())
 
 
 def graph_layer(room: RoomData) -> Sdf.Layer:
@@ -162,12 +186,13 @@ def room_looks(
     """
     table: dict[str, looks.Look] = {}
     bindings: dict[str, str] = {}
-    voices, slugs = {ROOM_STYLE: 0}, _slugs(room)
+    voices, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
     for node in room.graph.nodes:
         asset, style = room.assets[node.name], room.styles[node.name]
         slug = slugs[style]
         voice = voices.setdefault(style, len(voices))
-        for path, slot in assets.slot_paths(f"{OBJECTS}/{node.name}", made[asset].slots).items():
+        above = class_path(asset) if node.name in alike else f"{OBJECTS}/{node.name}"
+        for path, slot in assets.slot_paths(above, made[asset].slots).items():
             name = f"{slug}_{slot}"
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
@@ -195,6 +220,8 @@ def materials_layer(
     stage.OverridePrim("/Room")
     slots = _slots(small)
     tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
+    for asset in sorted({room.assets[name] for name in instanced(room)}):
+        assets.define_class(stage, asset)
     materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
     materials.write_palettes(stage, harmony, tables)
     if room.options.materialx:
@@ -219,17 +246,14 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     walled = room.floor if room.options.walls else None
     cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
-    return assets.without_stage(stage, lambda layer: _add_sublayers(layer, names))
+    paths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
+    return assets.without_stage(stage, lambda layer: setattr(layer, "subLayerPaths", paths))
 
 
 def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
     for name, asset in references.items():
         prim = layer.GetPrimAtPath(f"{OBJECTS}/{name}")
         prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
-
-
-def _add_sublayers(layer: Sdf.Layer, names: Sequence[str]) -> None:
-    layer.subLayerPaths = [f"./{layer_file(name)}" for name in names]
 
 
 def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:

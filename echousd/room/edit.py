@@ -169,7 +169,7 @@ def edit(
             manifest.get("dress", "none"),
             manifest.get("palette", ""),
             manifest.get("merge", "parts"),
-            manifest.get("materialx", False),
+            *(manifest.get(word, False) for word in ("materialx", "crate", "instances", "thumbnails")),
         ),
         timings=timer.seconds,
         edited=Path(root),

@@ -55,6 +55,9 @@ class Manifest(BaseModel):
     palette: str = ""
     merge: Literal["parts", "bodies", "closed"] = "parts"
     materialx: bool = False
+    crate: bool = False
+    instances: bool = False
+    thumbnails: bool = False
     faces: Annotated[int, Field(ge=1)] = FACES
     meshes: dict[str, dict[str, Any]] = {}
     history: list[Step] = []

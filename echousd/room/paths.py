@@ -4,13 +4,14 @@ from __future__ import annotations
 
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
+CLASSES = "_class_"  # the prim that an asset's class stands below
 GEO, MTL = "geo", "mtl"  # scopes of an asset: what is seen and what collides, and what it is made of
 DESCRIPTION = "echo:description"  # attribute of an asset's root: what the furniture branch said of it
 
 
-def layer_file(name: str) -> str:
-    """Path of one of the room's layers in its folder; the shell's meshes are no text."""
-    return f"layers/{name}.{'usdc' if name == 'shell' else 'usda'}"
+def layer_file(name: str, *, crate: bool = False) -> str:
+    """Path of one of the room's layers in its folder; the shell's meshes are no text, with `crate` none is."""
+    return f"layers/{name}.{'usdc' if crate or name == 'shell' else 'usda'}"
 
 
 def piece_name(asset: str, piece: str) -> str:
@@ -58,6 +59,16 @@ def component_file(asset: str) -> str:
 def original_file(asset: str, path: str) -> str:
     """Path in the room's folder of a file of somebody else's model that the asset holds."""
     return f"assets/{asset}/original/{path}"
+
+
+def thumbnail_file(asset: str) -> str:
+    """Path of an asset's picture in the room's folder; not every asset has one."""
+    return f"assets/{asset}/.thumbs/256x256/{asset}.usda.png"
+
+
+def class_path(asset: str) -> str:
+    """Path of an asset's class, whose opinions reach all its users."""
+    return f"/{CLASSES}/{asset}"
 
 
 def asset_files(asset: str) -> tuple[str, ...]:

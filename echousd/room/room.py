@@ -39,6 +39,10 @@ class RoomOptions:
             or `closed`, likewise, as a single closed surface without insides (`echousd.room.merging`).
         palette: harmony that is selected at first, one of `echousd.room.finishes.harmonies`; "" = the seed chooses.
         materialx: give the room's materials a MaterialX network beside their UsdPreviewSurface.
+        crate: write the layers as usdc, which open faster, instead of text.
+        instances: objects that share an asset are instances of it, bound through its class: less memory, no overrides
+            below one of them alone.
+        thumbnails: a picture of every asset, `.thumbs/256x256/<name>.usda.png` in its folder (extra `render`).
     """
 
     up_axis: str = "Y"
@@ -49,6 +53,9 @@ class RoomOptions:
     palette: str = ""
     merge: str = "parts"
     materialx: bool = False
+    crate: bool = False
+    instances: bool = False
+    thumbnails: bool = False
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):

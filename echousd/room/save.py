@@ -110,7 +110,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
-    last = [layer_file(name) for name in reversed(LAYERS)] + [paintings.UNFIT, root, manifest]
+    layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
+    last = [*layers, paintings.UNFIT, root, manifest]
     changed = folders.write_together(folder, files, last=last, remove=stale)
     for path, name in kept.items():
         if name:
@@ -242,7 +243,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         **({"palette": room.options.palette} if room.options.palette else {}),
         **({"faces": room.provenance.faces} if room.provenance.faces != FACES else {}),
         **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
-        **({"materialx": True} if room.options.materialx else {}),
+        **{word: True for word in ("materialx", "crate", "instances", "thumbnails") if getattr(room.options, word)},
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

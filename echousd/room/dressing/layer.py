@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from echousd.room import assets
 from echousd.room.dressing.dress import Dressing
 from echousd.room.dressing.setting import Thing
 from echousd.room.materials import LOOKS
+from echousd.room.paths import class_path
 
 DRESSING = "/Room/Dressing"
 
@@ -21,6 +23,8 @@ def dressing_layer(
     slots: Mapping[str, Mapping[str, Sequence[str]]],
     looks: Mapping[str, str],
     data: Mapping[str, Any],
+    *,
+    instances: bool = False,
 ) -> Sdf.Layer:
     """The layer; several layouts are variants of `layout`, as in the layer of the layout.
 
@@ -29,20 +33,26 @@ def dressing_layer(
         slots: asset -> name of a part -> its material slots.
         looks: material slot -> name of its material in the room.
         data: customLayerData.
+        instances: things of one asset are instances of it.
     """
     stage = assets.new_stage("Room", ".usda", data)
     room = stage.OverridePrim("/Room")
     several = len(dressing.layouts) > 1
+    users = Counter(dressing.assets[name] for things in dressing.layouts for name in things)
+    alike = frozenset(asset for asset, count in users.items() if instances and count > len(dressing.layouts))
     references: dict[str, str] = {}
     for number, things in enumerate(dressing.layouts):
         if not several:
-            _write(stage, things, dressing, slots, looks)
+            _write(stage, things, dressing, slots, looks, alike)
             continue
         variants = room.GetVariantSets().AddVariantSet("layout")
         variants.AddVariant(f"layout_{number}")
         variants.SetVariantSelection(f"layout_{number}")
         with variants.GetVariantEditContext():
-            _write(stage, things, dressing, slots, looks)
+            _write(stage, things, dressing, slots, looks, alike)
+    for asset in sorted(alike):
+        assets.define_class(stage, asset)
+        _bind(stage, class_path(asset), slots[asset], looks)
     for number, things in enumerate(dressing.layouts):
         above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
         references |= {f"{above}/{name}": dressing.assets[name] for name in things}
@@ -57,6 +67,7 @@ def _write(
     dressing: Dressing,
     slots: Mapping[str, Mapping[str, Sequence[str]]],
     looks: Mapping[str, str],
+    alike: Collection[str],
 ) -> None:
     group = UsdGeom.Xform.Define(stage, DRESSING).GetPrim()
     Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
@@ -66,11 +77,19 @@ def _write(
         x, y, z = (round(float(v), 5) + 0.0 for v in thing.position)
         xform.AddTranslateOp().Set(Gf.Vec3d(x, y, z))
         xform.AddRotateYOp().Set(round(float(np.degrees(thing.yaw)), 4) + 0.0)
-        for where, slot in assets.slot_paths(path, slots[asset]).items():
-            over = stage.OverridePrim(where)
-            UsdShade.MaterialBindingAPI.Apply(over)
-            target = Sdf.Path(f"{LOOKS}/{looks[slot]}")  # another layer defines it
-            over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])
+        if asset in alike:
+            xform.GetPrim().SetInstanceable(True)
+        else:
+            _bind(stage, path, slots[asset], looks)
+
+
+def _bind(stage: Usd.Stage, root: str, slots: Mapping[str, Sequence[str]], looks: Mapping[str, str]) -> None:
+    """Bind an asset's parts below a prim, or below its class."""
+    for where, slot in assets.slot_paths(root, slots).items():
+        over = stage.OverridePrim(where)
+        UsdShade.MaterialBindingAPI.Apply(over)
+        target = Sdf.Path(f"{LOOKS}/{looks[slot]}")  # another layer defines it
+        over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])
 
 
 def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
