@@ -125,7 +125,7 @@ def _read(file: Path, changed: int) -> Library:
     except ValueError as error:  # words that are no UTF-8
         raise ValueError(f"{file}: cannot be read as an index ({error})") from None
     for row in rows:
-        empty = [name for name, value in row.items() if value is None]
+        empty = [name for name, value in row.items() if value is None or (isinstance(value, list) and None in value)]
         if empty:
             raise ValueError(f"{file}: row {len(records) + 1} has no {empty[0]}; index the folder again")
         fields_of: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}
@@ -143,6 +143,14 @@ def _fault(record: AssetRecord) -> str:
         numbers = getattr(record, name)
         if len(numbers) != count or not all(map(math.isfinite, numbers)):
             return f"{name} is {numbers!s:.60}, allowed: {count} finite numbers"
+    if not record.fault and min(record.dims) <= 0:  # a model that could not be read has none
+        return f"dims is {record.dims!s:.60}, allowed: metres above 0"
+    for name in ("confidence", "front_confidence"):
+        if not 0 <= getattr(record, name) <= 1:
+            return f"{name} is {getattr(record, name)}, allowed: 0 to 1"
+    for name in ("supports", "descriptor"):
+        if not all(map(math.isfinite, getattr(record, name))):
+            return f"{name} is {getattr(record, name)!s:.60}, allowed: finite numbers"
     if record.category and record.category not in {category.name for category in vocabulary().categories}:
         return f"category is {record.category!r:.60}, allowed: a word of the vocabulary"
     return ""

@@ -154,6 +154,14 @@ def test_bombs_are_not_unpacked(folder, monkeypatch):
         ({"low": (math.nan,) * 3}, "low is .*allowed: 3 finite numbers"),
         ({"turn": (1.0,) * 4}, "turn is .*allowed: 9 finite numbers"),
         ({"category": "\0"}, "category is .*allowed: a word of the vocabulary"),
+        ({"low": (None, 1.0, 2.0)}, "row 1 has no low"),
+        ({"supports": (None,)}, "row 1 has no supports"),
+        ({"tags": (None,)}, "row 1 has no tags"),
+        ({"descriptor": (None,)}, "row 1 has no descriptor"),
+        ({"descriptor": (math.inf,)}, "descriptor is .*allowed: finite numbers"),
+        ({"dims": (0.0, -1.0, 1.0)}, "dims is .*allowed: metres above 0"),
+        ({"confidence": math.nan}, "confidence is nan, allowed: 0 to 1"),
+        ({"front_confidence": 7.0}, "front_confidence is 7.0, allowed: 0 to 1"),
     ],
 )
 def test_an_index_is_read_with_doubt(folder, change, told):
