@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections import Counter
 from functools import cached_property
 from typing import Any
 
@@ -67,8 +68,10 @@ class SceneGraph(PlainModel):
 
     @property
     def titles(self) -> dict[str, str]:
-        """Title of every node that has one, to its name."""
-        return {node.title: node.name for node in self.nodes if node.title is not None}
+        """Title of every node to its name, where it means that node alone: no other has that title or that name."""
+        often = Counter(node.title for node in self.nodes)
+        named = {node.title: node.name for node in self.nodes if node.title is not None and often[node.title] == 1}
+        return {title: name for title, name in named.items() if title not in self._by_name}
 
     @property
     def placements(self) -> tuple[Placed, ...]:

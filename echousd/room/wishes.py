@@ -129,7 +129,7 @@ def _added(graph: SceneGraph, text: str) -> SceneGraph:
     if not is_title(composed(name)):
         return graph.add_node(name, category)
     title = composed(name)
-    if title in graph.titles:
+    if title in {node.title for node in graph.nodes}:
         raise GraphError(f"object {title!r} is in this graph")
     return graph.add_node(identifier_of(title, category, set(graph.names)), category, title=title)
 

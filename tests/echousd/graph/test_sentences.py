@@ -125,6 +125,18 @@ def test_names_that_meet_are_numbered():
     assert all(Node(name, "desk").name == name for name in graph.names)
 
 
+def test_a_name_means_its_own_object_and_a_title_of_two_means_none():
+    graph = SceneGraph(
+        "study", (Node("desk", "desk", title="chair"), Node("chair", "chair"), Node("lamp", "floor_lamp"))
+    )
+    assert graph.titles == {}
+    assert str(stating(graph, "lamp left of chair").relations[0]) == "lamp left chair"
+    graph = graph.update_node("desk", title="Möbel").update_node("chair", title=unicodedata.normalize("NFD", "Möbel"))
+    with pytest.raises(GraphError, match="object: 'Möbel' is no identifier"):
+        stating(graph, "lamp left of Möbel")
+    assert stating(graph.update_node("chair", title="Stühle"), "lamp left of Möbel").relations[0].object == "desk"
+
+
 def test_a_title_must_be_shown_on_one_line():
     with pytest.raises(GraphError, match=r"object 'bed': title: found 'a.nb', allowed: a text of"):
         Node("bed", "double_bed", title="a\nb")

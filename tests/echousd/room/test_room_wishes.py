@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,9 @@ def test_titles_in_any_script_name_what_changes(tmp_path):
     assert wished(saved, Wishes(remove=("衣柜",))) == saved.graph.remove_node("wardrobe")
     assert wished(saved, Wishes(relabel=("衣柜:desk",))) == wished(saved, Wishes(relabel=("wardrobe:desk",)))
     assert not wished(saved, Wishes(lock=("衣柜",), unlock=("衣柜",))).node("wardrobe").locked
+    for twice in (saved, replace(saved, graph=saved.graph.update_node("lamp", title="Große Liege"))):
+        with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
+            wished(twice, Wishes(add=("Große Liege:single_bed",)))
     with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
         wished(saved, Wishes(add=("Große Liege:single_bed",)))
 
