@@ -130,7 +130,8 @@ def _with_placement(nodes: list[Node], placed: Placed, about: Path) -> list[Node
         raise GraphError(f"'{placed}': subject {placed.subject!r} is no object of this graph, allowed: {known}", about)
     fields = placed_fields(placed)
     held = {name: getattr(nodes[at], name) for name in fields}
-    if any(value is not None and value != fields[name] for name, value in held.items()):
+    same = set if placed.others else str  # between a and b is between b and a
+    if any(value is not None and same(value) != same(fields[name]) for name, value in held.items()):
         told = next(one for one in nodes[at].placements if bool(one.others) == bool(placed.others))
         raise GraphError(f"'{placed}': {told} is stated already, allowed: one of them", about)
     try:

@@ -73,6 +73,13 @@ def test_lines_of_relations_after_a_placement_are_right():
         read("plant in corner", "sofa left of armchair", "armchair left of sofa")
 
 
+def test_between_two_others_told_twice_in_either_order_is_no_contradiction():
+    graph = read("table between sofa and armchair", "table between armchair and sofa", "plant in corner")
+    assert set(graph.node("table").between) == {"sofa", "armchair"}
+    with pytest.raises(GraphError, match="table between sofa and armchair is stated already"):
+        read("table between sofa and armchair", "table between plant and sofa")
+
+
 def test_what_an_object_stands_between_goes_and_is_renamed_with_it():
     graph = read("table between sofa and armchair")
     assert graph.rename_node("sofa", "couch").node("table").between == ("couch", "armchair")
