@@ -106,7 +106,9 @@ class _Editor:
     def changed_node(self, prim: Usd.Prim, old: Node | None, new: Node) -> list[Edit]:
         values = usd.node_values(new)
         if old is not None and old.category == new.category:
-            del values[usd.LABELS], values[usd.CATEGORY]
+            del values[usd.CATEGORY]
+            if old.obstacle == new.obstacle:
+                del values[usd.LABELS]
         free = [a.GetName() for a in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1])]
         names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.PLACE, usd.LOCKED, usd.SOURCE, usd.ASSET, *free)
         edits = self.value_edits(prim, values, names)
