@@ -41,7 +41,8 @@ def _text(value: Any) -> str:
     return _storable(value)
 
 
-def _title(value: Any) -> str:
+def title(value: Any) -> str:
+    """A text that people may call an object by; raises ValueError for any other value."""
     if not isinstance(value, str) or not value.strip() or not value.isprintable() or len(value) > MAX_NAME:
         raise ValueError(f"found {shown(value)}, allowed: a text of at most {MAX_NAME} printable characters")
     return unicodedata.normalize("NFC", value)
@@ -246,7 +247,7 @@ Place: TypeAlias = Annotated[
     ),
 ]
 Two: TypeAlias = Annotated[tuple[str, str] | None, _optional(_two_names)]
-Title: TypeAlias = Annotated[str | None, _optional(_title)]
+Title: TypeAlias = Annotated[str | None, _optional(title)]
 AssetName: TypeAlias = Annotated[str | None, _optional(_text)]
 Size: TypeAlias = Annotated[
     Vector | None, _optional(_numbers(3, _positive, "three positive numbers [x, y, z], metres"))

@@ -13,6 +13,7 @@ from pxr import Sdf, Usd
 from echomodel.openings import Opening, opening_from_json
 from echomodel.vocabulary import vocabulary
 from echousd.graph import MAX_TEXT, GraphError, Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.fields import title
 from echousd.stage import encoding as usd
 from echousd.stage import values
 from echousd.stage.encoding import StageError
@@ -201,7 +202,7 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
 
 def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
     """The node that a prim states; `names`: of all nodes of its room, by path. Raises StageError."""
-    fields: dict[str, Any] = {"title": prim.GetDisplayName() or None, "between": _between(prim, names)}
+    fields: dict[str, Any] = {"title": _title(prim), "between": _between(prim, names)}
     free: dict[str, Any] = {}
     for attribute in prim.GetAuthoredPropertyNames():
         if attribute in _FIELDS:
@@ -219,6 +220,14 @@ def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
         return Node(name, attributes=free, **fields)
     except GraphError as error:
         raise StageError(f"{place(prim)}: {error}") from None
+
+
+def _title(prim: Usd.Prim) -> str | None:
+    """The display name of a prim, None for one that is no title: any host may write what it likes there."""
+    try:
+        return title(prim.GetDisplayName())
+    except ValueError:
+        return None
 
 
 def _between(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> tuple[str, ...] | None:

@@ -187,6 +187,26 @@ def test_another_predicate_renames_the_prim_in_place():
     assert names == ["stand__right__bed", "closet__taller_than__bed"]
 
 
+def test_another_word_for_an_obstacle_is_its_label_as_well():
+    harp = SceneGraph("study", (Node("thing", "cabinet", attributes={"obstacle": "harp"}), Node("desk", "desk")))
+    layer = graph_layer(harp)
+    for word in ("cello", None):
+        attributes = {"obstacle": word} if word else {}
+        write_graph(harp.update_node("thing", attributes=attributes), layer)
+        labels = layer.GetAttributeAtPath("/Room/Objects/thing.semantics:labels:category")
+        assert list(labels.default) == [word or "cabinet"]
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "long " * 30, "  "])
+def test_display_names_of_other_hosts_are_no_titles_where_they_do_not_fit(name):
+    layer = graph_layer(GRAPH)
+    layer.GetPrimAtPath("/Room/Objects/bed").SetInfo("displayName", name)
+    graph = read_graph(Usd.Stage.Open(layer))
+    assert graph == GRAPH
+    write_graph(graph.update_node("bed", style="oak"), layer)
+    assert layer.GetPrimAtPath("/Room/Objects/bed").GetInfo("displayName") == name
+
+
 def test_a_room_in_an_instance_is_refused():
     source = graph_layer(GRAPH)
     stage = Usd.Stage.CreateInMemory()
