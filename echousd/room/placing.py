@@ -10,12 +10,7 @@ from echousd.room.room import RoomData
 
 
 def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
-    """Author the objects' xformOps (replacing those there are), as variants `layout_0` ... where there are several."""
-    for name in room.names:
-        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
-        for property_name in ("xformOpOrder", "xformOp:translate", "xformOp:rotateY", "xformOp:rotateZ"):
-            if prim and prim.HasProperty(property_name):
-                prim.RemoveProperty(property_name)
+    """Author the objects' xformOps, as variants `layout_0` ... where there are several."""
     layouts = room.layouts or (room.boxes,)
     if len(layouts) == 1:
         _place(stage, room, 0)

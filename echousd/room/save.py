@@ -1,23 +1,20 @@
-"""Save a room: the layered folder with its manifest and preview, or one flat file."""
+"""Save a room: the layered folder with its manifest and preview."""
 
 from __future__ import annotations
 
 import io
 import json
-import tempfile
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pxr import Sdf, Usd
+from pxr import Sdf
 
 import echousd
-from echousd.flattening import flat_layer
 from echousd.graph import SceneGraph
 from echousd.naming import as_identifier
-from echousd.packing import Package, Reach, images_beside
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
 from echousd.room import ownership, paintings
@@ -27,12 +24,11 @@ from echousd.room.history import remembered
 from echousd.room.lock import locked
 from echousd.room.manifest import FACES, MANIFEST_KEY
 from echousd.room.paths import layer_file
-from echousd.room.placing import place_layouts
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
 from echousd.room.stored import Shelf, shelf_of
 from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_all, write_whole
+from echousd.stage.files import write_whole
 from echousd.stage.layouts import layout_names
 from echousd.store import Store
 
@@ -125,28 +121,6 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     for layer in filter(None, (Sdf.Layer.Find(str(folder / path)) for path in changed)):
         layer.Reload()  # this process holds it open, as it was before
     return folder / root
-
-
-def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
-    """Write the room as one `.usda` or `.usdc` file without references (variants of the layout included).
-
-    Its images lie beside it in `<name>_textures/`.
-
-    Raises ValueError for another ending, a file that is in the way, or a path that cannot be written.
-    """
-    if path.suffix not in (".usda", ".usdc"):
-        raise ValueError(f"{path}: a flat room ends in .usda or .usdc, found {path.suffix or 'no ending'!r}")
-    if path.exists() and not force:
-        raise ValueError(f"{path}: exists; choose another file or use --force")
-    with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
-        root = save_layers(room, Path(scratch) / room.name)
-        stage = open_stage(root)
-        package = Package(Reach.of(stage), images_beside(path))
-        layer = flat_layer(stage, package=package)
-    if len(room.layouts) > 1:
-        place_layouts(Usd.Stage.Open(layer), room)
-    write_all({path: layer_bytes(layer, path.suffix), **package.files(path.parent)})
-    return path
 
 
 PREVIEW = 400  # pixels

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from echousd.room.finished import Room
+from echousd.room.flat import save_flat
 from echousd.room.house import Place, check_house, write_house
 from echousd.room.output import writing
 from echousd.room.progress import StageTimer
-from echousd.room.save import save_flat, save_layers, write_preview, write_sheet
+from echousd.room.save import save_layers, write_preview, write_sheet
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import replace
 
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_room import StandIn, small_graph
 from stopped_disk import stopped_disk
 
@@ -15,8 +15,9 @@ import echousd
 from echousd.naming import as_identifier
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
+from echousd.room.flat import save_flat
 from echousd.room.folder import STAGING
-from echousd.room.save import save_flat, write_preview
+from echousd.room.save import write_preview
 
 
 def make(seed=0, shift=0.5, graph=None, **more):
@@ -294,6 +295,30 @@ def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
         save_flat(room, path)
     with pytest.raises(ValueError, match=r"a flat room ends in .usda or .usdc, found '.obj'"):
         save_flat(room, tmp_path / "room.obj")
+
+
+def shown(stage, layout):
+    """What a stage shows in a layout: path -> place, path of a mesh -> its material."""
+    stage.GetPrimAtPath("/Room").GetVariantSet("layout").SetVariantSelection(layout)
+    cache, places, looks = UsdGeom.XformCache(), {}, {}
+    for prim in stage.Traverse():
+        if UsdGeom.Xformable(prim) and prim.GetTypeName() != "Camera":
+            at = cache.GetLocalToWorldTransform(prim).ExtractTranslation()
+            places[str(prim.GetPath())] = [round(v, 3) + 0.0 for v in at]
+        if prim.IsA(UsdGeom.Mesh) and not prim.HasAPI(UsdPhysics.CollisionAPI):
+            looks[str(prim.GetPath())] = str(UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0].GetPath())
+    return places, looks
+
+
+@pytest.mark.parametrize("dress", ["none", "some"])
+def test_layouts_of_a_flat_room_look_as_those_of_its_folder(tmp_path, dress):
+    room = make(seed=1, samples=2, options=RoomOptions(walls=True, dress=dress, up_axis="Z"))
+    stages = [opened(room.save(tmp_path / "room", preview=False)), opened(save_flat(room, tmp_path / "flat.usda"))]
+    found = [[shown(stage, layout) for layout in ("layout_0", "layout_1")] for stage in stages]
+    assert found[0] == found[1]
+    (first, _), (second, _) = found[1]
+    assert first["/Room/Lights/lamp_lamp"] != second["/Room/Lights/lamp_lamp"]
+    assert any(path.startswith("/Room/Dressing/") for path in second) is (dress == "some")
 
 
 def test_room_is_shown_in_notebooks():
