@@ -32,8 +32,10 @@ def agreeing_labels(stage: Usd.Stage) -> Iterator[Finding]:
         if len(words) != 1:
             continue
         word = normalised(words[0])
-        meant = spaced(prim.GetName()).rpartition("_")[2]
-        other = meant in SHELL and word.removesuffix("s") not in (meant, SHELL[meant])
+        named = spaced(prim.GetName()).split("_")
+        meant = named[-1]  # a wall clock is none, and a ceiling lamp neither, whichever word comes last
+        shared = not {each.removesuffix("s") for each in word.split("_")}.isdisjoint({*named, SHELL.get(meant, meant)})
+        other = meant in SHELL and not shared
         if other and not any(prim.GetPath().HasPrefix(path) for path in nodes):
             known = is_structure(word) or known_category(word) is not None
             told = f"{usd.LABELS} is {words[0]!r}, its name says {meant!r}"

@@ -135,3 +135,14 @@ def test_walls_are_labelled_walls(stage):
     assert [one.warning for rule in RULES for one in safely(rule, stage)] == [False]
     prim.attributes[LABELS].default = Vt.TokenArray(["partition"])  # of somebody's own vocabulary
     assert [one.warning for rule in RULES for one in safely(rule, stage)] == [True]
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("SM_Lamp_Ceiling_01", "ceiling_lamp"), ("Cabinet_Door", "cabinet"), ("Clock_Wall", "clock")],
+)
+def test_names_that_share_a_word_with_their_label_agree(stage, name, word):
+    layer, path = stage.GetRootLayer(), f"/Room/Shell/{name}"
+    Sdf.CopySpec(layer, "/Room/Shell/Wall", layer, path)
+    layer.GetPrimAtPath(path).attributes[LABELS].default = Vt.TokenArray([word])
+    assert [one for one in found(stage) if one[0] == "echo:LabelsAgree"] == []
