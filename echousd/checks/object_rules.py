@@ -28,24 +28,24 @@ def upright(stage: Usd.Stage) -> Iterator[Finding]:
     for room in _rooms(stage):
         to_room = room_frame(room.room, cache)
         for prim in room.nodes:
-            try:
-                own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
-            except (StageError, Tf.ErrorException):
-                continue
-            length = np.linalg.norm(own[:3, :3], axis=0)
-            if (length < 1e-9).any():
-                continue
-            highest = float((own[1, 1:3] / length[1:3]).max())
-            if highest < UPRIGHT:
-                angle = np.degrees(np.arccos(np.clip(highest, -1, 1)))
+            ups = _ups(prim, to_room, cache)
+            if ups is not None and ups.max() < UPRIGHT:
+                angle = np.degrees(np.arccos(np.clip(ups.max(), -1, 1)))
                 yield Finding(prim.GetPath(), f"leans by {angle:.0f} degrees, allowed: upright")
         for prim in _others(room):
-            try:
-                own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
-            except (StageError, Tf.ErrorException):
-                continue
-            if own[1, 1] < -UPRIGHT and own[1, 2] < UPRIGHT:
+            ups = _ups(prim, to_room, cache)
+            if ups is not None and ups[0] < -UPRIGHT and ups[1] < UPRIGHT:
                 yield Finding(prim.GetPath(), "stands on its head, allowed: its own +Y (or +Z) upwards")
+
+
+def _ups(prim: Usd.Prim, to_room: np.ndarray, cache: UsdGeom.XformCache) -> np.ndarray | None:
+    """(2,) float, cosines of the angles between the room's up and a prim's own +Y and +Z; None = it has no axes."""
+    try:
+        own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
+    except (StageError, Tf.ErrorException):  # the rules on values report it
+        return None
+    length = np.linalg.norm(own[:3, 1:3], axis=0)
+    return None if (length < 1e-9).any() else own[1, 1:3] / length
 
 
 def one_label(stage: Usd.Stage) -> Iterator[Finding]:

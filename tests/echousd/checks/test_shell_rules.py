@@ -62,6 +62,15 @@ def test_what_the_graph_does_not_know_is_judged_too(stage, thing):
     assert found(stage) == [("echo:OneLabel", path, f"{LABELS} is rug, vase, allowed: one word")]
 
 
+@pytest.mark.parametrize(("angle", "scale", "wrong"), [(180, 0.1, True), (95, 100, False), (180, 0, False)])
+def test_small_things_stand_on_their_heads_in_any_scale(stage, angle, scale, wrong):
+    path = "/Room/Dressing/vase"
+    author(stage, f"{path}.xformOp:rotateX", float(angle), Sdf.ValueTypeNames.Float)
+    author(stage, f"{path}.xformOp:scale", (scale, scale, scale), Sdf.ValueTypeNames.Double3)
+    author(stage, f"{path}.xformOpOrder", Vt.TokenArray(["xformOp:translate", "xformOp:rotateX", "xformOp:scale"]))
+    assert [one[1] for one in found(stage) if one[0] == "echo:Upright"] == [path] * wrong
+
+
 @pytest.mark.parametrize("thing", ["Objects/bed", "Shell/Wall"])
 def test_hints_are_the_boxes_of_what_is_shown(stage, thing):
     author(stage, f"/Room/{thing}.extentsHint", Vt.Vec3fArray([(0, 0, 0), (9, 9, 9)]), Sdf.ValueTypeNames.Float3Array)
