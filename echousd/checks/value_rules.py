@@ -30,15 +30,14 @@ def value_types(stage: Usd.Stage) -> Iterator[Finding]:
 def finite_values(stage: Usd.Stage) -> Iterator[Finding]:
     """No NaN, no infinity (but for physics' "unlimited"), nothing beyond a thousand million."""
     for attribute in _authored(stage):
-        if attribute.GetNamespace().startswith("physics"):
-            continue
         try:
             found = np.asarray(attribute.Get())
         except (Tf.ErrorException, TypeError, ValueError):
             continue
         if found.dtype.kind != "f":
             continue
-        bad = ~(np.abs(found) <= LARGEST)
+        physical = attribute.GetNamespace().startswith("physics")
+        bad = np.isnan(found) if physical else ~(np.abs(found) <= LARGEST)
         if bad.any():
             told = f"{found[bad].flat[0]:g}" + (f" ({int(bad.sum())} of {bad.size} numbers)" if bad.size > 1 else "")
             yield Finding(attribute.GetPath(), f"holds {told}, allowed: -{LARGEST:g} to {LARGEST:g}")
