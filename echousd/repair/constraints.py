@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
 
 import numpy as np
+from scipy import sparse
 
 from echousd.repair.belonging import allowed_overlap
-from echousd.repair.geometry import COLUMNS, axes, floor_rows, separation_rows, spread
+from echousd.repair.geometry import COLUMNS, Rows, axes, floor_rows, separation_rows, spread, spread_sparsely
 from echousd.repair.placements import placement_rows
 from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem, wall_gaps
 from echousd.repair.relations import relation_margins
 
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
+MANY = 60  # boxes beyond which constraints are sparse, and pairs far apart are none
+LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
+
+Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,17 +28,26 @@ class Linearised:
 
     Arguments:
         value: (r,) float, metres or ratio, the wanted slack already taken off.
-        gradient: (r, n * 6) float.
+        gradient: (r, n * 6) float; sparse for very many boxes.
         equal: (r,) bool, True where the value must be zero rather than not negative.
         kind: (r,) int, `RELATION` ... `PLACEMENT`.
         axis: (p,) int, separating axis chosen for each pair.
+        pair: (c,) int, number of the pair of each collision's row.
     """
 
     value: np.ndarray
-    gradient: np.ndarray
+    gradient: Matrix
     equal: np.ndarray
     kind: np.ndarray
     axis: np.ndarray
+    pair: np.ndarray
+
+    def boxes_of(self, row: int) -> list[int]:
+        """The boxes that a constraint is about."""
+        slopes = self.gradient[[row]]
+        dense = slopes.toarray() if sparse.issparse(slopes) else slopes
+        found: list[int] = np.flatnonzero(np.abs(dense.reshape(-1, COLUMNS)).sum(1) > 0).tolist()
+        return found
 
 
 def linearise(
@@ -51,30 +67,44 @@ def linearise(
         slack: metres or ratio by which relations are to hold, so that rounding does not break them.
     """
     n = len(size)
+    many = n > MANY
     values: list[np.ndarray] = []
-    gradients: list[np.ndarray] = []
+    gradients: list[Matrix] = []
     equals: list[bool] = []
     kinds: list[np.ndarray] = []
 
     def add(value: np.ndarray, gradient: np.ndarray, kind: int | np.ndarray, equal: bool = False) -> None:
+        flat = gradient.reshape(len(value), n * COLUMNS)
+        put(value, sparse.csr_array(flat) if many else flat, kind, equal)
+
+    def add_rows(rows: Rows, kind: int) -> None:
+        if many:
+            put(rows.value, spread_sparsely(rows.gradient, rows.who, n), kind)
+        else:
+            add(rows.value, spread(rows.gradient, rows.who, n), kind)
+
+    def put(value: np.ndarray, gradient: Matrix, kind: int | np.ndarray, equal: bool = False) -> None:
         values.append(value)
-        gradients.append(gradient.reshape(len(value), n * COLUMNS))
+        gradients.append(gradient)
         equals.extend([equal] * len(value))
         kinds.append(np.broadcast_to(np.asarray(kind, int), len(value)))
 
     margin, by_pair = relation_margins(
         size, position, yaw, problem.triplets, rules=problem.rules, centre=problem.centre, fronts=problem.fronts
     )
-    add(margin - slack, spread(by_pair, problem.triplets[:, [0, 2]], n), RELATION)
+    add_rows(Rows(margin - slack, by_pair, problem.triplets[:, [0, 2]]), RELATION)
 
     apart, axis = separation_rows(size, position, yaw, problem.pairs, problem.order, handicap)
     allowed = np.where(problem.touching, 0.0, allowed_overlap(problem.categories, size, problem.pairs))
-    add(apart.value + allowed - 0.002, apart.gradient, COLLISION)
+    apart = replace(apart, value=apart.value + allowed - 0.002)
+    pair = np.arange(len(problem.pairs))
+    if many:  # those apart that no step brings together
+        pair = np.flatnonzero(apart.value <= LONGEST_STEP * np.abs(apart.gradient).sum((1, 2)) + 1e-6)
+    add_rows(apart.take(pair), COLLISION)
 
     if problem.floor is not None:
-        within, who = floor_rows(problem.floor, size, position, yaw)
-        near = ~problem.fixed[who] & (within.value < 1.0)
-        add(within.value[near], within.gradient[near], FLOOR)
+        within = floor_rows(problem.floor, size, position, yaw)
+        add_rows(within.take(~problem.fixed[within.who[:, 0]] & (within.value < 1.0)), FLOOR)
         add(*_wall_rows(problem, size, position, yaw), WALL, equal=True)
 
     add(*_support_rows(problem, size, position), equal=True)
@@ -83,9 +113,13 @@ def linearise(
         walls = problem.surroundings
         margin, gradient = placement_rows(problem.stated, walls, problem.categories, size, position, yaw)
         add(margin - slack, gradient, PLACEMENT)
-    return Linearised(
-        np.concatenate(values), np.concatenate(gradients), np.array(equals, bool), np.concatenate(kinds), axis
-    )
+    whole = stacked_rows(gradients)
+    return Linearised(np.concatenate(values), whole, np.array(equals, bool), np.concatenate(kinds), axis, pair)
+
+
+def stacked_rows(parts: Sequence[Matrix]) -> Matrix:
+    """Rows of gradients below one another."""
+    return sparse.vstack(parts, format="csr") if sparse.issparse(parts[0]) else np.concatenate(parts)
 
 
 def _wall_rows(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy import sparse
 
 from echomodel.roomboxes import footprints
 
@@ -22,11 +23,17 @@ class Rows:
 
     Arguments:
         value: (r,) float, metres.
-        gradient: (r, n, 6) float, derivative of each value by the numbers of each of the n boxes.
+        gradient: (r, k, 6) float, derivative of each value by the numbers of each of the k boxes that it is about.
+        who: (r, k) int, these boxes.
     """
 
     value: np.ndarray
     gradient: np.ndarray
+    who: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Rows:
+        """The same of some of the rows."""
+        return Rows(self.value[rows], self.gradient[rows], self.who[rows])
 
 
 def axes(yaw: np.ndarray) -> np.ndarray:
@@ -37,13 +44,19 @@ def axes(yaw: np.ndarray) -> np.ndarray:
     return out
 
 
-def spread(gradient: np.ndarray, ends: np.ndarray, n: int) -> np.ndarray:
-    """(r, n, 6) float: gradients by the two boxes of each row, (r, 2, 6), put at the rows' boxes `ends` (r, 2) int."""
-    out = np.zeros((len(ends), n, COLUMNS))
-    r = np.arange(len(ends))
-    out[r, ends[:, 0]] = gradient[:, 0]
-    out[r, ends[:, 1]] += gradient[:, 1]
+def spread(gradient: np.ndarray, who: np.ndarray, n: int) -> np.ndarray:
+    """(r, n, 6) float: gradients by the k boxes of each row, (r, k, 6), put at the rows' boxes `who` (r, k) int."""
+    out = np.zeros((len(who), n, COLUMNS))
+    r = np.arange(len(who))
+    for column in range(who.shape[1]):
+        out[r, who[:, column]] += gradient[:, column]
     return out
+
+
+def spread_sparsely(gradient: np.ndarray, who: np.ndarray, n: int) -> sparse.csr_array:
+    """(r, n * 6): `spread` of very many boxes."""
+    rows, columns = np.arange(len(who)).repeat(who.shape[1] * COLUMNS), who[..., None] * COLUMNS + np.arange(COLUMNS)
+    return sparse.csr_array((gradient.ravel(), (rows, columns.ravel())), shape=(len(who), n * COLUMNS))
 
 
 def pair_indices(n: int) -> np.ndarray:
@@ -109,24 +122,24 @@ def separation_rows(
     chosen = (gap - handicap).argmax(1)
     p = np.arange(len(pairs))
     value = gap[p, chosen]
-    gradient = np.zeros((len(pairs), len(size), COLUMNS))
+    gradient = np.zeros((len(pairs), 2, COLUMNS))
     flat = np.minimum(chosen, 3)
     horizontal = chosen < 4
     i, j = pairs[:, 0], pairs[:, 1]
     push = direction[p, flat] * horizontal[:, None]
     for end, column, sign in ((i, 0, -1.0), (j, 1, 1.0)):
-        gradient[p, end, 0] = sign * push[:, 0]
-        gradient[p, end, 2] = sign * push[:, 1]
+        gradient[:, column, 0] = sign * push[:, 0]
+        gradient[:, column, 2] = sign * push[:, 1]
         shrink = -0.5 * reach[p, flat, column] * size[end][:, [0, 2]] * horizontal[:, None]
-        gradient[p, end, 3] = shrink[:, 0]
-        gradient[p, end, 5] = shrink[:, 1]
+        gradient[:, column, 3] = shrink[:, 0]
+        gradient[:, column, 5] = shrink[:, 1]
     first_below = position[j, 1] + 0.5 * size[j, 1] >= position[i, 1] + 0.5 * size[i, 1]
-    lower, upper = np.where(first_below, i, j), np.where(first_below, j, i)
-    up = ~horizontal
-    gradient[p[up], upper[up], 1] = 1.0
-    gradient[p[up], lower[up], 1] = -1.0
-    gradient[p[up], lower[up], 4] = -size[lower[up], 1]
-    return Rows(value, gradient), chosen
+    lower, upper = np.where(first_below, 0, 1), np.where(first_below, 1, 0)
+    up = np.flatnonzero(~horizontal)
+    gradient[up, upper[up], 1] = 1.0
+    gradient[up, lower[up], 1] = -1.0
+    gradient[up, lower[up], 4] = -size[pairs[up, lower[up]], 1]
+    return Rows(value, gradient, pairs), chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,24 +245,20 @@ def _within(floor: Floor, points: np.ndarray) -> np.ndarray:
     return (above & (x < z * floor.slope)).sum(1) % 2 == 1
 
 
-def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> tuple[Rows, np.ndarray]:
-    """Every footprint corner inside the floor and every reflex corner of the floor outside the footprints.
-
-    Returns: the rows, and the object that each row is about (r,) int.
-    """
+def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Rows:
+    """Every footprint corner inside the floor and every reflex corner of the floor outside the footprints."""
     n, u = len(size), axes(yaw)
     corner = footprints(size, position, yaw)
     distance, gradient = inside(floor, corner.reshape(-1, 2))
     who = np.repeat(np.arange(n), 4)
     lever = corner.reshape(-1, 2) - position[who][:, [0, 2]]
     local = np.einsum("rkd,rd->rk", u[who], lever)
-    rows = np.zeros((len(who), n, COLUMNS))
-    r = np.arange(len(who))
-    rows[r, who, 0], rows[r, who, 2] = gradient[:, 0], gradient[:, 1]
+    rows = np.zeros((len(who), 1, COLUMNS))
+    rows[:, 0, 0], rows[:, 0, 2] = gradient[:, 0], gradient[:, 1]
     pull = np.einsum("rkd,rd->rk", u[who], gradient) * local
-    rows[r, who, 3], rows[r, who, 5] = pull[:, 0], pull[:, 1]
+    rows[:, 0, 3], rows[:, 0, 5] = pull[:, 0], pull[:, 1]
     if not len(floor.reflex):
-        return Rows(distance, rows), who
+        return Rows(distance, rows, who[:, None])
     offset = floor.reflex[None] - position[:, None, [0, 2]]
     local = np.einsum("nkd,nmd->nmk", u, offset)
     excess = np.abs(local) - 0.5 * size[:, None, [0, 2]]
@@ -257,9 +266,10 @@ def floor_rows(floor: Floor, size: np.ndarray, position: np.ndarray, yaw: np.nda
     value = np.take_along_axis(excess, axis[..., None], -1)[..., 0]
     who2 = np.repeat(np.arange(n), len(floor.reflex))
     axis, sign = axis.ravel(), np.sign(np.take_along_axis(local, axis[..., None], -1)).ravel()
-    rows2 = np.zeros((len(who2), n, COLUMNS))
+    rows2 = np.zeros((len(who2), 1, COLUMNS))
     r = np.arange(len(who2))
     direction = -sign[:, None] * u[who2, axis]
-    rows2[r, who2, 0], rows2[r, who2, 2] = direction[:, 0], direction[:, 1]
-    rows2[r, who2, 3 + 2 * axis] = -0.5 * size[who2, 2 * axis]
-    return Rows(np.concatenate((distance, value.ravel())), np.concatenate((rows, rows2))), np.concatenate((who, who2))
+    rows2[:, 0, 0], rows2[:, 0, 2] = direction[:, 0], direction[:, 1]
+    rows2[r, 0, 3 + 2 * axis] = -0.5 * size[who2, 2 * axis]
+    every = np.concatenate((who, who2))[:, None]
+    return Rows(np.concatenate((distance, value.ravel())), np.concatenate((rows, rows2)), every)

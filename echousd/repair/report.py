@@ -50,9 +50,9 @@ def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.nd
     """Objects that leave the floor, with the depth in metres."""
     if problem.floor is None:
         return ()
-    rows, who = floor_rows(problem.floor, size, position, yaw)
+    rows = floor_rows(problem.floor, size, position, yaw)
     depth = np.zeros(len(size))
-    np.maximum.at(depth, who, -rows.value)
+    np.maximum.at(depth, rows.who[:, 0], -rows.value)
     return tuple((i, float(depth[i])) for i in np.flatnonzero(depth > TOUCH).tolist())
 
 
@@ -70,9 +70,7 @@ def conflicts(
     """
     at = found.at
     violated = np.flatnonzero((at.value < -0.002) & np.isin(at.kind, (RELATION, COLLISION, FLOOR)))
-    touched = [
-        frozenset(np.flatnonzero(np.abs(at.gradient[r].reshape(len(problem.fixed), -1)).sum(1) > 0)) for r in violated
-    ]
+    touched = [frozenset(at.boxes_of(r)) for r in violated.tolist()]
     groups: list[tuple[set[int], list[int]]] = []
     for row, objects in zip(violated.tolist(), touched, strict=True):
         movable = {int(i) for i in objects if not (problem.fixed[i] and problem.rigid[i])}
@@ -91,9 +89,8 @@ def conflicts(
         Conflict(
             tuple(int(rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
             tuple(
-                (int(problem.pairs[r - first[COLLISION], 0]), int(problem.pairs[r - first[COLLISION], 1]))
-                for r in members
-                if at.kind[r] == COLLISION
+                (int(problem.pairs[pair, 0]), int(problem.pairs[pair, 1]))
+                for pair in (int(at.pair[r - first[COLLISION]]) for r in members if at.kind[r] == COLLISION)
             ),
             tuple(sorted({int(i) for r in members if at.kind[r] == FLOOR for i in objects_of[r]})),
         )

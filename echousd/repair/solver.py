@@ -10,19 +10,25 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.linalg import splu
 
 from echousd.repair.constraints import (
     CEILING,
     COLLISION,
     FLOOR,
+    LONGEST_STEP,
+    MANY,
     OVERHANG,
     PLACEMENT,
     RELATION,
     SUPPORT,
     WALL,
     Linearised,
+    Matrix,
     linearise,
+    stacked_rows,
 )
 from echousd.repair.geometry import COLUMNS
 from echousd.repair.problem import Posed
@@ -102,7 +108,7 @@ def solve(start: Posed, config: RepairConfig) -> Solution:
             break
         # Next time colliding pairs part along another axis; what still does not fit first walks through the others.
         stuck = np.flatnonzero((found.at.kind == COLLISION) & (found.at.value < -0.01))
-        colliding = stuck - (int(np.argmax(found.at.kind == COLLISION)) if len(stuck) else 0)
+        colliding = found.at.pair[stuck - (int(np.argmax(found.at.kind == COLLISION)) if len(stuck) else 0)]
         handicap[colliding, found.at.axis[colliding]] += 0.4
         if not len(stuck) or best is not found:
             through = THROUGH
@@ -118,6 +124,7 @@ def _descend(start: Posed, handicap: np.ndarray, through: int, config: RepairCon
     stiffnesses = np.array([STIFFNESS[kind] for kind in range(len(STIFFNESS))])
     sides = np.eye(n * COLUMNS).reshape(n, COLUMNS, -1)[:, 3:].reshape(3 * n, -1)
     bounds = np.concatenate((-sides, sides))
+    bounds = sparse.csr_array(bounds) if n > MANY else bounds
     state = origin.copy()
     best: Solution | None = None
     before, last = np.inf, 0
@@ -139,10 +146,10 @@ def _descend(start: Posed, handicap: np.ndarray, through: int, config: RepairCon
             stiffness = np.where(at.kind == COLLISION, 0.0, stiffness)
         grown = (state - origin)[:, 3:].ravel()
         step = newton(
-            np.concatenate((at.gradient, bounds))[:, free],
+            stacked_rows((at.gradient, bounds))[:, free],
             np.concatenate((at.value, config.limit - grown, config.limit + grown)),
-            np.concatenate((at.equal, np.zeros(len(bounds), bool))),
-            np.concatenate((stiffness, np.full(len(bounds), LIMIT_STIFFNESS))),
+            np.concatenate((at.equal, np.zeros(6 * n, bool))),
+            np.concatenate((stiffness, np.full(6 * n, LIMIT_STIFFNESS))),
             weight,
             (state - origin).ravel()[free],
             damping,
@@ -178,7 +185,7 @@ def newton(
     """Exact minimiser of 1/2 |moved + d|^2_W + damping' |d|^2 + sum rho/2 hinge(-(value + gradient d))^2 over d.
 
     Arguments:
-        gradient: (r, m) float; value, stiffness: (r,) float; equal: (r,) bool.
+        gradient: (r, m) float, sparse or not; value, stiffness: (r,) float; equal: (r,) bool.
         weight, moved: (m,) float: price of and present distance from the starting boxes.
         damping: factor >= 1 on the price of this step.
 
@@ -186,7 +193,7 @@ def newton(
     """
     extra = (damping - 1.0) * weight
     # Rows that no step of the allowed length can violate never become active.
-    far = value - 0.6 * np.abs(gradient).sum(1) > 0
+    far = value - LONGEST_STEP * np.asarray(abs(gradient).sum(1)).ravel() > 0
     keep = equal | ~far
     gradient, value, equal, stiffness = gradient[keep], value[keep], equal[keep], stiffness[keep]
     step = np.zeros(len(weight))
@@ -200,10 +207,7 @@ def newton(
     now, active = cost(step)
     for _ in range(20):
         rows = gradient[active]
-        scaled = rows * stiffness[active, None]
-        hessian = rows.T @ scaled
-        hessian[np.diag_indices_from(hessian)] += weight + extra
-        target = cho_solve(cho_factor(hessian, check_finite=False), -scaled.T @ value[active] - weight * moved)
+        target = _least(rows, stiffness[active], weight + extra, value[active], weight * moved)
         direction, length = target - step, 1.0
         for _ in range(12):
             after, following = cost(step + length * direction)
@@ -217,3 +221,20 @@ def newton(
         if same:
             break
     return step
+
+
+def _least(
+    rows: Matrix, stiffness: np.ndarray, diagonal: np.ndarray, value: np.ndarray, pull: np.ndarray
+) -> np.ndarray:
+    """The d (m,) with (rows' S rows + D) d = -rows' S value - pull."""
+    if sparse.issparse(rows):
+        stiff = sparse.diags_array(stiffness) @ rows
+        hessian = (rows.T @ stiff + sparse.diags_array(diagonal)).tocsc()
+        factors = splu(hessian, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        found: np.ndarray = factors.solve(-(stiff.T @ value) - pull)
+        return found
+    scaled = rows * stiffness[:, None]
+    hessian = rows.T @ scaled
+    hessian[np.diag_indices_from(hessian)] += diagonal
+    solved: np.ndarray = cho_solve(cho_factor(hessian, check_finite=False), -scaled.T @ value - pull)
+    return solved
