@@ -98,3 +98,32 @@ def review(
     say(f"page     {folder / 'review.html'}")
     say(f"sheets   {len(sheets)} in {folder}")
     say(f"table    {table}: correct it and run echousd assets index again")
+
+
+@assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")
+def pack(
+    room: Annotated[Path, typer.Argument(help="Room, or its folder.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the packages.", show_default=False)],
+    asset: Annotated[list[str] | None, typer.Option(help="Name of an asset; may be repeated; default: all.")] = None,
+    author: Annotated[str, typer.Option(help="Who is told as the author.")] = "EchoUSD",
+    force: Annotated[bool, typer.Option("--force", help="Replace packages that are there.")] = False,
+    json: AsJson = False,
+) -> None:
+    """Write a room's furniture as packages for SimReady hosts: Z up, payload folder, picture, provenance.
+
+    Needs the extra render.
+    """
+    from echousd.room.found import room_at
+    from echousd.room.simready import pack as write
+
+    started = time.perf_counter()
+    done = write(room_at(room), output, names=asset or (), author=author, force=force)
+    if json:
+        say_written(list(done.layers), started, more={"left_out": list(done.left), "hangs": list(done.hangs)})
+        return
+    for sentence in done.left:
+        say(f"left out {sentence}")
+    for path in done.layers:
+        say(f"package  {path}")
+    for sentence in done.hangs:
+        say(f"note     {sentence}")
