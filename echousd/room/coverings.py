@@ -6,7 +6,7 @@ import hashlib
 
 import numpy as np
 
-from echomodel.openings import edge_lengths, inward_normal
+from echomodel.openings import direction, edge_lengths, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.room.room import RoomData
 
@@ -33,8 +33,9 @@ def papered_wall(room: RoomData) -> str:
         front = np.array([np.sin(yaw[number]), np.cos(yaw[number])])
         back = position[number, [0, 2]] - front * size[number, 2] / 2
         for edge, length in enumerate(edge_lengths(corners)):
-            inside = inward_normal(corners, edge)
-            if length > 1.0 and front @ inside > 0.97 and abs(float((back - corners[edge]) @ inside)) < NEAR:
+            inside, off = inward_normal(corners, edge), back - corners[edge]
+            before = 0 <= float(off @ direction(corners, edge)) <= length  # not beside it, before another wall in line
+            if length > 1.0 and front @ inside > 0.97 and before and abs(float(off @ inside)) < NEAR:
                 return f"Wall_{edge + 1}"
     return ""
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+import torch
 from pxr import Usd, UsdShade
 from small_room import StandIn, small_graph
 
 import echousd
+from echomodel.boxes import Boxes
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.room import RoomOptions
 from echousd.room.coverings import floor_slot, papered_wall
 from echousd.room.room import Provenance
@@ -33,6 +36,15 @@ def test_about_a_third_of_the_bedrooms_has_carpet_and_a_third_paper(room):
     assert 18 < 90 - papers.count("") < 42
     assert len(set(papers)) == 2  # none, and the one behind the bed
     assert papered_wall(replace(seeded(room, papers.index(max(papers))), options=RoomOptions())) == ""
+
+
+@pytest.mark.parametrize(("x", "wall"), [(2.0, "Wall_5"), (-2.0, "Wall_1")])
+def test_of_two_walls_in_line_that_behind_the_bed_has_paper(room, x, wall):
+    corners = ((-3, -3), (-1, -3), (-1, 0), (1, 0), (1, -3), (3, -3), (3, 3), (-3, 3))
+    graph = SceneGraph(RoomSpec("bedroom", floor_polygon=corners), (Node("bed", "double_bed"),), ())
+    boxes = Boxes(torch.tensor([[1.8, 0.5, 2.0]]), torch.tensor([[x, 0.0, -2.0]]), torch.zeros(1))
+    papered = {papered_wall(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)}
+    assert papered == {"", wall}
 
 
 def test_coverings_are_bound_and_have_their_images(room, tmp_path):
