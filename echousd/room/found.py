@@ -5,21 +5,22 @@ from __future__ import annotations
 import glob
 from pathlib import Path
 
+from echousd.graph.files import STAGE_FORMS
 from echousd.room.manifest import find_manifest
 
 
 def rooms_at(place: Path) -> list[Path]:
     """The root layers of the rooms at a path, sorted; raises ValueError for a folder or pattern without any."""
     if place.is_dir():
-        rooms = [_room_in(folder) for folder in (place, *sorted(p for p in place.rglob("*") if p.is_dir()))]
-        found = [room for room in rooms if room is not None]
+        found = _rooms_below(place)
         if not found:
             raise ValueError(f"{place}: no room in this folder")
         return found
     if not place.exists() and glob.has_magic(str(place)):
-        found = [room for path in sorted(glob.glob(str(place), recursive=True)) for room in rooms_at(Path(path))]  # noqa: PTH207
+        matches = [Path(path) for path in sorted(glob.glob(str(place), recursive=True))]  # noqa: PTH207
+        found = _rooms_of(matches)
         if not found:
-            raise ValueError(f"{place}: matches nothing")
+            raise ValueError(f"{place}: matches {'no room' if matches else 'nothing'}")
         return found
     return [place]
 
@@ -37,6 +38,20 @@ def room_at(place: Path) -> Path:
         shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
         raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
     return rooms[0]
+
+
+def _rooms_below(place: Path) -> list[Path]:
+    rooms = [_room_in(folder) for folder in (place, *sorted(path for path in place.rglob("*") if path.is_dir()))]
+    return [room for room in rooms if room is not None]
+
+
+def _rooms_of(matches: list[Path]) -> list[Path]:
+    """What a pattern found: rooms of folders, and stages that are no layers or assets of these."""
+    rooms = [room for path in matches if path.is_dir() for room in _rooms_below(path)]
+    stages = [path for path in matches if path.suffix in STAGE_FORMS and path.is_file()]
+    folders = {room.parent for room in rooms}
+    rooms += [path for path in stages if folders.isdisjoint(path.parents)]
+    return sorted(dict.fromkeys(rooms))
 
 
 def _room_in(folder: Path) -> Path | None:

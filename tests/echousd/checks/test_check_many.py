@@ -30,6 +30,20 @@ def test_a_folder_and_a_pattern_of_rooms(rooms, echousd_command):
     assert "ok" in json.loads(echousd_command("check", rooms / "a", "--json").out)
 
 
+@pytest.mark.parametrize("pattern", ["*", "**", "**/*.usda", "?"])
+def test_what_matches_a_pattern_and_is_no_room_is_left_out(rooms, echousd_command, pattern):
+    (rooms / "manifest.json").write_text("{}")
+    (rooms / "pictures").mkdir()
+    found = json.loads(echousd_command("check", rooms / pattern, "--json").out)
+    at = [entry["room"] for entry in found]
+    if pattern == "**/*.usda":  # says itself that it means layers, too
+        assert str(rooms / "a/layers/layout.usda") in at
+        at = [path for path in at if not {"layers", "assets"} & set(path.split("/"))]
+    assert at == [str(rooms / n / f"{n}.usda") for n in "ab"]
+    done = echousd_command("check", rooms / "m*")
+    assert (done.code, "matches no room" in done.err) == (2, True)
+
+
 def test_a_room_that_cannot_be_read_costs_no_other_its_report(rooms, echousd_command):
     good = json.loads(echousd_command("check", rooms / "b", "--json").out)
     broken = rooms / "a" / "a.usda"
