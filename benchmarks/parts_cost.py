@@ -49,9 +49,8 @@ def on_disk(geometry: Geometry, word: str) -> int:
         if write is assets.geometry_layer:
             extents = np.stack([form.extent for form in forms.values()])
             extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
-            slots = {path: tuple(form.groups) for path, form in forms.items()}
-            layer = assets.component_layer("one", word, "oak", extent, slots, geometry, {})
-            total += len(layer_bytes(assets.geometry_layer("one", forms, geometry, {}), ".usdc"))
+            layer = assets.component_layer("one", word, extent, geometry, {})
+            total += len(layer_bytes(assets.geometry_layer("one", forms, geometry, {}, "oak"), ".usdc"))
             total += len(layer_bytes(layer, ".usda"))
         elif forms:
             total += len(layer_bytes(assets.coarse_layer("one", forms, {}), ".usdc"))

@@ -1,5 +1,8 @@
 """Geometry from solids: closed and in its box, within the budget, with colliders, weight and bodies that move."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from echousd.room.geometry import FRAME, Origin
 from echousd.room.joinery import assembled, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
+BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "parts_cost.py"
 
 
 def piece(category: str, size: np.ndarray = SIZE, seed: int = 0, faces: int = 5000):
@@ -124,3 +128,18 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     for state in ("articulated", "static"):  # pulled out, it is as good
         chest.GetVariantSet("articulation").SetVariantSelection(state)
         assert [str(found.path) for found in extents(stage)] == []
+
+
+def test_the_benchmark_weighs_what_a_room_writes(tmp_path):
+    import echousd
+    from echousd.graph import Node, RoomSpec, SceneGraph
+
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("one", "dresser", size=(0.9, 1.0, 0.45)),), ())
+    room = echousd.generate(graph, seed=1)
+    spec = importlib.util.spec_from_file_location("parts_cost", BENCHMARK)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    (name,) = room.asset_users
+    weighed = module.on_disk(room.geometry["one"], "dresser")
+    files = room.save(tmp_path / "room", preview=False).parent.glob(f"assets/{name}/*")
+    assert weighed == pytest.approx(sum(path.stat().st_size for path in files), rel=0.05)
