@@ -11,7 +11,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.room.geometry import Geometry, Mass
 from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
-from echousd.room.masses import mass_of, write_mass
+from echousd.room.masses import hull_volume, mass_of, write_mass
 from echousd.room.paths import MTL, SHELL, piece_path
 
 GRAVITY = 9.81  # m/s²
@@ -49,7 +49,7 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
         UsdPhysics.CollisionAPI.Apply(guide)
         UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)
     mass = mass_of(geometry, category)
-    volume = sum(max(float(collider.mesh.convex_hull.volume), 1e-6) for collider in geometry.colliders)
+    volume = sum(max(hull_volume(collider.mesh.vertices), 1e-6) for collider in geometry.colliders)
     slot = next(iter(slots), "wood")
     UsdGeom.Scope.Define(stage, f"{root}/{MTL}")
     bind_contact(stage, root, f"{root}/{MTL}/contact", CONTACT.get(slot, WOODEN), mass.mass / volume)

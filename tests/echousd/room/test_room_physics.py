@@ -9,7 +9,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.room.ballast import ballasted
 from echousd.room.colliders import collider, colliders_of
 from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
-from echousd.room.masses import mass_of, read_mass
+from echousd.room.masses import hull_volume, mass_of, read_mass
 from echousd.room.meshing import box_mesh
 from echousd.room.physics import write_asset_physics
 from echousd.room.sources.boxes import ORIGIN
@@ -101,3 +101,7 @@ def test_what_is_hollow_collides_by_convex_pieces():
     again = colliders_of(table, "dining_table")
     assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
     assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
+def test_volume_of_a_hull():
+    points = np.random.default_rng(3).normal(size=(40, 3))
+    assert hull_volume(points) == pytest.approx(trimesh.convex.convex_hull(points).volume)
+    assert hull_volume(points * [1, 0, 1]) == 0.0
