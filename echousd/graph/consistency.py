@@ -37,7 +37,43 @@ def faults_of(file: str) -> Iterator[None]:
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
-    """Raise `GraphError` of the faults among `triples`, each (subject, predicate, object) in canonical words.
+    """Raise `GraphError` of all the `triple_faults`."""
+    raise_all(triple_faults(triples, names))
+
+
+def raise_all(wrong: Sequence[GraphError]) -> None:
+    """Raise the first of some faults with the others (`MAX_ERRORS` in all); none, and nothing happens."""
+    if wrong:
+        wrong[0].others = tuple(wrong[1:MAX_ERRORS])
+        raise wrong[0]
+
+
+def name_faults(named: Sequence[tuple[str, Sequence[str]]]) -> list[GraphError]:
+    """The faults of objects, each a name and the two others that it stands between, if any.
+
+    Faults: a name that an object before has, and another that is no object.
+    """
+    known = {name for name, _ in named}
+    seen: set[str] = set()
+    wrong = []
+    for position, (name, others) in enumerate(named):
+        here = ("nodes", position)
+        if name in seen:
+            wrong.append(GraphError(f"two objects are called {name!r}, allowed: a name of its own for each", here))
+        seen.add(name)
+        wrong += [
+            GraphError(
+                f"object {name!r}: between: {other!r} is no object of this graph, allowed: {listed(sorted(known))}",
+                (*here, "between"),
+            )
+            for other in others
+            if other not in known
+        ]
+    return wrong
+
+
+def triple_faults(triples: Sequence[Triple], names: Iterable[str]) -> list[GraphError]:
+    """The faults among `triples`, each (subject, predicate, object) in canonical words.
 
     Faults: an endpoint that is none of `names`, a self relation, a relation stated twice, and a cycle in one of the
     orders that the vocabulary defines (left and right are one order along the room's z axis, bigger, smaller and `in`
@@ -64,9 +100,7 @@ def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
                 continue
             together = f"{', '.join(said[:-1])} and {said[-1]}"
             wrong.append(GraphError(f"{together} contradict each other: a cycle in the {order} order", here))
-    if wrong:
-        wrong[0].others = tuple(wrong[1:MAX_ERRORS])
-        raise wrong[0]
+    return wrong
 
 
 def unknown_ends(triples: Sequence[Triple | None], known: Collection[str]) -> list[GraphError]:

@@ -12,7 +12,7 @@ from pydantic import model_validator
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import fields as field
-from echousd.graph.consistency import GraphError, check_triples, listed
+from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.text import graph_from_text, graph_to_json, graph_to_yaml
@@ -37,18 +37,8 @@ class SceneGraph(PlainModel):
             raise ValueError("the graph is empty, allowed: at least one object")
         if len(self.nodes) > field.MAX_NODES:
             raise ValueError(f"the graph has {len(self.nodes)} objects, allowed: {field.MAX_NODES}")
-        seen: set[str] = set()
-        for position, node in enumerate(self.nodes):
-            if node.name in seen:
-                message = f"two objects are called {node.name!r}, allowed: a name of its own for each"
-                raise GraphError(message, ("nodes", position))
-            seen.add(node.name)
-        for position, node in enumerate(self.nodes):
-            for other in node.between or ():
-                if other not in seen:
-                    message = f"{other!r} is no object of this graph, allowed: {listed(sorted(seen))}"
-                    raise GraphError(f"object {node.name!r}: between: {message}", ("nodes", position, "between"))
-        check_triples([relation.triple for relation in self.relations], seen)
+        wrong = name_faults([(node.name, node.between or ()) for node in self.nodes])
+        raise_all([*wrong, *triple_faults([relation.triple for relation in self.relations], self.names)])
         return self
 
     @cached_property

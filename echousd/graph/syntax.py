@@ -57,10 +57,14 @@ Dumper.add_representer(str, _text)
 
 @dataclass(frozen=True)
 class Located:
-    """Plain data with the line (from 1) of every value, by its path of keys and positions."""
+    """Plain data with the line (from 1) of every value, by its path of keys and positions.
+
+    `faults` are keys that stand twice, of which the first counts.
+    """
 
     data: Any
     lines: Mapping[Path, int]
+    faults: tuple[GraphError, ...] = ()
 
     def line(self, path: Path) -> int | None:
         """Line of the value at `path`, or of the closest one around it."""
@@ -75,7 +79,8 @@ def parse_yaml(text: str) -> Located:
         _check_depth(text)
         root = yaml.compose(text, Loader=_Loader)
         lines: dict[Path, int] = {}
-        return Located(None if root is None else _value(root, (), lines, set()), lines)
+        twice: list[GraphError] = []
+        return Located(None if root is None else _value(root, (), lines, set(), twice), lines, tuple(twice))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}: " if mark else ""
@@ -113,15 +118,13 @@ def parse_json(text: str) -> Located:
     except RecursionError:
         raise GraphError("nested too deeply for a scene graph") from None
     try:
-        lines = parse_yaml(text).lines  # JSON is YAML but for tabs; the lines are there for messages alone
-    except GraphError as error:
-        if repeated:
-            raise error if "twice" in str(error) else GraphError(f"key {shown(repeated[0])} stands twice") from None
-        lines = {}
-    return Located(data, lines)
+        as_yaml = parse_yaml(text)  # JSON is YAML but for tabs; the lines are there for messages alone
+    except GraphError:
+        return Located(data, {}, tuple(GraphError(f"key {shown(key)} stands twice") for key in repeated))
+    return Located(data, as_yaml.lines, as_yaml.faults)
 
 
-def _value(node: yaml.Node, path: Path, lines: dict[Path, int], seen: set[int]) -> Any:
+def _value(node: yaml.Node, path: Path, lines: dict[Path, int], seen: set[int], twice: list[GraphError]) -> Any:
     if id(node) in seen:
         raise GraphError(
             f"line {node.start_mark.line + 1}: YAML aliases (*name) are not read here, write the value out"
@@ -129,14 +132,15 @@ def _value(node: yaml.Node, path: Path, lines: dict[Path, int], seen: set[int]) 
     seen.add(id(node))
     lines[path] = node.start_mark.line + 1
     if isinstance(node, yaml.SequenceNode):
-        return [_value(item, (*path, i), lines, seen) for i, item in enumerate(node.value)]
+        return [_value(item, (*path, i), lines, seen, twice) for i, item in enumerate(node.value)]
     if isinstance(node, yaml.MappingNode):
         found: dict[str, Any] = {}
         for key_node, value_node in node.value:
             key = _scalar(key_node)
             if key in found:
-                raise GraphError(f"line {key_node.start_mark.line + 1}: key {shown(key)} stands twice")
-            found[key] = _value(value_node, (*path, key), lines, seen)
+                twice.append(GraphError(f"line {key_node.start_mark.line + 1}: key {shown(key)} stands twice"))
+                continue
+            found[key] = _value(value_node, (*path, key), lines, seen, twice)
             lines[(*path, key)] = key_node.start_mark.line + 1
         return found
     return _scalar(node)

@@ -18,7 +18,7 @@ import yaml
 
 from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, unknown_ends
+from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_faults, raise_all, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
 from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
@@ -41,11 +41,15 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
         located = parse_json(text) if form == "json" else parse_yaml(text)
     except GraphError as error:
         raise GraphError(_with_source(source, str(error))) from None
+    wrong = list(located.faults)
     try:
-        return graph_from_plain(kind, located.data)
+        graph = graph_from_plain(kind, located.data)
     except GraphError as error:
-        said = [_with_source(source, _with_line(located, each)) for each in (error, *error.others)]
-        raise GraphError("\n".join(said), error.about) from None
+        wrong += [error, *error.others]
+    if not wrong:
+        return graph
+    said = [_with_source(source, _with_line(located, each)) for each in wrong[:MAX_ERRORS]]
+    raise GraphError("\n".join(said), wrong[0].about) from None
 
 
 def _with_line(located: Located, error: GraphError) -> str:
@@ -96,28 +100,27 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     said = [_tried(errors, _sentence, entry, ("relations", i), names) for i, entry in enumerate(stated or ())]
     relations = [one if isinstance(one, Relation) else None for one in said]
     if errors:
-        named = {str(fields["name"]) for _, fields in entries if "name" in fields}
-        errors += unknown_ends([None if r is None else r.triple for r in relations], named)
-        errors[0].others = tuple(errors[1:MAX_ERRORS])
-        raise errors[0]
+        named = [(str(one["name"]), _others(one)) for one in objects if "name" in one]
+        errors += name_faults(named) if len(named) == len(objects) else []
+        errors += unknown_ends([None if r is None else r.triple for r in relations], dict(named))
+        raise_all(errors)
     for i, one in enumerate(said):
         if isinstance(one, Placed):
             nodes = _tried(errors, _with_placement, nodes, one, ("relations", i)) or nodes
-    if errors:
-        errors[0].others = tuple(errors[1:MAX_ERRORS])
-        raise errors[0]
+    raise_all(errors)
     rows = [i for i, one in enumerate(said) if isinstance(one, Relation)]
     try:
         return kind(room, tuple(nodes), tuple(one for one in relations if one is not None))
     except GraphError as error:
-        if error.about[:1] != ("relations",):
-            raise
         raise _where_written(error, rows) from None
 
 
 def _where_written(error: GraphError, rows: Sequence[int]) -> GraphError:
-    """A fault of the graph's relations as one of the text's, whose rows `rows` they are."""
-    told = GraphError(str(error), ("relations", rows[int(error.about[1])], *error.about[2:]))
+    """A fault of the graph as one of the text, in whose rows `rows` its relations stand."""
+    about = error.about
+    if about[:1] == ("relations",):
+        about = ("relations", rows[int(about[1])], *about[2:])
+    told = GraphError(str(error), about)
     told.others = tuple(_where_written(each, rows) for each in error.others)
     return told
 
@@ -168,6 +171,12 @@ def _named(objects: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], dict[st
             fields = {**fields, "between": [name_of(one, names) for one in fields["between"]]}
         out.append(fields)
     return out, names
+
+
+def _others(fields: Mapping[str, Any]) -> list[str]:
+    """The names that an object stands between, as far as they are some."""
+    stated = fields.get("between")
+    return [name for name in stated if isinstance(name, str)] if isinstance(stated, list) else []
 
 
 def _tried(errors: list[GraphError], build: Callable[..., Any], *words: Any) -> Any:

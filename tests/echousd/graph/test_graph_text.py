@@ -306,3 +306,31 @@ def test_words_for_the_other_way_round():
         "relations: [desk under lamp, desk carries cup]\n"
     )
     assert [str(relation) for relation in graph.relations] == ["lamp above desk", "cup standing_on desk"]
+
+
+def test_names_that_stand_twice_are_told_with_everything_else(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text(
+        "room: bedroom\nobjects:\n  bed: double_bed\n  bed: single_bed\n  lamp: table_lamp\n  lamp: plant\n"
+        "relations:\n  - bed left wardrobe\n"
+    )
+    with pytest.raises(GraphError) as told:
+        load_graph(path)
+    assert [line.split("x.yaml:")[1] for line in str(told.value).splitlines()] == [
+        "4: key 'bed' stands twice",
+        "6: key 'lamp' stands twice",
+        "8: relation 'bed left wardrobe': object 'wardrobe' is no object of this graph, allowed: bed, lamp",
+    ]
+    path.write_text(
+        "room: bedroom\nobjects:\n  - {name: bed, category: bed}\n  - {name: bed, category: sofa}\n"
+        "  - {name: lamp, category: table_lamp, between: [bed, sofa]}\n  - {name: lamp, category: plant}\n"
+        "relations: [bed left sofa]\n"
+    )
+    with pytest.raises(GraphError) as told:
+        load_graph(path)
+    assert [line.split("x.yaml:")[1].split(",")[0] for line in str(told.value).splitlines()] == [
+        "4: two objects are called 'bed'",
+        "5: object 'lamp': between: 'sofa' is no object of this graph",
+        "6: two objects are called 'lamp'",
+        "7: relation 'bed left sofa': object 'sofa' is no object of this graph",
+    ]

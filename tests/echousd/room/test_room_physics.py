@@ -101,6 +101,8 @@ def test_what_is_hollow_collides_by_convex_pieces():
     again = colliders_of(table, "dining_table")
     assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
     assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
+
+
 def test_volume_of_a_hull():
     points = np.random.default_rng(3).normal(size=(40, 3))
     assert hull_volume(points) == pytest.approx(trimesh.convex.convex_hull(points).volume)
