@@ -1,4 +1,7 @@
-"""Collisions between the meshes of a room: boxes first, then points of one surface inside the other solid."""
+"""Collisions between the meshes of a room: boxes first, then points of one surface inside the other solid.
+
+Depth is measured to the other's faces, so that boards thinner than twice `DEEP` that cross are no collision.
+"""
 
 from __future__ import annotations
 
