@@ -18,7 +18,7 @@ from echousd.stage.layouts import layout_names, showing_layout
 __all__ = ["Motion", "SettleReport", "SettleUnavailable", "settle", "settle_layouts"]
 SECONDS = 2.0
 SHIFT, TURN = 0.01, 1.0  # metres and degrees that a piece may move
-FALL, TOPPLE = 0.05, 20.0  # metres and degrees from which we say that it fell
+FALL, TOPPLE = 0.01, 20.0  # metres and degrees from which we say that it fell
 DEEP = 0.002  # metres that pieces may overlap at the start
 
 

@@ -13,6 +13,7 @@ ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
 PILLOW = 3.2  # exponent of the outline of a cushion
 STEP = 0.02  # metres from place to place
 WIDE_BED = 1.3  # metres
+LEVEL = 0.005  # metres: what is as high as that is one height
 
 
 def cushions(setting: Setting) -> None:
@@ -52,7 +53,7 @@ def bed_cushions(setting: Setting) -> None:
         for side in (-1.0, 1.0) if wide > WIDE_BED else (0.0,):
             turn = float(rng.uniform(-0.12, 0.12))
             spot = seat.before_pillows(side * 0.21 * wide, size)
-            spot = None if spot is None else _clear_of(host, spot, turn, size)
+            spot = None if spot is None else _lying(host, seat, spot, turn, size)
             if spot is not None:
                 thing = Thing("cushion", size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
                 setting.put_first([thing], host=host.name, margin=0.0, floor=False)
@@ -89,6 +90,19 @@ def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -
         return None
     way = shapely.get_coordinates(shapely.shortest_line(shapely.Point(0, 0), free))[1]
     return spot + np.array([way[0], 0.0, way[1]])
+
+
+def _lying(host: Standing, seat: _Seat, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
+    """A place near a spot (3,) that is clear of the host, at the height of what is below; None where there is none."""
+    for _ in range(3):
+        clear = _clear_of(host, spot, turn, size)
+        down = None if clear is None else seat.below(clear, size)
+        if clear is None or down is None:
+            return None
+        if abs(down - clear[1]) < LEVEL:
+            return clear
+        spot = np.array([clear[0], down, clear[2]])
+    return None
 
 
 class _Seat:
@@ -128,6 +142,15 @@ class _Seat:
         if under.shape[1] < deep or np.ptp(under) > 0.05:
             return None
         return np.array([x, float(under.max()), self.z[first] + (deep - 1) * STEP / 2])
+
+    def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
+        """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
+        rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
+        under = self.height[np.ix_(rows, columns)]
+        if not under.size or not np.isfinite(under).any():
+            return None
+        top = float(under.max())
+        return top if (under > top - 2 * LEVEL).mean() > 0.6 else None
 
     def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
         """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""

@@ -21,6 +21,7 @@ from echousd.room.dressing import upholstery
 from echousd.room.dressing.dress import RULES, dress, placed, setting_of
 from echousd.room.dressing.setting import reaches, standing
 from echousd.room.dressing.surfaces import surfaces
+from echousd.room.dressing.upholstery import STEP, _Seat
 from echousd.room.geometry import Collider, Geometry, Origin, Part
 from echousd.room.sources.boxes import ORIGIN
 from echousd.room.sources.solid import solid_geometry
@@ -253,3 +254,14 @@ def test_what_stands_at_a_height_reaches_there_with_its_foot():
     geometry = Geometry((part,), (Collider("collider", foot, "convexHull"),), Origin("test"))
     lamp = standing("lamp", "table_lamp", np.array([0.2, 0.4, 0.2]), np.array([0.0, 0.5, 0.0]), 0.0, geometry)
     assert reaches(lamp, 0.5, 0.6).area > 0.9 * np.pi * 0.1**2
+
+
+def test_cushions_lie_on_what_is_level_below_them():
+    x = z = np.arange(-0.5, 0.5, STEP)
+    height = np.full((len(x), len(z)), 0.5)
+    height[:, z > 0.2] = 0.545  # a duvet, turned down
+    seat, size = _Seat(x, z, height, 0.5), np.array([0.4, 0.15, 0.3])
+    assert seat.below(np.array([0.0, 0.6, -0.2]), size) == pytest.approx(0.5)
+    assert seat.below(np.array([0.0, 0.6, 0.37]), size) == pytest.approx(0.545)
+    assert seat.below(np.array([0.0, 0.6, 0.13]), size) is None  # on the edge of the duvet
+    assert seat.below(np.array([3.0, 0.6, 0.0]), size) is None
