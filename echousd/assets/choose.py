@@ -97,6 +97,8 @@ def asked_of(
     words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
     if licences is not None and not words:
         raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
+    if text and assets is None:
+        raise ValueError(f"--text {text!r} needs models to choose from; name a library's index with --assets")
     wishes = AssetWishes(None if assets is None else read_library(assets), stretch, words, text, collect)
     _ = wishes.unlikeness  # what is absent is told before any long work
     return wishes

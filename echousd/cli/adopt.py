@@ -28,6 +28,14 @@ def adopt(
         str | None, typer.Option(help="Of new objects: parts, sdf, library, boxes; default: parts.")
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
+    stretch: Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)] = 1.15,
+    licenses: Annotated[
+        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
+    ] = None,
+    text: Annotated[str, typer.Option(help="What models shall be like, such as 'mid-century oak' (extra: text).")] = "",
+    collect: Annotated[
+        bool, typer.Option("--collect", help="Take the stage's pieces and models along instead of referring to them.")
+    ] = False,
     walls: Annotated[bool, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = False,
     dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "none",
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
@@ -36,7 +44,8 @@ def adopt(
 ) -> None:
     """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.
 
-    The stage is not written; the room refers to the pieces in it.
+    The stage is not written; the room refers to the pieces in it, with --collect to copies. What a person would point
+    at in their arrangement is told and left as it is.
     """
     from echousd.cli.generate import progress_bar
     from echousd.cli.output import say
@@ -46,19 +55,25 @@ def adopt(
     started = time.perf_counter()
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
-        from echousd.room.adopting import adopted
+        from echousd.assets.choose import asked_of
+        from echousd.room.adopting import adopted, seen_in_theirs
         from echousd.room.pipeline import generate
         from echousd.room.progress import StageTimer
         from echousd.room.room import RoomOptions
         from echousd.room.written import write_room
 
+        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         graph = adopted(stage, room=room, add=add, relate=relate or ())
         made = generate(
-            graph, seed=seed, shapes=shapes, assets=assets, options=RoomOptions(walls=walls, dress=dress),
+            graph, seed=seed, shapes=shapes, assets=wishes, options=RoomOptions(walls=walls, dress=dress),
             progress=listen,
         )  # fmt: skip
         written = write_room(made, output, StageTimer(listen), force=force)
     kept = sum(node.asset is not None for node in graph.nodes)
+    seen = seen_in_theirs(made)
     if not json:
         say(f"adopted  {kept} objects of {stage.name}, {len(graph.nodes) - kept} new")
-    report([written], since=started, json=json, more={"adopted": kept, "new": len(graph.nodes) - kept})
+        for one in seen:
+            say(f"theirs   {one}")
+    more = {"adopted": kept, "new": len(graph.nodes) - kept, "theirs": seen}
+    report([written], since=started, json=json, more=more)

@@ -8,7 +8,9 @@ from pathlib import Path
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.sentences import stating
+from echousd.repair.living import living_faults
 from echousd.room.originals.loading import joined
+from echousd.room.room import RoomData
 from echousd.stage import open_stage
 from echousd.stage.foreign import foreign_pieces
 from echousd.stage.read import find_rooms
@@ -64,6 +66,16 @@ def lacking(graph: SceneGraph) -> list[Node]:
             taken.add(name)
             out.append(Node(name, category, style=category if count - present > 1 else None))
     return out
+
+
+def seen_in_theirs(room: RoomData) -> list[str]:
+    """What a person would point at among the pieces that stood there already: told, and left as it is.
+
+    Walls count where their stage has a floor: a proposed one came after them.
+    """
+    theirs = {node.name for node in room.graph.nodes if node.locked and node.asset is not None}
+    found = living_faults(room.graph, room.boxes, all_blamed=True)
+    return [fault.says for fault in found if fault.object in theirs and fault.other in {None, *theirs}]
 
 
 def _node(text: str) -> Node:

@@ -1,4 +1,5 @@
 import hashlib
+import json
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from small_models import chest, seat
 from small_room import StandIn
 
 import echousd
-from echousd.room.adopting import adopted
+from echousd.room.adopting import adopted, seen_in_theirs
 from echousd.stage import open_stage
 
 
@@ -79,3 +80,53 @@ def test_what_cannot_be_adopted_is_said(loft, tmp_path):
     adopted(loft, add=[]).to_stage(text)
     with pytest.raises(ValueError, match=r"graph.usda: has a scene graph already; echousd generate and echousd update"):
         adopted(text)
+
+
+def stage_of(path, *pieces):
+    """A stage in metres, Y up, of (name, mesh, label, place, degrees about Y)."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
+    for name, mesh, label, place, turn in pieces:
+        prim = UsdGeom.Xform.Define(stage, f"/World/{name}")
+        prim.AddTranslateOp().Set(Gf.Vec3d(*place))
+        prim.AddRotateYOp().Set(turn)
+        UsdSemantics.LabelsAPI.Apply(prim.GetPrim(), "category").CreateLabelsAttr([label])
+        form = UsdGeom.Mesh.Define(stage, f"/World/{name}/form")
+        form.CreatePointsAttr([tuple(map(float, point)) for point in mesh.vertices])
+        form.CreateFaceVertexCountsAttr([3] * len(mesh.faces))
+        form.CreateFaceVertexIndicesAttr(np.asarray(mesh.faces).ravel().tolist())
+    stage.Save()
+    return path
+
+
+@pytest.mark.parametrize(("turn", "seen"), [(180, []), (0, ["tv faces no seat, sofa or bed"])])
+def test_what_a_person_would_point_at_in_their_arrangement_is_told(tmp_path, turn, seen):
+    """A sofa with its back to the screen stays as they put it, and is said."""
+    loft = stage_of(
+        tmp_path / "loft.usda",
+        ("tv", chest(1.2, 0.7, 0.12), "television", (0, 0, -2), 0),
+        ("sofa", seat(2.0, 0.8, 0.9), "sofa", (0, 0, 1), turn),
+    )
+    graph = adopted(loft, room="living_room", add=["plant:plant"])
+    room = echousd.generate(graph, shapes="boxes", steps=2, drafts=1)
+    assert seen_in_theirs(room) == seen
+    row = room.names.index("sofa")
+    np.testing.assert_allclose(room.boxes.position[row], (0, 0, 1), atol=2e-3)
+
+
+def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monkeypatch):
+    monkeypatch.setattr("echomodel.loading.load_model", lambda *_, **__: StandIn())
+    words = ("adopt", loft, "-o", tmp_path / "room", "--add", "wardrobe:wardrobe", "--shapes", "boxes")
+    done = echousd_command(*words, "--collect", "--json")
+    assert done.code in (0, 1), done.err
+    told = json.loads(done.out)
+    assert (told["adopted"], told["new"], type(told["theirs"])) == (2, 1, list)
+    loft.unlink()
+    stage = open_stage(tmp_path / "room/room.usda")
+    form = stage.GetPrimAtPath("/Room/Objects/bed/bed_placed/bed_model/form")
+    assert UsdGeom.Mesh(form).GetPointsAttr().Get()
+    done = echousd_command(*words, "--text", "mid-century oak")
+    assert done.code == 2
+    assert "--text 'mid-century oak' needs models to choose from; name a library's index with --assets" in done.err
