@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.roomboxes import footprints
-
-SIDEWAYS = 0.7  # cosine of the angle to which a wide picture reaches
+# points of a box of 1 m that stands on the origin
+GRID = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, 7)] * 3, indexing="ij"), -1).reshape(-1, 3) + np.array(
+    [0.0, 0.5, 0.0]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,21 +33,35 @@ class Furniture:
         weight = self.size[:, [0, 2]].prod(1)
         return np.asarray(weight @ self.position[:, [0, 2]] / max(float(weight.sum()), 1e-9))
 
-    def crowding(self, eye: np.ndarray, reach: float, way: np.ndarray | None = None) -> float:
-        """How much stands right before `eye` (3,): a box nearer than `reach` metres counts 0 (there) to 2 (here).
-
-        Where `way` (2,), x and z of a look, is given, only what is in a wide picture of it counts.
-        """
+    def nearness(self, eye: np.ndarray, reach: float) -> np.ndarray:
+        """(n,) how near each box is to `eye` (3,): 0 at `reach` metres and beyond, 1 where the eye touches it."""
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)
         x, y, z = (eye - self.position - self.size * (0.0, 0.5, 0.0)).T
         local = np.stack([cos * x - sin * z, y, sin * x + cos * z], 1)
         away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
-        near = 2.0 * np.clip(1.0 - away / reach, 0.0, 1.0)
-        if way is not None:
-            corners = footprints(self.size, self.position, self.yaw) - eye[[0, 2]]
-            along = (corners @ way) / np.maximum(np.linalg.norm(corners, axis=-1) * np.linalg.norm(way), 1e-9)
-            near = near * (along.max(1) > SIDEWAYS)
-        return float(near.sum())
+        return np.clip(1.0 - away / reach, 0.0, 1.0)
+
+    def filled(self, view: np.ndarray, half: float, reach: float) -> float:
+        """Share of a square picture that boxes nearer than `reach` metres fill, the nearer the more.
+
+        Arguments:
+            view: (4, 4) float camera to world. half: half of the picture's width at distance 1.
+            reach: metres.
+        """
+        near = self.nearness(view[:3, 3], reach)
+        share = np.zeros(len(near))
+        for number in np.flatnonzero(near):
+            cos, sin = np.cos(self.yaw[number]), np.sin(self.yaw[number])
+            local = GRID * self.size[number]
+            points = np.stack(
+                [cos * local[:, 0] + sin * local[:, 2], local[:, 1], cos * local[:, 2] - sin * local[:, 0]], 1
+            )
+            x, y, z = ((points + self.position[number] - view[:3, 3]) @ view[:3, :3]).T
+            seen = np.stack([x, y], 1)[z < -0.05] / -z[z < -0.05, None] / half
+            seen = seen[(np.abs(seen) < 1.15).all(1)]
+            if len(seen):
+                share[number] = np.ptp(np.clip(seen, -1, 1), axis=0).prod() / 4
+        return float(near @ share)
 
     def hidden(self, eye: np.ndarray) -> float:
         """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""

@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from echomodel.openings import inward_normal
 from echousd.sight import Furniture
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 WIDE = 21.0  # mm, for a camera inside: 81 degrees across
 EYES = 0.62  # of the height of the walls: where a camera inside is
-BEFORE, BESIDE = 1.6, 1.0  # metres: what stands, what hangs nearer to the eye fills the picture
-STEPS = (0.3, 0.5)  # metres from a corner that a camera inside may stand
+BEFORE = 1.8  # metres: what is nearer to the eye fills the picture
+FILLED = 14.0  # metres of depth that a picture full of what is near is worth
+TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
+STEPS = (0.3, 0.5, 0.8)  # metres from a corner that a camera inside may stand
+ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.25  # or along a wall, as shares of its length, and metres from it
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
@@ -89,19 +93,36 @@ def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Fu
     middle = np.asarray(room.representative_point().coords[0])
     aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
     best, most = middle + 0.1, -np.inf
+    for spot in _spots(np.asarray(floor, float), middle):
+        if not room.contains(shapely.LineString([spot, middle])):
+            continue
+        view = _level_view(spot, aim, height)
+        eye = view[:3, 3]
+        merit = _depth(room, spot, aim - spot) + (spot - middle) @ furniture.facing - furniture.hidden(eye)
+        for things in (furniture, hung):
+            if things is not None and len(things.size):
+                merit -= FILLED * things.filled(view, APERTURE / 2 / WIDE, BEFORE)
+                merit -= FILLED * float((things.nearness(eye, BEFORE) > TOUCHED).any())
+        if merit > most:
+            best, most = spot, merit
+    return _level_view(best, aim, height)
+
+
+def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
+    """Where a camera inside may stand, (2,) x and z each, metres: in the corners, then along the walls."""
+    spots = []
     for corner in floor:
         inwards = (middle - corner) / max(float(np.linalg.norm(middle - corner)), 1e-9)
-        for step in STEPS:
-            spot = corner + step * inwards
-            if not room.contains(shapely.LineString([spot, middle])):
-                continue
-            eye = np.array([spot[0], EYES * height, spot[1]])
-            merit = _depth(room, spot, aim - spot) + (corner - middle) @ furniture.facing
-            merit -= furniture.hidden(eye) + furniture.crowding(eye, BEFORE)
-            merit -= hung.crowding(eye, BESIDE, aim - spot) if hung is not None and len(hung.size) else 0.0
-            if merit > most:
-                best, most = spot, merit
-    return view_matrix(np.array([best[0], EYES * height, best[1]]), np.array([aim[0], 0.3 * height, aim[1]]))
+        spots += [corner + step * inwards for step in STEPS]
+    for edge in range(len(floor)):
+        start, end = floor[edge], floor[(edge + 1) % len(floor)]
+        spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
+    return spots
+
+
+def _level_view(spot: np.ndarray, aim: np.ndarray, height: float) -> np.ndarray:
+    """(4, 4) float camera to world from eye height over `spot` to a little lower over `aim`, x and z each."""
+    return view_matrix(np.array([spot[0], EYES * height, spot[1]]), np.array([aim[0], 0.3 * height, aim[1]]))
 
 
 def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:

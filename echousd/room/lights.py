@@ -24,9 +24,11 @@ NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a
 LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
-SHARES = {"open": (1.0, 1.0), "walls": (1.1, 0.12), "ceiling": (3.2, 0.7)}
+SHARES = {"open": (1.0, 1.0), "walls": (1.1, 0.12), "ceiling": (3.6, 1.1)}
 SKY = "layers/sky.jpg"  # stays with the room where a store has the images
 BULB = 0.04  # metres, radius
+# Kelvin. White is 6504 to a renderer, which adapts to nothing as eyes do: lamps of 2,900 K would turn a room orange.
+DAYLIGHT, BULBS = 6500.0, 3900.0
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
 SUN, OVERHEAD = 1.4, 0.55
@@ -87,7 +89,7 @@ def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Int
     panel.CreateWidthAttr(width)
     panel.CreateHeightAttr(depth)
     panel.CreateEnableColorTemperatureAttr(True)
-    panel.CreateColorTemperatureAttr(5000.0)
+    panel.CreateColorTemperatureAttr(DAYLIGHT)
     panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
     panel.AddRotateXOp().Set(-90.0)
     return {panel.GetPath(): (1, share * min(20.0, 1.6 * height**2 / (width * depth)))}
@@ -108,7 +110,7 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
     sun.CreateAngleAttr(0.53)
     sun.CreateNormalizeAttr(True)  # intensity is irradiance, whatever the disc's size
     sun.CreateEnableColorTemperatureAttr(True)
-    sun.CreateColorTemperatureAttr(5400.0)
+    sun.CreateColorTemperatureAttr(DAYLIGHT - 700)
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
     sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
@@ -126,7 +128,7 @@ def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
         bulb.CreateRadiusAttr(BULB)
         bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
         bulb.CreateEnableColorTemperatureAttr(True)
-        bulb.CreateColorTemperatureAttr(2900.0)
+        bulb.CreateColorTemperatureAttr(BULBS)
         bulb.AddTranslateOp()
         full[bulb.GetPath()] = (3, LUMENS[row.support] / (np.pi * NITS))
     if len(room.layouts) < 2:

@@ -28,7 +28,7 @@ LOOKS = {
     "trim": Look(linear("f7f5f1"), 0.4),
     "leaf": Look(linear("efebe3"), 0.4),
     "rail": Look(linear("8e9194"), 0.35, metallic=0.85),
-    "glass": Look(linear("d6e6ee"), 0.05, opacity=0.2),
+    "glass": Look(linear("d6e6ee"), 0.05, opacity=0.06),
 }
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from echousd.sight import Furniture
-from echousd.views import inside_view
+from echousd.views import inside_view, view_matrix
 
 FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
 
@@ -36,8 +37,12 @@ def test_the_camera_looks_into_the_larger_part_of_a_room_with_a_corner() -> None
     assert np.linalg.norm(eye - floor[4]) > 1.0  # not behind the edge that juts in
 
 
-def test_crowding_counts_what_is_in_the_picture() -> None:
-    eye, way = np.array([0.0, 1.5, 0.0]), np.array([1.0, 0.0])
-    ahead, behind = (boxes((0.3, 2.0, 0.3, x, 0.0, 0.0, 0.0)) for x in (0.6, -0.6))
-    assert ahead.crowding(eye, 1.0, way) == ahead.crowding(eye, 1.0) == behind.crowding(eye, 1.0) > 0
-    assert behind.crowding(eye, 1.0, way) == 0
+def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
+    view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
+    ahead, behind, beside, far = (
+        boxes((0.3, 2.0, 0.3, x, 0.0, z, 0.0)) for x, z in ((0.8, 0.0), (-0.8, 0.0), (0.3, 0.9), (3.0, 0.0))
+    )
+    assert ahead.nearness(view[:3, 3], 1.0)[0] == behind.nearness(view[:3, 3], 1.0)[0] == pytest.approx(0.35)
+    assert ahead.filled(view, 1.0, 1.0) > 0.05
+    assert behind.filled(view, 1.0, 1.0) == far.filled(view, 1.0, 1.0) == 0
+    assert beside.filled(view, 0.5, 1.0) == 0  # a narrow picture does not reach so far

@@ -62,14 +62,23 @@ def curtains(setting: Setting) -> None:
             wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
             left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
             right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
+            inner = np.linspace(
+                0.0, 0.5 * (right - left) - wide / 2, 4
+            )  # drawn over the pane where something is beside
             for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02):
                 size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
-                pair = [
-                    Thing("curtain", size, wall.at(middle, before, foot), wall.yaw, "", variant)
-                    for middle in (left, right)
+                sides = [
+                    next((one for one in hung if setting.clear(one, margin=0.0, floor=False)), None)
+                    for hung in (
+                        [
+                            Thing("curtain", size, wall.at(end + way * off, before, foot), wall.yaw, "", variant)
+                            for off in inner
+                        ]
+                        for end, way in ((left, 1), (right, -1))
+                    )
                 ]
-                if all(setting.clear(one, margin=0.0, floor=False) for one in pair):  # one alone looks forgotten
-                    setting.placed += pair
+                if None not in sides:  # one alone looks forgotten
+                    setting.placed += [one for one in sides if one is not None]
                     break
 
 

@@ -43,16 +43,35 @@ def painting(colors: Sequence[Sequence[float]], number: int) -> np.ndarray:
     return np.clip(out * grain, 0, 1)
 
 
-SKY = (  # elevation in degrees, linear RGB: fields, haze, a bright horizon, blue
-    (-90.0, -25.0, -7.0, -1.5, 4.0, 30.0, 90.0),
-    ((0.22, 0.27, 0.15), (0.31, 0.38, 0.21), (0.50, 0.56, 0.42), (0.76, 0.80, 0.78), (0.86, 0.90, 0.93),
-     (0.62, 0.76, 0.94), (0.50, 0.68, 0.92)),
+SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
+SKY = (  # elevation in degrees, linear RGB: a near lawn, fields, haze, a bright horizon, blue
+    (-90.0, -25.0, -7.0, -1.5, 2.0, 12.0, 35.0, 90.0),
+    ((0.14, 0.19, 0.08), (0.18, 0.24, 0.10), (0.24, 0.30, 0.14), (0.38, 0.44, 0.26), (0.84, 0.90, 0.95),
+     (0.68, 0.81, 0.95), (0.58, 0.74, 0.94), (0.54, 0.71, 0.93)),
 )  # fmt: skip
+HILLS = (
+    (3.2, 1.3, (0.40, 0.50, 0.55)),
+    (1.6, 0.9, (0.30, 0.40, 0.30)),
+)  # degrees high and how uneven, colour; far, near
+TREES, LEAVES = (2.2, 3.4), (0.075, 0.125, 0.045)  # degrees that trees rise over the horizon, and how unevenly
 
 
 def sky() -> np.ndarray:
-    """(128, 256, 3) linear RGB: a clear sky over fields by longitude and latitude, the zenith in the first row."""
-    elevation = 90 - (np.arange(128) + 0.5) / 128 * 180
+    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, hills and trees over a lawn."""
+    height, width = SKY_SIZE
+    elevation = (90 - (np.arange(height) + 0.5) / height * 180)[:, None]
     level, tones = SKY[0], np.array(SKY[1])
-    row = np.stack([np.interp(elevation, level, tone) for tone in tones.T], 1)
-    return np.repeat(row[:, None], 256, axis=1)
+    out = np.stack([np.interp(elevation, level, tone) for tone in tones.T], -1) * np.ones((1, width, 1))
+    grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
+    cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
+    out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
+    out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
+    ridge = noise(151, 14.0, 14.0)[:3].repeat(2, axis=1)  # smooth rows of noise, all around
+    for row, (rise, uneven, color) in enumerate(HILLS):
+        line = rise + uneven * ridge[row]
+        out[(elevation > -2) & (elevation < line)] = color
+    crown = TREES[0] + TREES[1] * np.clip(ridge[2], -1.2, 1.5) + 0.5 * grain[0]
+    leaves = np.array(LEAVES) * (1 + 0.35 * grain + 0.25 * np.clip(elevation / 4, -1, 1))[..., None]
+    wood = (elevation > -2.5) & (elevation < crown)
+    out[wood] = np.clip(leaves, 0.01, 1)[wood]
+    return np.clip(out, 0, 1)
