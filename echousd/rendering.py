@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,7 +88,7 @@ def render_stage(
     if view != CONTACT:
         return _image(_seen(scenery, view, size, rays))
     first = [_seen(scenery, word, size, rays) for word in SHEET]
-    others = [trace(shown, corner, size, rays=rays) for corner, shown in corner_views(scenery)[1:]]
+    others = [trace(shown, corner, size, rays=rays) for corner, shown in islice(corner_views(scenery), 1, None)]
     return _image(np.concatenate([np.concatenate(row, axis=1) for row in (first, others)]))
 
 
@@ -121,7 +122,7 @@ def render_turn(
 def _seen(scenery: Scenery, view: str, size: int, rays: int) -> np.ndarray:
     """(size, size, 3) what one of the views `top`, `perspective` and `eye` shows."""
     if view == "perspective":
-        camera, scenery = corner_views(scenery)[0]
+        camera, scenery = next(corner_views(scenery))
     else:
         camera = {"top": top_view, "eye": eye_view}[view](scenery)
     return trace(scenery, camera, size, rays=rays)

@@ -13,6 +13,7 @@ from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
 SHELL = ("floor", "wall", "ceiling", "door", "window")
+SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
 HUNG = ("picture", "mirror", "curtain", "wall_shelf", "wall_clock", "coats")  # goes with the wall that it hangs on
 
@@ -149,7 +150,8 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         parts.append(part)
         words.append(mesh.category)
         if mesh.category not in (*SHELL, *HUNG, "rug"):
-            boxes.append(_box(mesh))
+            box = _box(mesh)
+            boxes += [box] if box[:3].max() > SMALL else []
         if mesh.category in HUNG:
             hung.append(len(parts) - 1)
             curtains.append(_box(mesh))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,15 +73,13 @@ def eye_view(scenery: Scenery) -> View:
     return View(matrix, APERTURE / 2 / WIDE, False)
 
 
-def corner_views(scenery: Scenery) -> list[tuple[View, Scenery]]:
+def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:
     """From above each corner, the view where least is hidden first, and what it shows: near walls are left out."""
-    views = []
     for matrix in perspective_views(_outermost(scenery), scenery.furniture):
         shown = scenery.without_near_walls(matrix[:3, 3])
         if shown is not scenery:
             matrix = framed(_outermost(shown), matrix[:3, 2])
-        views.append((View(matrix, APERTURE / 2 / FOCAL_LENGTH, False), shown))
-    return views
+        yield View(matrix, APERTURE / 2 / FOCAL_LENGTH, False), shown
 
 
 def turning_views(scenery: Scenery, count: int) -> list[View]:
