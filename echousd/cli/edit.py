@@ -41,6 +41,7 @@ def edit(
         bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
     ] = False,
     undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back, byte for byte; alone.")] = False,
+    redo: Annotated[bool, typer.Option("--redo", help="Make again what --undo took back last; alone.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
@@ -74,10 +75,11 @@ def edit(
     )  # fmt: skip
     options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces, "assets": assets}
     options["drafts"] = drafts
-    if undo:
-        if wishes != Wishes() or dry_run or output is not None:
-            raise ValueError("--undo takes the last edit back and does nothing else; leave the other options out")
-        _undo(room, wait, json)
+    if undo or redo:
+        if wishes != Wishes() or dry_run or output is not None or (undo and redo):
+            does = "--undo takes the last edit back" if undo else "--redo makes it again"
+            raise ValueError(f"{does} and does nothing else; leave the other options out")
+        _step(room, wait, json, back=undo)
         return
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
@@ -113,19 +115,20 @@ def update(
     _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
 
 
-def _undo(room: Path, wait: bool, json: bool) -> None:
-    """Take the last edit of a room back and say what it was."""
-    from echousd.room.history import undo
+def _step(room: Path, wait: bool, json: bool, *, back: bool) -> None:
+    """Take the last edit of a room back, or make it again, and say what it was."""
+    from echousd.room import history
     from echousd.room.save import write_preview, write_sheet
 
     started = time.perf_counter()
-    steps = undo(room, wait=wait)
+    steps = history.undo(room, wait=wait) if back else history.redo(room, wait=wait)
     pictures = [path for path in (write_preview(room), write_sheet(room)) if path]
+    word = "undone" if back else "redone"
     if json:
-        say_written([room, *pictures], started, more={"undone": list(steps)})
+        say_written([room, *pictures], started, more={word: list(steps)})
         return
     for step in steps:
-        say(f"undone   {step}")
+        say(f"{word}   {step}")
     say(f"room     {room}")
 
 

@@ -20,7 +20,7 @@ from echousd.room import folder as folders
 from echousd.room import ownership, paintings
 from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
-from echousd.room.history import remembered
+from echousd.room.history import remembered, undone
 from echousd.room.lock import locked
 from echousd.room.manifest import FACES, MANIFEST_KEY
 from echousd.room.paths import layer_file
@@ -108,7 +108,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, paintings.UNFIT, root, manifest]
-    changed = folders.write_together(folder, files, last=last, remove=stale)
+    changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder)])
     for path, name in kept.items():
         if name:
             folders.tell_kept(folder, path, name)

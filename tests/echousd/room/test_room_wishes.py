@@ -36,7 +36,8 @@ def box(root, name):
 
 
 def files(folder):
-    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in folder.rglob("*") if p.is_file()}
+    found = (p for p in folder.rglob("*") if p.is_file() and p.parent.name != ".redo")
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in found}
 
 
 def test_move_turn_lock_and_restyle_at_once(root, echousd_command):
@@ -165,6 +166,35 @@ def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
     assert echousd_command("edit", root, "--undo").code == 0
     assert told(root.parent) == without_pictures(states[0])
     assert not (root.parent / "history").exists()
+    for state in states[1:]:
+        done = echousd_command("edit", root, "--redo")
+        assert done.code == 0, done.err
+        assert told(root.parent) == without_pictures(state)
+        read_room(root)
+    assert "redone   - object wardrobe (wardrobe)" in done.out
+    assert not (root.parent / ".redo").exists()
+    nothing = f"error: {root}: no edit that was taken back can be made again\n"
+    assert echousd_command("edit", root, "--redo").err == nothing
+    assert echousd_command("edit", root, "--undo").code == 0
+    assert told(root.parent) == without_pictures(states[1])
+    assert echousd_command("edit", root, "--shapes", "boxes", "--lock", "bed").code in (0, 1)
+    assert echousd_command("edit", root, "--redo").err == nothing  # another edit was made in its place
+    assert not (root.parent / ".redo").exists()
+
+
+def test_a_damaged_archive_of_what_was_taken_back_changes_nothing(root, echousd_command):
+    assert echousd_command("edit", root, "--shapes", "boxes", "--add", "chair:nightstand").code in (0, 1)
+    assert echousd_command("edit", root, "--undo").code == 0
+    before, (archive,) = files(root.parent), (root.parent / ".redo").iterdir()
+    archive.write_bytes(archive.read_bytes()[:200])
+    done = echousd_command("edit", root, "--redo")
+    assert done.code == 2
+    assert "1.zip: is damaged" in done.err
+    archive.unlink()
+    assert echousd_command("edit", root, "--redo").code == 2
+    assert files(root.parent) == before
+    done = echousd_command("edit", root, "--redo", "--lock", "bed")
+    assert "--redo makes it again and does nothing else" in done.err
 
 
 def without_pictures(found):
