@@ -21,7 +21,25 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         found = sorted(path for path in Path(given).glob("*/*.usda") if (path.parent / "layers").is_dir())
         assert found, f"{given}: no rooms"
         return found
-    from echousd import generate
+    from echousd import RoomOptions, generate
 
-    folder = tmp_path_factory.mktemp("rooms")
-    return [generate(SAMPLES / f"{name}.usda", seed=7).save(folder / name) for name in NAMES]
+    folder, options = tmp_path_factory.mktemp("rooms"), RoomOptions(walls=True, dress="some")  # as the command's
+    return [generate(SAMPLES / f"{name}.usda", seed=7, options=options).save(folder / name) for name in NAMES]
+
+
+@pytest.fixture(scope="session")
+def z_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A room with Z up, its layers as usdc."""
+    from echousd import RoomOptions, generate
+
+    options = RoomOptions("Z", walls=True, dress="some", crate=True)
+    return generate(SAMPLES / "study.usda", seed=301, options=options).save(tmp_path_factory.mktemp("z") / "study")
+
+
+@pytest.fixture(scope="session")
+def shared_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A room whose chairs are instances of one asset."""
+    from echousd import RoomOptions, generate
+
+    options = RoomOptions(walls=True, dress="some", instances=True)
+    return generate(SAMPLES / "dining_room.usda", seed=7, options=options).save(tmp_path_factory.mktemp("i") / "dining")

@@ -15,12 +15,12 @@ PYTHON_CLIENTS = {
     "omni": ("omniverse-asset-validator==1.18.0", "usd-core==26.11"),
     "simready": ("simready-validate==2026.8.0", "simready-foundation-tier-core==2026.8.0"),
     "tinyusdz": ("tinyusdz==0.9.4", "numpy"),
-    "usd2403": ("usd-core==24.3",),
     "nvidia": ("usd-validation-nvidia==1.22.0", "usd-core==26.11", "numpy>=2"),
-    "usd2411": ("usd-core==24.11",),
-    "usd2551": ("usd-core==25.5.1",),
     "ray": ("ray==2.60.0",),
 }
+# Every OpenUSD since 24.3 that there is a wheel of, but for repetitions of one release.
+RELEASES = ("24.3", "24.5", "24.8", "24.11", "25.2.post1", "25.5.1", "25.8", "25.11", "26.3", "26.5", "26.8")
+PYTHON_CLIENTS |= {f"usd-{release}": (f"usd-core=={release}",) for release in RELEASES}
 WITH_OURS = ("ray",)  # clients that see our own packages, too
 NODE = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10")
 
