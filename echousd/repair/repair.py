@@ -11,7 +11,7 @@ import numpy as np
 
 from echomodel.openings import Opening
 from echomodel.rules.living import plan_of
-from echomodel.rules.living.sizes import laid_tables, usual_sizes
+from echomodel.rules.living.sizes import hung_lamps, laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
 from echousd.repair.placements import stated_placements
@@ -223,10 +223,11 @@ def repair_boxes(
         usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=lenient)
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
-        laid = laid_tables(at.problem.categories, at.size, anchor, ~rigid & ~np.isin(np.arange(n), told))
-        at = replace(at, size=laid)
+        free = ~rigid & ~np.isin(np.arange(n), told)
+        at = replace(at, size=laid_tables(at.problem.categories, at.size, anchor, free))
         chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
-        at = posed(at.size, chosen.position, chosen.yaw)
+        hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
+        at = posed(hung, chosen.position, chosen.yaw)
     found = solve(at, config)
     if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
         plain = solve(drawn, config)

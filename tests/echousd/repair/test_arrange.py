@@ -162,6 +162,18 @@ def test_a_pendant_follows_its_table_and_a_flush_lamp_hangs_in_the_middle():
     np.testing.assert_allclose(lamp[[0, 2]], 0.0, atol=0.05)
 
 
+@pytest.mark.parametrize(("below", "most"), [("kids_bed", 0.9), ("wardrobe", 0.8)])
+def test_no_lamp_is_wider_than_what_it_hangs_over(below, most):
+    words, size = [below, "pendant_lamp"], np.array([(0.9, 0.8, 1.7), (1.06, 0.9, 0.8)])
+    drawn = np.array([(0.3, 0, -1.2), (0.3, 1.7, -1.2)]), np.zeros(2)
+    told = np.array([(1, ID["above"], 0)])[: below == "kids_bed"]
+    done = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7)
+    assert done.size[1, 0] == pytest.approx(most, abs=0.01)
+    assert done.size[1, 2] / done.size[1, 0] == pytest.approx(0.8 / 1.06, abs=0.01)
+    kept = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7, rigid=np.ones(2, bool))
+    assert kept.size[1, 0] == 1.06
+
+
 def test_a_second_sofa_leaves_the_view_to_the_screen_that_the_first_is_told_to_watch():
     words = ["multi_seat_sofa", "loveseat_sofa", "coffee_table", "tv_stand"]
     size = [(2.0, 0.85, 0.9), (1.5, 0.85, 0.9), (1.0, 0.4, 0.6), (1.6, 0.5, 0.4)]

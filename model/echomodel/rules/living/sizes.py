@@ -20,6 +20,7 @@ USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 ELBOWS = 0.05  # metres between two chairs
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
 LEAST_DEPTH = 0.75  # metres of a table at which people sit opposite each other
+ALONE = 0.8  # metres, width of a lamp that hangs over nothing
 
 
 @cache
@@ -73,6 +74,26 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         long = 0 if size[table, 0] >= size[table, 2] else 2
         out[table, long] = max(size[table, long], a_side * (width + ELBOWS) + 2 * TUCKED * at_ends)
         out[table, 2 - long] = max(size[table, 2 - long], LEAST_DEPTH)
+    return out
+
+
+def hung_lamps(
+    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, free: np.ndarray
+) -> np.ndarray:
+    """(n, 3) float: sizes in which no lamp of the ceiling is wider than what it hangs over.
+
+    Arguments:
+        categories: n words. size, position: (n, 3) float, metres, yaw: (n,) float, radians, of the room as arranged.
+        free: (n,) bool, sizes that may change.
+    """
+    out, kinds = size.copy(), [kind_of(word) for word in categories]
+    lit = np.array([kind.role in ("board", "bed", "sofa") and kind.support == "floor" for kind in kinds], bool)
+    for lamp in (i for i, kind in enumerate(kinds) if kind.role == "light" and kind.support == "ceiling" and free[i]):
+        x, z = (position[lamp] - position)[:, [0, 2]].T
+        local = np.stack([np.cos(yaw) * x - np.sin(yaw) * z, np.sin(yaw) * x + np.cos(yaw) * z], 1)
+        under = lit & (np.abs(local) <= size[:, [0, 2]] / 2).all(1)
+        most = size[under][:, [0, 2]].min() if under.any() else ALONE
+        out[lamp, [0, 2]] *= min(1.0, most / size[lamp, [0, 2]].max())
     return out
 
 
