@@ -6,6 +6,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from pxr import Usd, UsdGeom
@@ -18,6 +19,7 @@ from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig,
 from echomodel.released.model import ReleasedModel
 from echomodel.released.tables import LayoutTables
 from echomodel.released.vqvae import VQVAE
+from echomodel.roomboxes import RoomBoxes, write_rooms
 from echomodel.text import ClipTextEncoder
 
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
@@ -60,6 +62,25 @@ def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
     assert stage.GetCompositionErrors() == []
     bed = UsdGeom.Mesh(stage.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh"))
     assert len(bed.GetFaceVertexCountsAttr().Get()) > 12  # a shape, not a box
+
+
+def test_scored_like_any_other_model(weights, tmp_path, echousd_command):
+    size, x = np.full((3, 3), 0.5), np.array([-1.0, 0.0, 1.0])
+    room = RoomBoxes(
+        "room", "bedroom", np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]), 2.6,
+        ("double_bed", "nightstand", "wardrobe"), size, np.stack([x, 0 * x, 0.5 * x], 1), 0 * x,
+    )  # fmt: skip
+    write_rooms(tmp_path / "rooms.json", [room])
+    asked = ("eval", "layout", "--rooms", tmp_path / "rooms.json", "--model", weights)
+    done = echousd_command(*asked, "--steps", 2, "--rules", "sgfront", "--json")
+    assert done.code == 0, done.err
+    scores = json.loads(done.out)["generation"]
+    assert scores["n"] >= 4
+    assert 0 <= scores["total"] <= 1
+    done = echousd_command(*asked, "--steps", 11)
+    assert (done.code, "layout steps is 11, allowed: 1..10" in done.err) == (2, True), done.err
+    done = echousd_command(*asked, "--guidance", 2)
+    assert (done.code, "are for compact weights, found: released" in done.err) == (2, True), done.err
 
 
 def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):
