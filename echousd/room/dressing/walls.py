@@ -49,7 +49,7 @@ def walls_of(setting: Setting) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window that has a rail, to the floor where nothing stands below."""
+    """A curtain on either side of every window that has a rail, down to the floor, the sill or what stands there."""
     if not setting.walls:
         return
     above, before, beyond = RAIL
@@ -65,7 +65,7 @@ def curtains(setting: Setting) -> None:
             inner = np.linspace(
                 0.0, 0.5 * (right - left) - wide / 2, 4
             )  # drawn over the pane where something is beside
-            for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02):
+            for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02, window.sill + 0.2):
                 size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
                 sides = [
                     next((one for one in hung if setting.clear(one, margin=0.0, floor=False)), None)
