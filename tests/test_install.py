@@ -27,12 +27,26 @@ def test_a_clone_called_echousd_does_not_hide_the_package(tmp_path):
 
 
 @pytest.fixture
-def wheel(monkeypatch):
-    """The package and file names that a wheel holds."""
+def script(monkeypatch):
+    """What setup.py defines, and as `told_setup` what it tells setuptools."""
     told: dict = {}
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr("setuptools.setup", told.update)
-    runpy.run_path(str(ROOT / "setup.py"))
+    return {**runpy.run_path(str(ROOT / "setup.py")), "told_setup": told}
+
+
+def test_an_editable_install_says_where_types_are(script):
+    lines = script["told"]("import some_finder; some_finder.install()").decode().splitlines()
+    assert lines[0].startswith("import some_finder; some_finder.install(); import sys; ")
+    assert "some_finder" in lines[0].rpartition("!=")[2]
+    for line, package in zip(lines[1:], ("echousd", "echomodel"), strict=True):
+        assert (Path(line) / package / "py.typed").is_file()
+
+
+@pytest.fixture
+def wheel(script):
+    """The package and file names that a wheel holds."""
+    told = script["told_setup"]
     made = Distribution(told)
     made.parse_config_files()
     build = made.get_command_obj("build_py")
