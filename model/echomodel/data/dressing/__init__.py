@@ -75,12 +75,12 @@ KINDS: dict[str, Kind] = {
         Kind("laptop", "computer", household.laptop, (0.32, 0.22, 0.28), (0.36, 0.24, 0.3)),
         Kind("pens", "pot", household.pens, (0.08, 0.17, 0.08), (0.09, 0.19, 0.09)),
         Kind("remote", "box", household.remote, (0.045, 0.018, 0.17), (0.05, 0.02, 0.2)),
-        Kind("television", "television", household.television, (0.6, 0.39, 0.18), (0.95, 0.58, 0.22)),
+        Kind("television", "television receiver", household.television, (0.6, 0.39, 0.18), (0.95, 0.58, 0.22)),
         Kind("slippers", "apparel", floorware.slippers, (0.22, 0.07, 0.26), (0.24, 0.08, 0.28)),
         Kind("floor_plant", "plant", floorware.floor_plant, (0.42, 0.85, 0.42), (0.58, 1.35, 0.58), faces=2600),
         Kind("floor_vase", "vase", floorware.floor_vase, (0.24, 0.8, 0.24), (0.32, 1.1, 0.32)),
         Kind("pouf", "ottoman", floorware.pouf, (0.42, 0.34, 0.42), (0.52, 0.42, 0.52)),
-        Kind("cable", "pipe", floorware.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
+        Kind("cable", "lamp", floorware.cable, (0.05, 0.008, 0.3), (0.12, 0.008, 2.4), True, True),
         Kind("shoes", "apparel", household.shoes, (0.24, 0.1, 0.27), (0.27, 0.12, 0.31)),
     )
 }
