@@ -89,7 +89,7 @@ def edit(
 
 
 def update(
-    layer: Annotated[Path, typer.Argument(help="Your layer over a room that generate made.", show_default=False)],
+    layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.", show_default=False)],
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
@@ -102,7 +102,10 @@ def update(
 
     What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
     """
+    from echousd.room.found import layer_over
     from echousd.room.wishes import artists_wishes
+
+    layer = layer_over(layer)
 
     def wanted() -> tuple[Path, SceneGraph]:
         own, graph, moved = artists_wishes(layer)

@@ -28,7 +28,7 @@ def register(app: typer.Typer) -> None:
     "export", epilog="Example: echousd texture export out/bedroom/bedroom.usda -o out/job --for scenetex"
 )
 def export(
-    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz).", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room: .usda, .usdc, .usd, .usdz or folder.", show_default=False)],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the job.", show_default=False)],
     tool: Annotated[str, typer.Option("--for", help="scenetex, hunyuan, mvpainter or generic.", show_default=False)],
     prompt: Annotated[str, typer.Option(help="Words for the room; default: from its graph.")] = "",
@@ -46,9 +46,11 @@ def export(
     json: AsJson = False,
 ) -> None:
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
+    from echousd.room.found import room_at
     from echousd.texturing import export_job
 
     started = time.perf_counter()
+    room = room_at(room)
     job = export_job(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
         force=force,
@@ -64,7 +66,7 @@ def export(
 
 @texture_app.command("import", epilog="Example: echousd texture import out/bedroom/bedroom.usda out/job --name oil")
 def import_(
-    room: Annotated[Path, typer.Argument(help="Root layer of the room that was exported.", show_default=False)],
+    room: Annotated[Path, typer.Argument(help="Room that was exported: root layer or folder.", show_default=False)],
     job: Annotated[Path, typer.Argument(help="Folder of the job, painted.", show_default=False)],
     name: Annotated[str, typer.Option(help="Of the look; default: the tool's.")] = "",
     skip: Annotated[list[str] | None, typer.Option(help="Object that keeps its look; may be repeated.")] = None,
@@ -74,9 +76,11 @@ def import_(
     json: AsJson = False,
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
+    from echousd.room.found import room_at
     from echousd.texturing import import_look
 
     started = time.perf_counter()
+    room = room_at(room)
     look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     if json:
         told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}

@@ -40,6 +40,29 @@ def room_at(place: Path) -> Path:
     return rooms[0]
 
 
+def layer_over(place: Path) -> Path:
+    """Somebody's layer over a room: a file itself, of a room's folder the one layer there that names its root.
+
+    Raises ValueError for a folder without one or with several.
+    """
+    if not place.is_dir():
+        return place
+    from pxr import Sdf
+
+    root = room_at(place)
+    layers = sorted(path for path in root.parent.glob("*.usd*") if path.suffix in STAGE_FORMS and path != root)
+    opened = {path: Sdf.Layer.FindOrOpen(str(path)) for path in layers}
+    over = [
+        path
+        for path, layer in opened.items()
+        if layer and any((path.parent / below).resolve() == root.resolve() for below in layer.subLayerPaths)
+    ]
+    if len(over) != 1:
+        found = ", ".join(path.name for path in over) or "none"
+        raise ValueError(f"{place}: layers over {root.name} in this folder: {found}; name the one that changes it")
+    return over[0]
+
+
 def _rooms_below(place: Path) -> list[Path]:
     rooms = [_room_in(folder) for folder in (place, *sorted(path for path in place.rglob("*") if path.is_dir()))]
     return [room for room in rooms if room is not None]

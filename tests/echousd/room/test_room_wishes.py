@@ -134,7 +134,7 @@ def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
     done = echousd_command("update", path, "--dry-run")
     assert done.code == 0, done.err
     assert "locked   wardrobe, where mine.usda puts it" in done.out
-    done = echousd_command("update", path)
+    done = echousd_command("update", root.parent)  # the one layer there over its room
     assert done.code in (0, 1), done.err
     node = echousd.read_graph(root).node("wardrobe")
     assert node.locked
@@ -146,6 +146,10 @@ def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
     done = echousd_command("update", root)
     assert done.code == 2
     assert "the room's own root layer; name the stronger layer" in done.err
+    path.rename(root.parent.parent / path.name)
+    done = echousd_command("update", root.parent)
+    assert done.code == 2
+    assert "layers over bedroom.usda in this folder: none; name the one that changes it" in done.err
 
 
 def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
