@@ -12,7 +12,7 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.compact.branches import branches
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
-from echomodel.compact.given import known_values, repeated, starting_noise
+from echomodel.compact.given import Sampling, known_values, repeated, starting_noise
 from echomodel.compact.joined import equal_furniture, joined
 from echomodel.compact.layouts import LayoutSampling, sample_boxes
 from echomodel.compact.learned import in_learned_words, unlearned
@@ -26,7 +26,7 @@ from echomodel.progress import StepListener, part_of
 from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.randomness import Randomness
 from echomodel.released.packed import pack_linear_maps
-from echomodel.samplers import Predict, guided, sample
+from echomodel.samplers import Predict, guided
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 # Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
@@ -138,20 +138,8 @@ class EchoModel:
         """
         graph = self._checked(graph)
         known, known_mask = known_values(graph, known, known_mask, self.device)
-        how = LayoutSampling(
-            generator,
-            rules,
-            steps,
-            sampler,
-            known,
-            known_mask,
-            edit,
-            guidance,
-            relation_guidance,
-            noise,
-            start,
-            progress,
-        )
+        by = Sampling(generator, steps, sampler, None, known_mask, guidance, progress)
+        how = LayoutSampling(by, rules, known, edit, relation_guidance, noise, start)
         return sample_boxes(self.model, self.graph_latent, graph, how)
 
     @torch.no_grad()
@@ -211,7 +199,7 @@ class EchoModel:
         graph, boxes = self._checked(graph), self._of(graph, boxes)
         known, known_mask = known_values(graph, known, known_mask, self.device)
         given = None if known is None else self.model.shape.codes(coder.encode(known))
-        equal, steps = equal_furniture(graph), steps or settings.steps
+        equal = equal_furniture(graph)
         tries = 1 if noise is not None else candidates or settings.candidates
         width = max(1, min(tries, TOGETHER // graph.num_nodes))
         rounds = [min(width, tries - start) for start in range(0, tries, width)]
@@ -223,12 +211,12 @@ class EchoModel:
             ]
             if noise is None:
                 starts = [settings.temperature * x[equal] for x in starts]
-            codes = sample(
-                sampler or settings.sampler, self._shape_predictor(graph, boxes.size, equal, edit, guidance, count),
-                torch.cat(starts), steps, settings.objective, known=repeated(given, count),
-                known_mask=repeated(known_mask, count), generator=generator,
-                progress=part_of(progress, number, len(rounds)),
+            how = Sampling(
+                generator, steps, sampler, repeated(given, count), repeated(known_mask, count), guidance,
+                part_of(progress, number, len(rounds)),
             )  # fmt: skip
+            predict = self._shape_predictor(graph, boxes.size, equal, edit, guidance, count)
+            codes = how.denoised(predict, torch.cat(starts), settings)
             for draw in codes.chunk(count):
                 drawn = self._decoded(draw)
                 whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
@@ -292,8 +280,8 @@ class EchoModel:
         return sample_descriptions(
             self.model, in_learned_words(graph, self.config), boxes.size, self.graph_latent(graph, edit), equal,
             settings.temperature * start[equal] if noise is None else start,
-            generator=generator, steps=steps, sampler=sampler, known=known, known_mask=known_mask,
-            guidance=guidance, bare_latent=None if guidance == 1.0 else self.graph_latent(bare), progress=progress,
+            Sampling(generator, steps, sampler, known, known_mask, guidance, progress),
+            bare_latent=None if guidance == 1.0 else self.graph_latent(bare),
         )  # fmt: skip
 
     def _shape_predictor(

@@ -5,13 +5,12 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from echomodel.compact.given import Sampling
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing
-from echomodel.config import Sampler
 from echomodel.graph import GraphBatch
-from echomodel.progress import StepListener
-from echomodel.samplers import Predict, guided, sample
+from echomodel.samplers import Predict, guided
 from echomodel.vocabulary import vocabulary
 
 
@@ -45,15 +44,8 @@ def sample_descriptions(
     latent: Tensor,
     equal: Tensor,
     noise: Tensor,
-    *,
-    generator: torch.Generator,
-    steps: int | None = None,
-    sampler: Sampler | None = None,
-    known: Tensor | None = None,
-    known_mask: Tensor | None = None,
-    guidance: float = 1.0,
+    how: Sampling,
     bare_latent: Tensor | None = None,
-    progress: StepListener | None = None,
 ) -> Tensor:
     """Descriptions (N, D) of all pieces of S scenes.
 
@@ -61,17 +53,10 @@ def sample_descriptions(
         graph: S scenes, N nodes. size: (N, 3) float32, metres.
         latent: (N, latent width), of the graph; `bare_latent` of the graph without relations, for `guidance`.
         equal: (N,) int64, number of each piece's group in [0, N); a group agrees on one description.
-        noise: (N, D) starting noise.
-        known, known_mask: (N, D) and (N,) bool; where true the description is given and comes back unchanged.
-        guidance: scale of classifier-free guidance towards the relations, 1 = off.
-        generator, steps, sampler, progress: as for `EchoModel.sample_layout`.
+        noise: (N, D) starting noise. how: to sample.
     """
-    settings = model.config.furniture
     predict = furniture_predictor(model, graph, size, latent)
-    if guidance != 1.0 and bare_latent is not None:
+    if how.guidance != 1.0 and bare_latent is not None:
         bare = graph.with_triplets(graph.triplets[:0])
-        predict = guided(predict, furniture_predictor(model, bare, size, bare_latent), guidance)
-    return sample(
-        sampler or settings.sampler, agreeing(predict, equal), noise, steps or settings.steps, settings.objective,
-        known=known, known_mask=known_mask, generator=generator, progress=progress,
-    )  # fmt: skip
+        predict = guided(predict, furniture_predictor(model, bare, size, bare_latent), how.guidance)
+    return how.denoised(agreeing(predict, equal), noise, model.config.furniture)

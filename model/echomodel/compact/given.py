@@ -1,15 +1,63 @@
-"""What a caller gives to a sampler, checked: known boxes or shapes, and noise to start from."""
+"""What a caller gives to a sampler, checked: how to sample, known boxes or shapes, and noise to start from."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.config import Objective, Sampler
 from echomodel.graph import GraphBatch
+from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
+from echomodel.samplers import Predict, sample
+
+
+class SamplerSettings(Protocol):
+    """What the configuration of every branch says of its sampling."""
+
+    @property
+    def sampler(self) -> Sampler: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def objective(self) -> Objective: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How nodes are sampled, whatever the branch; fields as the arguments of `EchoModel.sample_layout`.
+
+    Arguments:
+        known, known_mask: (N, ...) in the numbers that are denoised, and (N,) bool.
+    """
+
+    generator: Randomness
+    steps: int | None = None
+    sampler: Sampler | None = None
+    known: Tensor | None = None
+    known_mask: Tensor | None = None
+    guidance: float = 1.0
+    progress: StepListener | None = None
+
+    def denoised(
+        self,
+        predict: Predict,
+        noise: Tensor,
+        settings: SamplerSettings,
+        *,
+        draft: Tensor | None = None,
+        start: float = 1.0,
+    ) -> Tensor:
+        """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
+        return sample(
+            self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
+            known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
+            draft=draft, start=start,
+        )  # fmt: skip
 
 
 def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: torch.device) -> tuple[Any, Tensor | None]:

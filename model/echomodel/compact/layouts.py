@@ -9,20 +9,18 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.compact.given import starting_noise
+from echomodel.compact.given import Sampling, starting_noise
 from echomodel.compact.learned import in_learned_words
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor
-from echomodel.config import Sampler
 from echomodel.drafts import drafted
 from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
-from echomodel.progress import StepListener
 from echomodel.protocols import GraphEdit
-from echomodel.randomness import Randomness, for_scenes, uniform
-from echomodel.samplers import Predict, guided, sample
+from echomodel.randomness import for_scenes, uniform
+from echomodel.samplers import Predict, guided
 from echomodel.vocabulary import vocabulary
 
 TRUST = 2.0  # a draft that keeps a share of what is told is begun on with this power of it as probability
@@ -32,20 +30,19 @@ Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
 
 @dataclass(frozen=True, eq=False)
 class LayoutSampling:
-    """How to sample and what is given; fields as the arguments of `EchoModel.sample_layout`."""
+    """How layouts are sampled and what is given; fields as the arguments of `EchoModel.sample_layout`.
 
-    generator: Randomness
+    Arguments:
+        by: how every branch is sampled; what is known is here, in metres.
+    """
+
+    by: Sampling
     rules: str
-    steps: int | None = None
-    sampler: Sampler | None = None
     known: Boxes | None = None
-    known_mask: Tensor | None = None
     edit: GraphEdit | None = None
-    guidance: float = 1.0
     relation_guidance: float | None = None
     noise: Tensor | None = None
     start: float | None = None
-    progress: StepListener | None = None
 
 
 def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: LayoutSampling) -> Boxes:
@@ -67,7 +64,7 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
     open_ = told <= MOST_TOLD
     if not bool(open_.any()):
         return _denoised(model, latent, graph, how, None, 1.0)
-    some = for_scenes(how.generator, open_)
+    some = for_scenes(how.by.generator, open_)
     draft, share = drafted(_scenes(graph, open_).to("cpu"), some, rules=how.rules)
     trusted = open_.clone()
     luck = uniform(len(share), some)
@@ -77,8 +74,8 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
     for mask, level in ((trusted, begin), (~trusted, 1.0)):
         if bool(mask.any()):
             # the same steps again for the other scenes would be told twice
-            own = for_scenes(how.generator, mask)
-            part = replace(how, generator=own, progress=how.progress if bool(mask[0]) else None)
+            own, told_of = for_scenes(how.by.generator, mask), how.by.progress if bool(mask[0]) else None
+            part = replace(how, by=replace(how.by, generator=own, progress=told_of))
             scenes = graph if bool(mask.all()) else _scenes(graph, mask)
             boxes = _denoised(model, latent, scenes, part, draft if level < 1 else None, level)
             out[mask[graph.scene]] = torch.cat([boxes.size, boxes.position, boxes.yaw[:, None]], 1)
@@ -93,13 +90,13 @@ def _scenes(graph: GraphBatch, mask: Tensor) -> GraphBatch:
 def _denoised(
     model: CompactModel, latent: Latent, graph: GraphBatch, how: LayoutSampling, draft: Boxes | None, start: float
 ) -> Boxes:
-    config = model.config.layout
+    config, by = model.config.layout, how.by
     scale = model.statistics.scale(in_learned_words(graph, model.config).category)
     given = None if how.known is None else how.known.encode(scale)
     conditional = _predictor(model, graph, latent(graph, how.edit), how.rules)
-    if how.guidance != 1.0:
+    if by.guidance != 1.0:
         bare = graph.with_triplets(graph.triplets[:0])
-        conditional = guided(conditional, _predictor(model, bare, latent(bare, None), how.rules), how.guidance)
+        conditional = guided(conditional, _predictor(model, bare, latent(bare, None), how.rules), by.guidance)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
     if strength:
         conditional = relation_guided(
@@ -107,17 +104,14 @@ def _denoised(
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
             openings=_in_the_way(graph), category=graph.category, placements=graph.placements,
         )  # fmt: skip
-    vectors = sample(
-        how.sampler or config.sampler, conditional,
-        starting_noise((graph.num_nodes, 8), how.generator, how.noise, graph.category.device),
-        how.steps or config.steps, config.objective, known=given, known_mask=how.known_mask, generator=how.generator,
-        progress=how.progress, draft=None if draft is None else draft.encode(scale), start=start,
-    )  # fmt: skip
+    noise = starting_noise((graph.num_nodes, 8), by.generator, how.noise, graph.category.device)
+    begun = None if draft is None else draft.encode(scale)
+    vectors = replace(by, known=given).denoised(conditional, noise, config, draft=begun, start=start)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
-    if how.known is None or how.known_mask is None:
+    if how.known is None or by.known_mask is None:
         return boxes
-    return boxes.replaced(how.known_mask, how.known)
+    return boxes.replaced(by.known_mask, how.known)
 
 
 def _in_the_way(graph: GraphBatch) -> Tensor | None:
