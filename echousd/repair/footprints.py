@@ -49,6 +49,11 @@ class Pairs:
         fronts = None if self.fronts is None else self.fronts[rows]
         return Pairs(self.size[rows], self.position[rows], self.axis[rows], self.half[rows], self.columns, fronts)
 
+    def swapped(self) -> Pairs:
+        """The same pairs, the second box first."""
+        both = (value[:, ::-1] for value in (self.size, self.position, self.axis, self.half))
+        return Pairs(*both, self.columns, self.fronts)
+
     def flat(self) -> np.ndarray:
         """(p, 2) float: in x and z from the second box to the first, metres."""
         return self.position[:, FIRST, PLAN] - self.position[:, SECOND, PLAN]

@@ -137,10 +137,17 @@ def _beside(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values
 
 
 def _close(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:
-    from echomodel.rules.sets import NEAR
+    from echomodel.rules.sets import NEAR, SIDES
 
     distance, gradient = corner_distance(pair)
-    return NEAR - distance, -gradient
+    corners = NEAR - distance, -gradient
+    if not strict:
+        return corners
+    over, by_over = _rise(pair, to_top=True)
+    gap, by_gap = penetration(pair)
+    under, by_under = _rise(pair.swapped(), to_top=True)
+    level = _larger_of((over, by_over), (under, by_under[:, ::-1]))
+    return _larger_of(corners, _smaller((SIDES + gap, by_gap), (NEAR - level[0], -level[1])))
 
 
 def _symmetrical(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:

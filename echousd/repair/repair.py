@@ -11,7 +11,7 @@ import numpy as np
 
 from echomodel.openings import Opening
 from echomodel.rules.living import plan_of
-from echomodel.rules.living.sizes import hung_lamps, laid_tables, usual_sizes
+from echomodel.rules.living.sizes import fitting_loads, hung_lamps, laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
 from echousd.repair.placements import stated_placements
@@ -224,7 +224,8 @@ def repair_boxes(
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         free = ~rigid & ~np.isin(np.arange(n), told)
-        at = replace(at, size=laid_tables(at.problem.categories, at.size, anchor, free))
+        laid = laid_tables(at.problem.categories, at.size, anchor, free)
+        at = replace(at, size=fitting_loads(at.problem.categories, laid, at.problem.carrier, free))
         chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw)

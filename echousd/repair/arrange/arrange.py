@@ -12,14 +12,16 @@ import numpy as np
 
 from echousd.repair.arrange.costs import least, price, soon_told
 from echousd.repair.arrange.groups import paid_by, seat_evenly, slide_groups
+from echousd.repair.arrange.overlaps import depths
 from echousd.repair.arrange.places import places
-from echousd.repair.arrange.setting import Setting, State
+from echousd.repair.arrange.setting import Poses, Setting, State
 
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
 SWEEPS = 1  # times that every piece is offered a better place
 BLOCK, FEW = 64, 24  # poses that are looked at together at first, and those that are priced before the others
 HAIR = 1e-9  # of rounding in sums of the same costs in another order
+CLOSE = 0.5  # metres: what is so near is in the way
 BAD = 1.8  # a piece that pays more comes earlier in the next round
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 
@@ -57,24 +59,35 @@ def arrange(setting: Setting, *, rounds: int | None = None) -> Arranged:
         if not bad.any():
             break
         rank = rank - np.where(bad, 2.5, 0.0)
-        for i, paid in _blamed(setting, found.paid).items():
+        for i, paid in _blamed(setting, found).items():
             x, _, z = found.position[i].tolist()
             regrets.setdefault(i, []).append((x, z, float(found.yaw[i]), paid))
     assert best is not None
     return best
 
 
-def _blamed(setting: Setting, paid: np.ndarray) -> dict[int, float]:
-    """Boxes whose poses led to what bad ones pay: what those attend, and what relations tie them to."""
+def _blamed(setting: Setting, found: Arranged) -> dict[int, float]:
+    """Boxes whose poses led to what bad ones pay: what those attend, what relations tie them to, what is in their way.
+    """
     out: dict[int, float] = {}
-    for i in np.flatnonzero(paid > BAD).tolist():
+    for i in np.flatnonzero(found.paid > BAD).tolist():
         ties = setting.triplets[(setting.triplets[:, [0, 2]] == i).any(1)][:, [0, 2]]
         tied = {int(setting.anchor[i]), *ties.ravel().tolist()} - {-1, i}
-        for j in tied:
+        for j in tied | _crowding(setting, found, i):
             if not setting.fixed[j]:
                 share = 0.6 if j == setting.anchor[i] else 0.3
-                out[j] = min(out.get(j, 0.0) + share * float(paid[i]), 6.0)
+                out[j] = min(out.get(j, 0.0) + share * float(found.paid[i]), 6.0)
     return out
+
+
+def _crowding(setting: Setting, found: Arranged, i: int) -> set[int]:
+    """What stands close to a box and is of another group."""
+    if not setting.standing(i):
+        return set()
+    here = Poses(found.position[i : i + 1], found.yaw[i : i + 1], np.zeros(1))
+    gap = -depths(setting.size[i], here, setting.size, found.position, found.yaw)[0]
+    near = (gap < CLOSE) & (setting.group != setting.group[i])
+    return {j for j in np.flatnonzero(near).tolist() if setting.standing(j)}
 
 
 def _rank(setting: Setting, i: int) -> float:

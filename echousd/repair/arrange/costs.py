@@ -25,6 +25,7 @@ BLOCKED = 3.0  # for a front that cannot be opened
 ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regretted
 CROWDED = 0.7  # for a chair in the way of a front
 SEATED, ENDS = 0.75, 4  # metres from a table to behind its chairs; more chairs than that sit at its ends, too
+ELBOWS, ELBOW = 1.0, 0.2  # for an armchair so many metres before its own sofa's seat
 FOOT = 0.4  # metres at the foot of a bed
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
 GLARE = 0.2  # metres of a stand before a window
@@ -123,6 +124,11 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
     out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
+    if setting.stances[i] == "company":  # of its own sofa an armchair leaves the knees free
+        sofas = [j for j in others if setting.at_home[i, j] and setting.kinds[j].role == "sofa"]
+        zones = fronts(setting, state, sofas)
+        deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
+        out = out + ELBOWS * (deep > ELBOW).sum(1)
     front = own_front(setting, i)
     if front is None:
         return out

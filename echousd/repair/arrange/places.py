@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.rules.living.walls import PASSAGE
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.slots import STANDS, Slot
@@ -19,6 +20,9 @@ STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
 LONELY = 2.5  # for a piece that does not stand at what it attends though that is there; chairs pay twice
 HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
+AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
+WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
+TOO_FAR, NEARER = 4.6, 0.7  # metres from which on a sofa leaves its wall for that, and what it gains per metre
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -44,9 +48,10 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     elif kind.wall or (kind.role == "board" and kind.access > 0):
         rows += along_walls(setting, i, lonely)
         if kind.role == "sofa":
-            rows += in_the_open(setting, i, 4.5 + lonely)
-    elif kind.stands == "company" and anchor < 0:  # an armchair by itself looks into the room from its edge
-        rows += nooks(setting, i) + along_walls(setting, i, 0.2) + in_the_open(setting, i, 2.5)
+            rows += in_the_open(setting, i, 4.5 + lonely) + _in_view(setting, i)
+    elif kind.stands == "company":  # an armchair by itself looks into the room from its edge
+        rows += [(*row[:3], row[3] + lonely) for row in nooks(setting, i)] + along_walls(setting, i, 0.2 + lonely)
+        rows += in_the_open(setting, i, 2.5 + lonely)
     elif kind.role == "sofa":
         rows += along_walls(setting, i, lonely) + in_the_open(setting, i, 1.5 + lonely)
     elif kind.role in ("decor", "light", "storage"):
@@ -198,6 +203,22 @@ def corners(setting: Setting, i: int, price: float) -> list[Row]:
     return rows
 
 
+def _in_view(setting: Setting, i: int) -> list[Row]:
+    """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
+    if not any(stance == "opposite" and a == i for stance, a in zip(setting.stances, setting.anchor, strict=True)):
+        return []
+    out = []
+    for x, z, yaw, price in along_walls(setting, i, 0.0):
+        front = np.array([math.sin(yaw), math.cos(yaw)])
+        steps = np.array([x, z]) + AHEAD[:, None] * front
+        inside = depth_inside(setting.floor, steps) > 0
+        ahead = float(AHEAD[-1] if inside.all() else AHEAD[inside.argmin()])
+        if ahead > max(TOO_FAR, WATCHED + PASSAGE):
+            (dx, dz), gain = ((ahead - WATCHED) * front).tolist(), NEARER * (ahead - TOO_FAR)
+            out.append((x + dx, z + dz, yaw, price - gain))
+    return out
+
+
 def nooks(setting: Setting, i: int) -> list[Row]:
     """In the corners, looking across the room."""
     width, depth = setting.size[i, [0, 2]].tolist()
@@ -240,11 +261,23 @@ def overhead(setting: Setting, state: State, i: int) -> list[Row]:
         if not state.placed[j] or not (j in told or (lit and setting.standing(j))):
             continue
         taste = 0.8 * _hanging_over(setting, state, i, j) + 0.4 * (kind.stands == "beside") + HIGH_UP * (not low)
-        price = 0.0 if j in told else taste
-        rows.append((float(state.position[j, 0]), float(state.position[j, 2]), float(state.yaw[j]), price))
+        price, (x, _, z), yaw = 0.0 if j in told else taste, state.position[j].tolist(), float(state.yaw[j])
+        for away in _row_over(setting, i, j):  # along its long side
+            long = yaw if setting.size[j, 0] >= setting.size[j, 2] else yaw - HALF_PI
+            rows.append((x + math.cos(long) * away, z - math.sin(long) * away, yaw, price))
     middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
     rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.9 if low and rows else 0.0))
     return rows
+
+
+def _row_over(setting: Setting, i: int, j: int) -> list[float]:
+    """Where lamps hang over box j, metres from its middle: as many in a row as are told to."""
+    above = vocabulary().predicate_id("above")
+    lamps = {k for k, predicate, other in setting.triplets.tolist() if predicate == above and other == j}
+    if i not in lamps or len(lamps) < 2:
+        return [0.0]
+    length = float(setting.size[j, [0, 2]].max())
+    return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
 
 
 def _hanging_over(setting: Setting, state: State, i: int, j: int) -> int:

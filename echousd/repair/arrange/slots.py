@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from echomodel.rules.living.sizes import TUCKED
 from echomodel.vocabulary import Category, vocabulary
 
 Size = np.ndarray
@@ -44,8 +45,10 @@ def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
 
 
 def around(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
-    """Chairs: along both long sides of a table and at its ends, looking at it."""
+    """Chairs: along both long sides of a table and at its ends, looking at it; along the front of one at a wall."""
     length, depth = float(anchor[0]), float(anchor[2])
+    if kind.wall:
+        return _along_front(own, length, depth, count)
     if length >= depth:
         return _around(own, length, depth, count)
     # the long sides are the left and the right one: the same, turned by a quarter
@@ -57,8 +60,9 @@ def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
     fits = max(int((length + 0.1) // (own[0] + 0.06)), 1)
     wanted = max(1, min(fits, math.ceil(count / 2)))
     tuck = min(TUCK, 0.3 * float(own[2]))
+    free = length - 2 * TUCKED * (count > 2 * wanted)  # what sits at the ends keeps off the corners
     for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
-        spacing = max(min(length / per_side, 0.85), float(own[0]) + 0.03)
+        spacing = max(min(free / per_side, 0.85), float(own[0]) + 0.03)
         more = 0.0 if per_side == wanted else 0.25 if count % 2 else 0.9
         for k in range(per_side):
             lateral = (k - (per_side - 1) / 2) * spacing
@@ -72,6 +76,16 @@ def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
     return out
+
+
+def _along_front(own: Size, length: float, depth: float, count: int) -> list[Slot]:
+    spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
+    tuck = min(TUCK, 0.3 * float(own[2]))
+    return [
+        ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, price)
+        for k in range(count)
+        for off, price in ((0.0, 0.0), (-0.15, 0.3), (0.2, 0.3))
+    ]
 
 
 def at_front(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:

@@ -23,6 +23,7 @@ VOLUME = 0.15  # relative difference of volume for bigger and smaller
 HEIGHT = 0.1  # relative difference of the tops for taller and shorter
 TOUCH = 0.04  # metres of vertical play for standing on
 NEAR = 0.45  # metres for close by and symmetrical to
+SIDES = 0.2  # metres between sides that are close by as well, however long they are
 LOOK = math.cos(math.radians(30.0))  # of the angle between two ways that are the same
 
 
@@ -127,6 +128,13 @@ def _close(pair: PairGeometry) -> Tensor:
     return NEAR - pair.corner_distance
 
 
+def _near(pair: PairGeometry) -> Tensor:
+    """Corners are close, as published, or sides: a chair in the middle of a long table's side is near it, too."""
+    level = torch.maximum(pair.position_s[:, 1] - pair.top_o, pair.position_o[:, 1] - pair.top_s)
+    sides = torch.minimum(SIDES + pair.footprint_penetration, NEAR - level)
+    return torch.maximum(_close(pair), sides)
+
+
 def _sgfront_standing_on(pair: PairGeometry) -> Tensor:
     return TOUCH - (pair.position_s[:, 1] - pair.position_o[:, 1]).abs()
 
@@ -212,6 +220,8 @@ SGFRONT.rules["front"] = replace(SGFRONT.rules["front"], label=_beside(0, 1.0, A
 SGFRONT.rules["behind"] = replace(SGFRONT.rules["behind"], label=_beside(0, -1.0, APART))
 SGFRONT.rules["standing_on"] = replace(SGFRONT.rules["standing_on"], label=None)
 SGFRONT.rules["above"] = Rule(None, _higher)
+
+STRICT.rules["close_by"] = Rule(_near, _close)  # what is learned stays what is published
 
 RULE_SETS = {rules.name: rules for rules in (STRICT, SGFRONT)}
 

@@ -20,6 +20,7 @@ BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
 NEAR = 3.0  # metres: a sofa further away stands for itself
 COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand before
 SIDE = 0.6  # metres: what is further from its seat stands for itself
+ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
 VIEW_STEPS = 9
@@ -29,7 +30,7 @@ VIEW_HEIGHT = 0.65  # metres: one looks over what is lower
 def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
     i, j = plan.attended("at", "foot")
-    tables = plan.which(lambda kind: kind.role == "board" and not kind.access)
+    tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
     keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
     i, j = i[keep], j[keep]
     places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
@@ -60,15 +61,19 @@ def sofas_in_circle(plan: Plan) -> Found:
 
 
 def at_its_side(plan: Plan) -> Found:
-    """Side tables and floor lamps stand beside their sofa or bed, not before it."""
+    """Side tables and floor lamps stand beside their sofa or bed, not before it; armchairs leave room for its knees."""
     i, j = plan.attended("beside")
     keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
-    i, j = i[keep], j[keep]
+    chairs = (plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa")).nonzero()[:, 0]
+    i, j = torch.cat([i[keep], chairs]), torch.cat([j[keep], plan.group[chairs]])
+    armchair = plan.stands("company")[i]
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     covered = plan.size[j, 0] / 2 + half_width - lateral.abs()
     before = forward - half_depth - plan.size[j, 2] / 2
-    margin = torch.maximum(COVERS * plan.size[j, 0] - covered, -0.05 - before)
+    share = torch.where(armchair, ELBOW, COVERS).to(plan.size)
+    margin = torch.maximum(share * plan.size[j, 0] - covered, -0.05 - before)
+    margin = torch.where(armchair, torch.maximum(margin, before - KNEES), margin)
     return found(i, margin, other=j, measure=before.clamp_min(0.0))
 
 

@@ -19,7 +19,8 @@ USUAL = 0.6  # power of the ratio of the 5th and 95th percentile to the median
 
 ELBOWS = 0.05  # metres between two chairs
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
-LEAST_DEPTH = 0.75  # metres of a table at which people sit opposite each other
+LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
+PLACE, SPARE = 0.55, 0.8  # metres of a table's side for each chair there, and in all beside that, at most
 ALONE = 0.8  # metres, width of a lamp that hangs over nothing
 
 
@@ -56,7 +57,7 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
 
 
 def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(n, 3) float: sizes in which every table is long and deep enough for the chairs around it.
+    """(n, 3) float: sizes in which every table suits the chairs around it: long and deep enough, and no hall's.
 
     Arguments:
         categories: n words. size: (n, 3) float, metres.
@@ -69,11 +70,32 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         if not free[table] or kinds[table].role != "board" or kinds[table].access or len(chairs) < 2:
             continue
         width = float(np.median([min(size[i, 0], 0.7) for i in chairs]))
+        if kinds[table].wall:  # they sit along its front
+            out[table, 0] = max(size[table, 0], len(chairs) * (width + ELBOWS))
+            continue
         at_ends = len(chairs) > 4
         a_side = -(-(len(chairs) - 2 * at_ends) // 2)
         long = 0 if size[table, 0] >= size[table, 2] else 2
-        out[table, long] = max(size[table, long], a_side * (width + ELBOWS) + 2 * TUCKED * at_ends)
-        out[table, 2 - long] = max(size[table, 2 - long], LEAST_DEPTH)
+        ends = 2 * TUCKED * at_ends
+        least, most = a_side * (width + ELBOWS) + ends, a_side * max(PLACE, width + ELBOWS) + ends + SPARE
+        out[table, long] = np.clip(size[table, long], least, most)
+        out[table, 2 - long] = np.clip(size[table, 2 - long], LEAST_DEPTH, MOST_DEPTH)
+    return out
+
+
+def fitting_loads(categories: Sequence[str], size: np.ndarray, carrier: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(n, 3) float: sizes in which no screen or lamp is larger in plan than what carries it, where their kinds allow.
+
+    Arguments:
+        categories: n words. size: (n, 3) float, metres.
+        carrier: (n,) int, what each stands on, negative = no other box. free: (n,) bool, sizes that may change.
+    """
+    out = size.copy()
+    for load in np.flatnonzero((carrier >= 0) & free).tolist():
+        if kind_of(categories[load]).name:
+            low = np.array(size_range(categories[load])[0])
+            plan = np.minimum(out[load], np.maximum(out[carrier[load]], low))[[0, 2]]
+            out[load, [0, 2]] = plan
     return out
 
 
