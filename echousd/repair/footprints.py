@@ -51,8 +51,8 @@ class Pairs:
 
     def swapped(self) -> Pairs:
         """The same pairs, the second box first."""
-        both = (value[:, ::-1] for value in (self.size, self.position, self.axis, self.half))
-        return Pairs(*both, self.columns, self.fronts)
+        size, position, axis, half = (value[:, ::-1] for value in (self.size, self.position, self.axis, self.half))
+        return Pairs(size, position, axis, half, self.columns, self.fronts)
 
     def flat(self) -> np.ndarray:
         """(p, 2) float: in x and z from the second box to the first, metres."""
