@@ -82,6 +82,12 @@ class ClipTextEncoder:
             raise TextEncoderError(
                 "text features need the package open_clip_torch: pip install 'echousd[text]'"
             ) from None
+        except (RuntimeError, AttributeError, OSError) as error:  # torchvision's operators are of another torch
+            reason = (str(error).strip() or type(error).__name__).splitlines()[0][:200]
+            raise TextEncoderError(
+                f"open_clip_torch is there and cannot be imported ({reason}); torch {torch.__version__} and "
+                "torchvision must be of one release and one source"
+            ) from None
         if self.weights != PUBLISHED_WEIGHTS and not Path(self.weights).is_file():
             raise TextEncoderError(f"{self.weights}: no such weights file for the text encoder")
         try:

@@ -60,6 +60,22 @@ def test_absent_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         ClipTextEncoder()(["chair"])
 
 
+def test_a_package_that_cannot_be_imported_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What pip installs as torchvision may be made for another build of torch."""
+    real = builtins.__import__
+
+    def broken(name: str, *args: object, **kwargs: object) -> object:
+        if name == "open_clip":
+            raise RuntimeError("operator torchvision::nms does not exist")
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", broken)
+    with pytest.raises(
+        TextEncoderError, match=r"cannot be imported \(operator torchvision::nms does not exist\); torch 2"
+    ):
+        ClipTextEncoder()(["chair"])
+
+
 def test_absent_weights_are_named(tmp_path) -> None:
     with pytest.raises(TextEncoderError, match=r"clip\.pt: no such weights file"):
         CachedTextEncoder(ClipTextEncoder(tmp_path / "clip.pt"), tmp_path)
