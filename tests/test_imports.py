@@ -8,6 +8,7 @@ import networkx
 import pytest
 
 ROOT = Path(__file__).parents[1]
+LINES = 350  # of a module that is read in one sitting
 # package -> what it must not import, in a function or above it (imports for type hints alone are none)
 FORBIDDEN = {
     "echomodel": ("echousd", "pxr", "typer", "rich"),
@@ -117,3 +118,10 @@ def test_the_page_on_architecture_names_files_that_there_are():
     named = set(re.findall(r"`((?:echousd|echomodel|model|tests)/[\w/.]+)`", page))
     assert len(named) > 20
     assert [name for name in sorted(named) if not any((top / name).exists() for top in (ROOT, ROOT / "model"))] == []
+
+
+def test_modules_are_read_in_one_sitting():
+    files = [path for folder in ("echousd", "model", "tests", "benchmarks") for path in (ROOT / folder).rglob("*.py")]
+    long = [str(path.relative_to(ROOT)) for path in files if len(path.read_text("utf-8").splitlines()) > LINES]
+    assert len(files) > 400
+    assert long == []

@@ -15,7 +15,8 @@ from echousd.graph import fields as field
 from echousd.graph.consistency import GraphError, listed, name_faults, raise_all, triple_faults
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
-from echousd.graph.text import graph_from_text, graph_to_json, graph_to_yaml
+from echousd.graph.text import graph_from_text
+from echousd.graph.writing import graph_to_json, graph_to_yaml
 
 
 class SceneGraph(PlainModel):

@@ -1,4 +1,4 @@
-"""Scene graphs as text: the canonical JSON form and the short form that a person writes, each as YAML or JSON.
+"""Scene graphs read from text: the canonical form and the short form that a person writes, each as YAML or JSON.
 
 room: bedroom
 objects: {bed: double_bed, wardrobe: wardrobe, lamp: {category: table_lamp, style: oak}}
@@ -9,21 +9,17 @@ doors: [{wall: south, offset: 0.6}]
 from __future__ import annotations
 
 import difflib
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-import yaml
-
-from echomodel.openings import Opening
 from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph.consistency import MAX_ERRORS, GraphError, listed, name_faults, raise_all, unknown_ends
 from echousd.graph.fields import IDENTIFIER, shown
 from echousd.graph.nodes import Node, Placed, Relation, RoomSpec
-from echousd.graph.openings import LISTS, listed_words, opening_from_words, stated
+from echousd.graph.openings import LISTS, listed_words, opening_from_words
 from echousd.graph.sentences import fields_of_sentence, placed_fields
-from echousd.graph.syntax import Dumper, Located, Path, parse_json, parse_yaml
+from echousd.graph.syntax import Located, Path, parse_json, parse_yaml
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
 
 if TYPE_CHECKING:
@@ -287,65 +283,3 @@ def _own_name(category: str) -> str:
     """The name of an object that is listed by its category alone."""
     name = normalised(category)
     return name if IDENTIFIER.fullmatch(name) else vocabulary().category(category).name
-
-
-def plain(graph: SceneGraph) -> dict[str, Any]:
-    """The canonical form as plain data: fields in a fixed order, those at their default left out."""
-    return {
-        "room": _stated(graph.room),
-        "nodes": [_stated(node) for node in graph.nodes],
-        "relations": [_stated(relation) for relation in graph.relations],
-    }
-
-
-def _stated(model: RoomSpec | Node | Relation) -> dict[str, Any]:
-    fields = type(model).model_fields
-    values = {name: getattr(model, name) for name in fields}
-    return {
-        name: _lists(value)
-        for name, value in values.items()
-        if value != fields[name].get_default(call_default_factory=True)
-    }
-
-
-def _lists(value: Any) -> Any:
-    if isinstance(value, Opening):
-        return stated(value)
-    return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
-
-
-def graph_to_json(graph: SceneGraph) -> str:
-    """The canonical JSON form with one node and one relation a line."""
-
-    def line(value: Any) -> str:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-    def block(entries: list[Any]) -> str:
-        return "[\n    " + ",\n    ".join(map(line, entries)) + "\n  ]" if entries else "[]"
-
-    form = plain(graph)
-    return (
-        f'{{\n  "room": {line(form["room"])},\n  "nodes": {block(form["nodes"])},\n'
-        f'  "relations": {block(form["relations"])}\n}}\n'
-    )
-
-
-def graph_to_yaml(graph: SceneGraph) -> str:
-    """The short YAML form with one object and one relation a line."""
-    form = plain(graph)
-    room = form["room"]
-    lines = [f"room: {_flow(room['type'] if len(room) == 1 else room)}", "objects:"]
-    for node in form["nodes"]:
-        name = node.pop("name")
-        lines.append(f"  {_flow(name)}: {_flow(node['category'] if len(node) == 1 else node)}")
-    if graph.relations:
-        lines.append("relations:")
-    for relation, said in zip(graph.relations, form["relations"], strict=True):
-        lines.append(f"  - {relation if len(said) == 3 else _flow(said)}")
-    return "\n".join(lines) + "\n"
-
-
-def _flow(value: Any) -> str:
-    """`value` on one line of YAML."""
-    text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
-    return text.removesuffix("\n").removesuffix("\n...").strip()
