@@ -37,6 +37,16 @@ def test_no_module_takes_the_place_of_a_public_name():
     assert all(callable(getattr(echousd, name)) for name in echousd.__all__)
 
 
+def test_every_measured_word_is_explained():
+    from echomodel.rules import rule_set
+
+    rules = rule_set("strict").rules
+    assert [name for name, rule in rules.items() if not rule.means] == []
+    page = (DOCS / "API.md").read_text("utf-8")
+    assert "| facing | The subject's front looks at the object's centre, to 30 degrees |" in page
+    assert "| same_style_as | one style" in page
+
+
 def test_help_is_short_and_shows_no_names_of_libraries():
     told = pydoc.render_doc(echousd, renderer=pydoc.plaintext)
     assert len(told.splitlines()) < 800

@@ -5,6 +5,7 @@ A rule is registered here or with `@rule("name")` in a module that `echomodel.ru
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,12 +37,14 @@ class Rule:
         label: margin that a pair needs to be labelled with the predicate; None where rooms are not labelled with it.
         open: the bound itself does not count (satisfied iff > 0).
         same_category: only objects of one category are labelled with it.
+        means: what a person is told that it asks for.
     """
 
     margin: Margin | None
     label: Margin | None = None
     open: bool = False
     same_category: bool = False
+    means: str = ""
 
 
 @dataclass(frozen=True)
@@ -173,6 +176,23 @@ def _named(margins: Mapping[str, Margin], *, open_: Collection[str] = ()) -> dic
     }
 
 
+_BESIDE = f"{APART} m at least from centre to centre along {{}}, and {OVERLAP:.0%} of the smaller in the other at most"
+MEANS = {
+    "left": _BESIDE.format("-Z"),
+    "right": _BESIDE.format("+Z"),
+    "front": _BESIDE.format("+X"),
+    "behind": _BESIDE.format("-X"),
+    "close_by": f"a corner of one within {NEAR} m of a corner of the other",
+    "above": f"over its footprint and higher than its top by {TOUCH} m at least",
+    "standing_on": f"the bottom within {TOUCH} m of its top, the centre over it",
+    "bigger_than": f"the volume larger by {VOLUME:.0%} of the larger one at least",
+    "smaller_than": f"the volume smaller by {VOLUME:.0%} of the larger one at least",
+    "taller_than": f"the top higher by {HEIGHT:.0%} of the higher one at least",
+    "shorter_than": f"the top lower by {HEIGHT:.0%} of the higher one at least",
+    "symmetrical_to": f"within {NEAR} m of its mirror image across the room's middle, and turned like that to "
+    "30 degrees where both have a front",
+}  # in the set `strict`
+
 STRICT = RuleSet(
     "strict",
     oriented=True,
@@ -193,6 +213,7 @@ STRICT = RuleSet(
         }
     ),
 )
+STRICT.rules.update({name: replace(rule, means=MEANS[name]) for name, rule in STRICT.rules.items()})
 
 SGFRONT = RuleSet(
     "sgfront",
@@ -250,7 +271,7 @@ def rule(predicate: str, *, sets: Sequence[str] = ("strict",), labels: bool = Fa
             rules = rule_set(name).rules
             if predicate in rules:
                 raise ValueError(f"predicate {predicate!r} has a rule in the set {name!r} already")
-            rules[predicate] = Rule(margin, margin if labels else None)
+            rules[predicate] = Rule(margin, margin if labels else None, means=inspect.getdoc(margin) or "")
         return margin
 
     return register
