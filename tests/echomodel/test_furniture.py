@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from echomodel.data.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
+from echomodel.data.furniture.lathe import Lathe
 from echomodel.data.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.data.tsdf import mesh_from_tsdf, tsdf_from_mesh
 from echomodel.sizes import size_score, size_statistics
@@ -107,3 +108,13 @@ def test_bad_words_and_sizes_are_refused_in_one_line():
         furniture("piano", style, rng)
     with pytest.raises(ValueError, match=r"size of chair is \[1.0, -1.0, 1.0\], need three positive numbers in metres"):
         furniture("chair", style, rng, np.array([1.0, -1.0, 1.0]))
+
+
+@pytest.mark.parametrize("size", [(0.25, 1.4, 0.86), (0.86, 1.4, 0.25), (0.3, 1.5, 0.45)])
+def test_no_shade_of_a_floor_lamp_is_a_long_oval(size):
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        parts = solids("floor_lamp", Style.draw(rng), Choices.draw(rng), np.array(size))
+        shades = [part for part in parts if part.role == "shade" and isinstance(part, Lathe)]
+        assert all(1 / 1.7 < part.squash < 1.7 for part in shades)
+        assert mesh_of(parts, np.array(size)).is_watertight

@@ -21,6 +21,7 @@ from echomodel.metrics.shape_evaluation import FIRST_ROOM
 from echomodel.metrics.shapes import set_scores, surface_points
 from echomodel.progress import StageListener
 from echomodel.rules import label_relations
+from echomodel.rules.living.sizes import size_range
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
@@ -80,7 +81,7 @@ def evaluate_parts(
     spread, distinct = [], 0
     words = [category.name for category in vocabulary().categories]
     for number, name in enumerate(words):
-        sizes = np.stack([sample_size(name, rng) for _ in range(settings.per_class)])
+        sizes = np.stack([usual_size(name, rng) for _ in range(settings.per_class)])
         graph = GraphBatch.pack([GraphBatch.single([number])] * settings.per_class)
         found = _sampled(model, graph, sizes, generator, settings.steps)
         meshes[name], fresh[name] = [], []
@@ -144,7 +145,7 @@ def style_scores(model: EchoModel, settings: PartsEvaluation, generator: torch.G
         suites = [rng.permutation(classes)[:SUITE].tolist() for _ in range(settings.suites)]
         graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in suites])
         words = vocabulary().categories
-        sizes = np.stack([sample_size(words[number].name, rng) for suite in suites for number in suite])
+        sizes = np.stack([usual_size(words[number].name, rng) for suite in suites for number in suite])
         distance = style_distances(_sampled(model, graph, sizes, generator, settings.steps))
         scene, category = graph.scene, graph.category
         other_class = category[:, None] != category
@@ -169,6 +170,11 @@ def style_distances(descriptions: Tensor) -> Tensor:
     differ = (kinds[:, None] != kinds).float().mean(2)
     numbers = descriptions[:, HOT:STYLE]
     return (differ + (numbers[:, None] - numbers).abs().mean(2) / 2) / 2
+
+
+def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:
+    """(3,) float, metres: a size as `sample_size` draws it, within what a person takes for one of the category."""
+    return np.clip(sample_size(category, rng), *map(np.array, size_range(category)))
 
 
 def _sampled(

@@ -224,7 +224,7 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A foot, a straight pole, an arc, an angled arm or a tripod, and a shade."""
     w, h, d = size
     r = 0.012 * (0.8 + 0.4 * style.bulk)
-    if w / d > 1.6 or w > 0.8:
+    if max(w, d) / min(w, d) > 1.6 or w > 0.8:  # the shade of another would be a long oval
         return _arc(size, style, r)
     tall = h * (0.16 + 0.12 * style.taper)
     a, b = w / 2, d / 2
@@ -244,9 +244,10 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def _arc(size: Size, style: Style, r: float) -> list[Solid]:
-    """A bow from a heavy foot to a hanging shade, from corner to corner of a deep box."""
+    """A bow from a heavy foot to a hanging shade, from corner to corner of its box."""
     w, h, d = size
-    head, foot = min(d * 0.5, w * 0.2, 0.22), min(0.15, d * 0.45, w * 0.3)
+    long, short = max(w, d), min(w, d)
+    head, foot = min(short * 0.5, long * 0.2, 0.22), min(0.15, short * 0.45, long * 0.3)
     start, end = np.array([-w / 2 + foot, -d / 2 + foot]), np.array([w / 2 - head, d / 2 - head])
     t = np.linspace(0, 1, 13)
     rise = 0.03 + (h - 0.03) * np.sin(np.pi * (0.5 * t**0.6 + 0.12 * t)) / np.sin(np.pi * 0.5)
