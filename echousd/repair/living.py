@@ -56,3 +56,17 @@ def living_faults(
         LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))
         for f in found
     )
+
+
+def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
+    """One sentence for every object whose stated size no such furniture has."""
+    from echomodel.rules.living.sizes import size_range
+
+    told = []
+    for node in graph.nodes:
+        if node.size is None or node.obstacle or node.asset:
+            continue
+        for word, side, low, high in zip(("wide", "high", "deep"), node.size, *size_range(node.category), strict=True):
+            if not 0.999 * low <= side <= 1.001 * high:
+                told.append(f"{node.name} is {side:.2f} m {word} as stated; such furniture: {low:.2f} to {high:.2f} m")
+    return tuple(told)

@@ -15,6 +15,7 @@ from echousd.graph import SceneGraph
 from echousd.graph.consistency import faults_of
 from echousd.graph.doors import check_doors
 from echousd.graph.floors import check_space, with_plan, with_wider_floor
+from echousd.repair.living import unusual_sizes
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.fitting import FITS, fitted, with_space
@@ -203,7 +204,7 @@ def generate(
         floor=floor,
         layouts=tuple(layouts),
         outcomes=outcomes,
-        notes=(*crowded, *homeless, *notes),
+        notes=(*crowded, *homeless, *notes, *unusual_sizes(stated)),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file, faces),
         options=options,
         timings=timer.seconds,

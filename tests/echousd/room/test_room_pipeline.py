@@ -195,3 +195,11 @@ def test_what_cannot_fit_is_said_or_left_out() -> None:
     assert said == gone
     with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep, drop"):
         echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze")
+
+
+def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
+    nodes = (Node("bed", "double_bed", size=(0.18, 0.9, 2.0)), Node("wardrobe", "wardrobe", size=(0.9, 2.0, 0.6)))
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), nodes, ())
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes")
+    assert room.boxes.size[0].tolist() == pytest.approx([0.18, 0.9, 2.0])
+    assert room.notes == ("bed is 0.18 m wide as stated; such furniture: 1.32 to 3.28 m",)
