@@ -14,7 +14,7 @@ from typing import Any
 import typer
 
 from echousd.cli.numbers import bound_numbers
-from echousd.cli.output import one_line
+from echousd.cli.output import one_line, safe
 from echousd.cli.quiet import add_quiet
 
 app = typer.Typer(
@@ -70,7 +70,7 @@ def _options(
 def main() -> None:
     """Entry point of the `echousd` command."""
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # torch's threads sleep between products
-    warnings.formatwarning = lambda message, *_, **__: f"warning: {message}\n"  # no line of our source
+    warnings.formatwarning = lambda message, *_, **__: f"warning: {safe(str(message))}\n"  # no line of our source
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: PTH123, SIM115  # `echousd check room.usda >&-`
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: PTH123, SIM115
     sys.exit(run(sys.argv[1:]))
@@ -97,8 +97,8 @@ def run(arguments: Sequence[str]) -> int:
         return _complain("interrupted", INTERRUPTED, debug)
     except Exception as error:
         message, code = _explained(error)
-        lines = message.splitlines() if type(error).__name__ == "GraphError" else [message]
-        for line in lines:  # all faults of a graph's file
+        lines = getattr(error, "lines", [message])  # all faults of a graph's file
+        for line in lines:
             _complain(line, code, debug and line == lines[-1])
         return code
 

@@ -16,13 +16,14 @@ class GraphError(ValueError):
     """A scene graph or a file that holds one is not valid; one line says what was found, where and what is allowed.
 
     `about` leads to the fault: field names and positions, such as ("relations", 3) or ("nodes", 0, "size"). `others`
-    are further faults of the same text; a file's message has a line for each.
+    are further faults of the same text; a file's message has a line for each, which `lines` holds one by one.
     """
 
     def __init__(self, message: str, about: tuple[str | int, ...] = ()) -> None:
         super().__init__(message)
         self.about = about
         self.others: tuple[GraphError, ...] = ()
+        self.lines: tuple[str, ...] = (message,)
 
 
 @contextmanager
@@ -33,7 +34,9 @@ def faults_of(file: str) -> Iterator[None]:
     except GraphError as error:
         if not file:
             raise
-        raise GraphError(f"{file}: {error}", error.about) from None
+        told = GraphError(f"{file}: {error}", error.about)
+        told.lines = tuple(f"{file}: {line}" for line in error.lines)
+        raise told from None
 
 
 def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:

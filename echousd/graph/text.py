@@ -45,7 +45,9 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
     if not wrong:
         return graph
     said = [_with_source(source, _with_line(located, each)) for each in wrong[:MAX_ERRORS]]
-    raise GraphError("\n".join(said), wrong[0].about) from None
+    told = GraphError("\n".join(said), wrong[0].about)
+    told.lines = tuple(said)
+    raise told from None
 
 
 def _with_line(located: Located, error: GraphError) -> str:

@@ -43,6 +43,7 @@ FOUND = {
     "absolute_path": {"echo:RelativePaths"},
     "path_outside": {"echo:PathsInside"},
     "not_finite": {"echo:FiniteValues"},
+    "nan_mass": {"echo:FiniteValues"},
     "nan_points": {"echo:FiniteValues", "empty"},
     "wrong_type": {"echo:ValueTypes", "usdValidation:AttributeTypeMismatch.AttributeTypeMismatch"},
     "missing_op": {"echo:TransformOps"},

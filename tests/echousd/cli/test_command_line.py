@@ -71,6 +71,14 @@ def test_the_start_loads_nothing_heavy_and_is_fast():
     assert min(seconds) < 1.0  # of processor time; 0.2 on a free machine
 
 
+def test_a_warning_steers_no_terminal(monkeypatch):
+    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)  # as it was, afterwards
+    monkeypatch.setattr(sys, "argv", ["echousd", "--version"])
+    with pytest.raises(SystemExit):
+        main.main()
+    assert warnings.formatwarning("made with \x1b[31m", UserWarning, "", 0) == "warning: made with \\x1b[31m\n"
+
+
 def test_threads_wait_asleep_unless_somebody_says_otherwise(monkeypatch):
     monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)  # as it was, afterwards
     monkeypatch.setenv("OMP_WAIT_POLICY", "")

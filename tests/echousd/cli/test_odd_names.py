@@ -106,3 +106,15 @@ def test_names_given_as_lists(echousd_command, tmp_path, text):
     done = echousd_command("graph", tmp_path / "graph.yaml")
     assert done.code == 2
     assert "graph.yaml:" in done.err
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\u2028b", "a\x0bb"])
+def test_a_fault_is_one_line_whatever_names_hold(echousd_command, tmp_path, name):
+    graph = tmp_path / "graph.json"
+    nodes = [{"name": name, "category": "double_bed"}, {"name": "lamp", "category": "table_lamp"}]
+    relations = [{"subject": "lamp", "predicate": "close_by", "object": "bed"}] * 2
+    graph.write_text(json.dumps({"room": {"type": "bedroom"}, "nodes": nodes, "relations": relations}))
+    done = echousd_command("graph", graph)
+    assert done.code == 2
+    lines = done.err.strip().split("\n")
+    assert all(line.startswith(f"error: {graph}") for line in lines), done.err

@@ -13,6 +13,7 @@ from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.repair import RepairConfig, allowed_overlap, repair, repair_boxes
 from echousd.repair.geometry import depth_inside, floor_from_polygon, inside, separation, spread
 from echousd.repair.relations import relation_margins
+from echousd.repair.repair import RepairedBoxes
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
 
@@ -195,6 +196,30 @@ def test_noisy_rooms_get_their_relations_back() -> None:
     assert measured > 500
     assert kept / measured >= 0.995
     assert hit == 0
+
+
+def test_very_many_boxes_end_where_few_would(monkeypatch) -> None:
+    rng = np.random.default_rng(3)
+    count = 24
+    floor = np.array([(-4.0, -4.0), (4.0, -4.0), (4.0, 1.0), (1.0, 1.0), (1.0, 4.0), (-4.0, 4.0)])
+    words = ["dining_table", "dining_chair", "bookshelf", "nightstand"] * (count // 4)
+    size = rng.uniform(0.4, 0.9, (count, 3))
+    position = np.stack([rng.uniform(-3.5, 3.5, count), np.zeros(count), rng.uniform(-3.5, 0.5, count)], -1)
+    close_by = vocabulary().predicate_id("close_by")
+    triplets = np.array([(4 * k + 1, close_by, 4 * k) for k in range(count // 4)])
+
+    def ends() -> RepairedBoxes:
+        config = RepairConfig(arrange=False)
+        return repair_boxes(words, size, position, np.zeros(count), triplets, floor_polygon=floor, config=config)
+
+    few = ends()
+    monkeypatch.setattr("echousd.repair.constraints.MANY", 8)
+    monkeypatch.setattr("echousd.repair.solver.MANY", 8)
+    many = ends()
+    np.testing.assert_allclose(many.position, few.position, atol=1e-5)
+    np.testing.assert_allclose(many.size, few.size, atol=1e-5)
+    assert [pair for pair, _ in many.collisions] == [pair for pair, _ in few.collisions]
+    assert many.conflicts == few.conflicts
 
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
