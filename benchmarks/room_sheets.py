@@ -4,7 +4,7 @@
     python benchmarks/room_sheets.py --set people --seeds 2 -o sheets
 
 The five samples (`samples`), what `echousd new --room` writes for all five types (`new`), and graphs as people write
-them (`people`, people_graphs.yaml), each with the same seeds; boxes with their front as a dark edge, faults of the
+them (`people`, `more`: people_graphs.yaml, more_graphs.yaml), each with the same seeds; boxes with their front as a dark edge, faults of the
 rules in red.
 """
 
@@ -31,7 +31,7 @@ from echousd.repair.living import living_faults
 from echousd.room import Room
 
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
-SETS = ("samples", "new", "people")
+SETS = ("samples", "new", "people", "more")
 CELL, TITLE, LINES = 540, 34, 66  # pixels
 ACROSS, DOWN = 3, 2  # rooms on a sheet
 FONT = ImageFont.load_default(13)
@@ -83,9 +83,10 @@ def graphs_of(sets: list[str]) -> Iterator[tuple[str, SceneGraph]]:
     if "new" in sets:
         for word in TYPES:
             yield f"new_{word}", starting_graph(word)
-    if "people" in sets:
-        for name, entry in yaml.safe_load((here / "people_graphs.yaml").read_text("utf-8")).items():
-            yield name, SceneGraph.from_yaml(yaml.safe_dump(entry, sort_keys=False))
+    for word in ("people", "more"):
+        if word in sets:
+            for name, entry in yaml.safe_load((here / f"{word}_graphs.yaml").read_text("utf-8")).items():
+                yield name, SceneGraph.from_yaml(yaml.safe_dump(entry, sort_keys=False))
 
 
 def save_sheets(cells: list[Image.Image], folder: Path) -> None:

@@ -67,8 +67,7 @@ def arrange(setting: Setting, *, rounds: int | None = None) -> Arranged:
 
 
 def _blamed(setting: Setting, found: Arranged) -> dict[int, float]:
-    """Boxes whose poses led to what bad ones pay: what those attend, what relations tie them to, what is in their way.
-    """
+    """Boxes whose poses led to what bad ones pay: what they attend, are told of or have in their way."""
     out: dict[int, float] = {}
     for i in np.flatnonzero(found.paid > BAD).tolist():
         ties = setting.triplets[(setting.triplets[:, [0, 2]] == i).any(1)][:, [0, 2]]
