@@ -4,8 +4,8 @@
     python benchmarks/room_sheets.py --set people --seeds 2 -o sheets
 
 The five samples (`samples`), what `echousd new --room` writes for all five types (`new`), and graphs as people write
-them (`people`, `more`: people_graphs.yaml, more_graphs.yaml), each with the same seeds; boxes with their front as a dark edge, faults of the
-rules in red.
+them (`people`, `more`: people_graphs.yaml, more_graphs.yaml), each with the same seeds; boxes with their front as a
+dark edge, faults of the rules in red.
 """
 
 from __future__ import annotations
