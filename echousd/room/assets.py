@@ -44,10 +44,17 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
     return layer
 
 
-def define_class(stage: Usd.Stage, name: str) -> None:
-    """Have a stage define the class of an asset, so that its opinions there reach all users of the asset."""
-    for path in (f"/{CLASSES}", class_path(name)):
-        stage.CreateClassPrim(path)
+def as_class(stage: Usd.Stage, name: str) -> None:
+    """Have what a stage says of an asset's class be a class, and define what is below: no overs of nothing."""
+    layer, top = stage.GetRootLayer(), Sdf.Path(class_path(name))
+    paths: list[Sdf.Path] = []
+    layer.Traverse(top, paths.append)
+    with Sdf.ChangeBlock():
+        for path in paths:
+            if path.IsPrimPath():
+                layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef  # a class below would not be seen
+        for path in (top.GetParentPath(), top):
+            layer.GetPrimAtPath(path).specifier = Sdf.SpecifierClass
 
 
 def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:

@@ -220,9 +220,9 @@ def materials_layer(
     stage.OverridePrim("/Room")
     slots = _slots(small)
     tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
-    for asset in sorted({room.assets[name] for name in instanced(room)}):
-        assets.define_class(stage, asset)
     materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
+    for asset in sorted({room.assets[name] for name in instanced(room)}):
+        assets.as_class(stage, asset)
     materials.write_palettes(stage, harmony, tables)
     if room.options.materialx:
         materialx.write_networks(stage, harmony, tables)

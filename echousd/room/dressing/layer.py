@@ -51,8 +51,8 @@ def dressing_layer(
         with variants.GetVariantEditContext():
             _write(stage, things, dressing, slots, looks, alike)
     for asset in sorted(alike):
-        assets.define_class(stage, asset)
         _bind(stage, class_path(asset), slots[asset], looks)
+        assets.as_class(stage, asset)
     for number, things in enumerate(dressing.layouts):
         above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
         references |= {f"{above}/{name}": dressing.assets[name] for name in things}
