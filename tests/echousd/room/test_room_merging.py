@@ -11,6 +11,7 @@ from echomodel.data.furniture.description import WIDTH, piece_of
 from echousd.room.geometry import FRAME, Geometry, Origin, Part
 from echousd.room.joinery import assembled
 from echousd.room.merging import merged
+from echousd.room.surface import surface
 
 SIZE = np.array([0.9, 1.0, 0.45])
 
@@ -49,6 +50,28 @@ def test_fewer_meshes_of_the_same_shape(category, how):
     if how == "closed":
         assert all(part.mesh.is_watertight for part in fewer.parts)
         assert fewer.mesh.volume <= 1.02 * made.mesh.volume  # overlaps count once
+
+
+def side(p, q, r):
+    """Above zero where r is to the left of the way from p to q."""
+    (x, z), (u, v) = np.moveaxis(q - p, -1, 0), np.moveaxis(r - p, -1, 0)
+    return x * v - z * u
+
+
+@pytest.mark.parametrize("how", ["bodies", "closed"])
+def test_merged_meshes_have_an_atlas_without_overlaps(how):
+    pytest.importorskip("xatlas")
+    (part,) = merged({"one": piece("chair", faces=800)}, how, 800)["one"].parts
+    form = surface(part.mesh, part.slots, atlas=True, crease=part.crease)
+    assert 0 <= form.st.min() < form.st.max() <= 1
+    corners = form.st[form.st_index].reshape(-1, 3, 2).astype(float)
+    turn = side(corners[:, 0], corners[:, 1], corners[:, 2])
+    corners, turn = corners[np.abs(turn) > 1e-7], turn[np.abs(turn) > 1e-7]
+    a, b, c = np.moveaxis(corners, 1, 0)
+    middle = corners.mean(1)[:, None]  # inside[i, k]: whether triangle k holds the middle of triangle i
+    inside = np.logical_and.reduce([side(p, q, middle) * turn > 0 for p, q in ((a, b), (b, c), (c, a))])
+    assert len(a) > 100
+    assert (inside.sum(1) == 1).all()
 
 
 def test_a_closed_surface_keeps_a_small_budget_and_says_what_is_not_closed():
