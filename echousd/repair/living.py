@@ -68,5 +68,5 @@ def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
             continue
         for word, side, low, high in zip(("wide", "high", "deep"), node.size, *size_range(node.category), strict=True):
             if not 0.999 * low <= side <= 1.001 * high:
-                told.append(f"{node.name} is {side:.2f} m {word} as stated; such furniture: {low:.2f} to {high:.2f} m")
+                told.append(f"{node.name} is {side:.3g} m {word} as stated; such furniture: {low:.3g} to {high:.3g} m")
     return tuple(told)
