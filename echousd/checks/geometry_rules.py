@@ -12,11 +12,15 @@ from echousd.stage.encoding import NODE_API, StageError
 from echousd.stage.values import array, matrix, targets
 
 EVEN = 1e-3  # relative difference of scale factors that counts as none
+NO_UVS = "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
 PHYSICAL = ("PhysicsRigidBodyAPI", "PhysicsCollisionAPI")
 
 
 def texture_coordinates(stage: Usd.Stage) -> Iterator[Finding]:
-    """Every visible mesh has `primvars:st`, with as many values as its interpolation asks for and indices in range."""
+    """Every visible mesh has `primvars:st`, with as many values as its interpolation asks for and indices in range.
+
+    Models of others that have none are warnings: they may need none.
+    """
     for prim in prims(stage):
         if not prim.IsA(UsdGeom.Mesh) or is_guide(prim):
             continue
@@ -25,13 +29,19 @@ def texture_coordinates(stage: Usd.Stage) -> Iterator[Finding]:
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
         if fault:
-            yield Finding(prim.GetPath(), fault)
+            yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and _of_others(prim))
+
+
+def _of_others(prim: Usd.Prim) -> bool:
+    """Whether a prim is part of a model of somebody else's, which is taken as it is: `<asset>_placed/<asset>_model`."""
+    above = prim.GetPath().GetPrefixes()
+    return any(at.name.endswith("_model") and at.GetParentPath().name.endswith("_placed") for at in above)
 
 
 def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
     primvar = UsdGeom.PrimvarsAPI(mesh).FindPrimvarWithInheritance("st")
     if not primvar or not primvar.HasValue():
-        return "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
+        return NO_UVS
     values = array(primvar.GetAttr(), 2)
     interpolation = primvar.GetInterpolation()
     points = len(array(mesh.GetPointsAttr(), 3))

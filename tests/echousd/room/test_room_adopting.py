@@ -8,6 +8,7 @@ from small_models import chest, seat
 from small_room import StandIn
 
 import echousd
+from echousd import check
 from echousd.room.adopting import adopted, seen_in_theirs
 from echousd.stage import open_stage
 
@@ -59,6 +60,9 @@ def test_a_half_furnished_stage_is_completed_and_left_as_it_is(loft, tmp_path):
         there = bounds(theirs, f"/World/Furniture/{name}", lambda b: b[:, [0, 2, 1]] * [0.01, 0.01, -0.01])
         here = bounds(ours, f"/Room/Objects/{name}", lambda b: b)
         np.testing.assert_allclose(np.sort(here, 0), np.sort(there, 0), atol=1e-3)
+    report = check(root)  # their meshes have no texture coordinates, which is theirs to decide
+    assert not report.errors
+    assert "echo:TextureCoordinates" in {warning.rule for warning in report.warnings}
     bed = room.boxes.yaw[room.names.index("bed")]
     assert abs(np.cos(float(bed))) < 1e-4
     assert ours.GetPrimAtPath("/Room/Objects/bed/bed_placed/bed_model/form").IsA(UsdGeom.Mesh)
