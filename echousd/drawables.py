@@ -186,7 +186,7 @@ def _corner_values(
 def _flattened(primvar: UsdGeom.Primvar) -> Any:
     """Values of a primvar, one for each of its indices; raises StageError for indices out of range."""
     found = values.given(primvar.GetAttr())
-    if not primvar.IsIndexed():
+    if not primvar.IsIndexed() or isinstance(found, str):  # a text is refused where numbers are read
         return found
     index = values.array(primvar.GetIndicesAttr(), whole=True)
     if not hasattr(found, "__len__") or (len(index) and (index.min() < 0 or index.max() >= len(found))):

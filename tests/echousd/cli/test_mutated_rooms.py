@@ -34,6 +34,7 @@ KNOWN = (
     Mutation("/Room/Objects/pendant.xformOp:rotateY", "nan"),
     Mutation("/Room/Shell/Floor/Floor_mesh.faceVertexCounts", "infinity"),
     Mutation("/Room/Objects/bed/geo/bed_mesh.points", "texts"),
+    Mutation("/Room/Shell/Floor/Floor_mesh.primvars:normals", "long text"),
     Mutation("/Room/Objects/bed/geo/bed_mesh.faceVertexIndices", "negative ints"),
     Mutation("/Room/Objects/bed.semantics:labels:category", "negative"),
     Mutation("/Room/Lights/ceiling.light:materialSyncMode", "points of NaN", "sample"),
