@@ -19,9 +19,10 @@ from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.dressing import upholstery
 from echousd.room.dressing.dress import RULES, dress, placed, setting_of
-from echousd.room.dressing.setting import reaches, standing
+from echousd.room.dressing.setting import Setting, Thing, reaches, standing
 from echousd.room.dressing.surfaces import surfaces
 from echousd.room.dressing.upholstery import STEP, _Seat
+from echousd.room.dressing.walls import curtains
 from echousd.room.geometry import Collider, Geometry, Origin, Part
 from echousd.room.sources.boxes import ORIGIN
 from echousd.room.sources.solid import solid_geometry
@@ -265,3 +266,19 @@ def test_cushions_lie_on_what_is_level_below_them():
     assert seat.below(np.array([0.0, 0.6, 0.37]), size) == pytest.approx(0.545)
     assert seat.below(np.array([0.0, 0.6, 0.13]), size) is None  # on the edge of the duvet
     assert seat.below(np.array([3.0, 0.6, 0.0]), size) is None
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
+    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
+    setting = Setting({}, floor, (window,), 2.7, True, False, 0)
+    shelf = Thing("floor_vase", np.array([0.7, 2.3, 0.35]), np.array([-1.2, 0.0, -1.8]), 0.0)
+    setting.placed = [shelf] if beside else []
+    curtains(setting)
+    hung = [thing for thing in setting.placed if thing.kind == "curtain"]
+    assert len(hung) == 2
+    left = min(hung, key=lambda thing: thing.position[0])
+    assert left.footprint.intersection(shelf.footprint).area == 0 or not beside
+    assert (left.position[0] > -0.85) == beside
+    assert all(thing.position[1] < 0.1 for thing in hung)
