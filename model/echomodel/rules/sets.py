@@ -242,7 +242,9 @@ SGFRONT.rules["behind"] = replace(SGFRONT.rules["behind"], label=_beside(0, -1.0
 SGFRONT.rules["standing_on"] = replace(SGFRONT.rules["standing_on"], label=None)
 SGFRONT.rules["above"] = Rule(None, _higher)
 
-STRICT.rules["close_by"] = Rule(_near, _close)  # what is learned stays what is published
+STRICT.rules["close_by"] = Rule(
+    _near, _close, means=f"a corner of one within {NEAR} m of a corner of the other, or their sides within {SIDES} m"
+)  # what is learned stays what is published
 
 RULE_SETS = {rules.name: rules for rules in (STRICT, SGFRONT)}
 
