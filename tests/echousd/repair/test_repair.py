@@ -88,12 +88,11 @@ def test_everything_that_was_asked_for_holds_afterwards() -> None:
 
 @pytest.mark.parametrize(("drawn", "kept"), [(-0.1, 0.01), (0.0, 0.01), (0.045, 0.045), (0.3, 0.03)])
 def test_backs_keep_the_distance_to_their_wall_that_was_drawn_within_what_is_usual(drawn: float, kept: float) -> None:
-    floor = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
     size = np.array([[1.2, 2.2, 0.6]])
     position = np.array([[0.3, 0.0, -1.8 + 0.3 + drawn]])
     for arrange in (True, False):
         done = repair_boxes(
-            ["wardrobe"], size, position, np.zeros(1), np.zeros((0, 3)), floor_polygon=floor, height=2.7,
+            ["wardrobe"], size, position, np.zeros(1), np.zeros((0, 3)), floor_polygon=FLOOR, height=2.7,
             rigid=np.ones(1, bool), config=RepairConfig(arrange=arrange),
         )  # fmt: skip
         assert done.position[0, 2] - 0.3 + 1.8 == pytest.approx(kept, abs=0.012)  # a wall gives way a little
