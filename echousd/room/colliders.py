@@ -17,6 +17,7 @@ PIECES, CORNERS = 16, 32  # convex pieces of a shape at most, corners of each
 COARSE = 0.08  # CoACD's concavity: what is left of a shape's hollows, of its size
 SEARCH = {"mcts_iterations": 20, "mcts_nodes": 10, "resolution": 500}  # a second a piece rather than ten
 LEAST_VOLUME = 1e-7  # m³ of a piece that is one
+DIGITS = 4  # of metres, corners of a hull
 FLAT = 0.012  # metres: what is as near to the top or the bottom belongs to it
 
 
@@ -77,7 +78,9 @@ def collider(mesh: trimesh.Trimesh, category: str) -> Collider:
 def standing_hull(mesh: trimesh.Trimesh, name: str = "collider") -> Collider:
     """One hull of a mesh (metres) that stands on a plane, however its base is rounded."""
     light = flush(_reduced(mesh.convex_hull, HULL_FACES), mesh.bounds)
-    return Collider(name, trimesh.convex.convex_hull(np.concatenate([light.vertices, soles(mesh)])), "convexHull")
+    # corners nearer to one another than what is written would be one corner there, with faces that have two
+    points = np.unique(np.concatenate([light.vertices, soles(mesh)]).round(DIGITS), axis=0)
+    return Collider(name, trimesh.convex.convex_hull(points), "convexHull")
 
 
 def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:

@@ -7,6 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import echomodel
+import echousd
+
 PYTHON_CLIENTS = {
     "blender": ("bpy==5.0.1",),
     "blender42": ("bpy==4.2.0", "numpy<2"),
@@ -40,7 +43,9 @@ def python_of(client: str) -> Path:
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
         if client in WITH_OURS:
             (site,) = (folder / "lib").glob("python*/site-packages")
-            (site / "ours.pth").write_text("\n".join(filter(None, sys.path)) + "\n", "utf-8")
+            # an editable install finds our packages by a hook, which another environment does not have
+            ours = {str(Path(package.__path__[0]).parent) for package in (echousd, echomodel)}
+            (site / "ours.pth").write_text("\n".join([*sorted(ours), *filter(None, sys.path)]) + "\n", "utf-8")
         install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         subprocess.run([*install, *PYTHON_CLIENTS[client]], check=True)
         ready.write_text(wanted, "utf-8")

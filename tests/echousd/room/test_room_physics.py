@@ -5,10 +5,13 @@ import pytest
 import trimesh
 from pxr import Usd, UsdGeom
 
+from echomodel.data.dressing import KINDS
+from echomodel.data.dressing import thing as solids_of
 from echomodel.vocabulary import vocabulary
 from echousd.room.ballast import ballasted
-from echousd.room.colliders import collider, colliders_of
+from echousd.room.colliders import collider, colliders_of, standing_hull
 from echousd.room.geometry import Collider, Geometry, Mass, Origin, Part
+from echousd.room.joinery import part_of, within_budget
 from echousd.room.masses import hull_volume, mass_of, read_mass
 from echousd.room.meshing import box_mesh
 from echousd.room.physics import write_asset_physics
@@ -61,6 +64,20 @@ def test_colliders_stand_on_planes_that_end_where_the_mesh_does(category):
     np.testing.assert_allclose(light.bounds, mesh.bounds, atol=1e-6)
     for height in light.bounds[:, 1]:
         assert (np.abs(light.vertices[:, 1] - height) < 1e-9).sum() >= 3
+
+
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("kind", ["cup", "candles", "pens"])
+def test_hulls_of_small_things_are_closed_as_they_are_written(kind, number):
+    size = (0.06, 0.12, 0.06)
+    solids = solids_of(kind, size, np.random.default_rng(number))
+    hull = standing_hull(part_of("mesh", within_budget(solids, size, KINDS[kind].faces)).mesh).mesh
+    _, corners = np.unique(hull.vertices.round(6), axis=0, return_inverse=True)
+    written = trimesh.Trimesh(hull.vertices.round(6), hull.faces, process=True)
+    assert len(written.vertices) == len(hull.vertices) == corners.max() + 1
+    assert written.is_watertight
+    assert written.is_winding_consistent
+    assert written.area_faces.min() > 1e-12
 
 
 def test_what_would_topple_has_ballast_in_its_base():
