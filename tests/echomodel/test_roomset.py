@@ -91,6 +91,21 @@ def test_bad_folders_are_told(folder, tmp_path):
     shard.write_bytes(shard.read_bytes()[:-3])
     with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, \d+ bytes of \d+; remove it and build again"):
         RoomSet(tmp_path)
+    build_rooms(tmp_path / "zeros", 5, 1, 2)
+    shard = tmp_path / "zeros/rooms-0000.bin"
+    raw = bytearray(shard.read_bytes())
+    raw[48:52] = bytes(4)  # the first room's number of objects
+    shard.write_bytes(raw)
+    with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, its objects are not those of its rooms"):
+        RoomSet(shard.parent)
+    for text, said in (
+        ("{", "not JSON"),
+        ("[]", r"missing: rooms \(int\)"),
+        ('{"rooms": "5"}', r"missing: rooms \(int\)"),
+    ):
+        (shard.parent / "rooms.json").write_text(text)
+        with pytest.raises(ValueError, match=f"rooms.json: .*{said}"):
+            RoomSet(shard.parent)
     with pytest.raises(ValueError, match="unknown rules 'x': a room set is labelled by strict, sgfront"):
         RoomSet(folder).relations(0, rules="x")
     with pytest.raises(ValueError, match="unknown recipe 'huge': allowed are smoke, packed, full"):

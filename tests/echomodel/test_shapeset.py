@@ -78,6 +78,9 @@ def test_damage_is_named(tmp_path):
     shard.write_bytes(shard.read_bytes()[:-100])
     with pytest.raises(ValueError, match=r"shapes-0000.bin: damaged shard"):
         ShapeSet(tmp_path)
+    (tmp_path / "shapes.json").write_text('{"count": 46}')
+    with pytest.raises(ValueError, match=r"shapes.json: .* missing: categories \(list\)"):
+        ShapeSet(tmp_path)
 
 
 def test_names_outside_the_set_are_refused(smoke):

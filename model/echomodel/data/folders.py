@@ -8,6 +8,25 @@ from pathlib import Path
 from echomodel.files import write_json
 
 
+def read_note(path: Path, **kinds: type) -> dict:
+    """What a folder of data says of itself, a JSON object.
+
+    Arguments:
+        kinds: fields that it must have, and their types.
+
+    Raises ValueError, with the file's path, for anything else.
+    """
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: not JSON ({error})") from None
+    wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
+    if wrong or not isinstance(found, dict):
+        told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
+        raise ValueError(f"{path}: not what a set of data says of itself, missing: {told}")
+    return found
+
+
 def claim(folder: Path, plan: dict) -> None:
     """Remember what a folder is being filled with (`plan.json`).
 
@@ -17,7 +36,7 @@ def claim(folder: Path, plan: dict) -> None:
     if not note.exists():
         write_json(note, plan)
         return
-    found = json.loads(note.read_text("utf-8"))
+    found = read_note(note)
     wrong = [key for key in plan if found.get(key) != plan[key]]
     if wrong:
         told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"

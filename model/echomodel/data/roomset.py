@@ -7,7 +7,6 @@ set.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.data.folders import claim
+from echomodel.data.folders import claim, read_note
 from echomodel.data.rooms import generate_rooms, untidied
 from echomodel.files import whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
@@ -172,7 +171,7 @@ class RoomSet:
         if not index.exists():
             hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no rooms.json"
             raise ValueError(f"{self.directory}: not a room set ({hint})")
-        self.info: dict = json.loads(index.read_text("utf-8"))
+        self.info: dict = read_note(index, rooms=int)
         self._shards = [_tables(path) for path in sorted(self.directory.glob("rooms-*.bin"))]
         rooms = [shard["rooms"] for shard in self._shards]
         count = sum(map(len, rooms))
@@ -333,4 +332,11 @@ def _tables(path: Path) -> dict[str, np.ndarray]:
         out[name] = np.frombuffer(raw, dtype.base, int(number) * int(np.prod(dtype.shape)), start)
         out[name] = out[name].reshape(int(number), *dtype.shape)
         start += int(number) * dtype.itemsize
+    rooms, words = out["rooms"], vocabulary()
+    wrong = [name for name in list(out)[1:] if rooms[name].sum(dtype=np.uint64) != len(out[name])]
+    wrong += [] if (rooms["pairs"] == rooms["objects"].astype(np.uint64) ** 2).all() else ["pairs"]
+    wrong += [] if out["objects"]["category"].max(initial=0) < len(words.categories) else ["categories"]
+    wrong += [] if rooms["type"].max(initial=0) < len(words.room_types) else ["room types"]
+    if wrong:
+        raise ValueError(f"{path}: damaged shard, its {wrong[0]} are not those of its rooms; remove it and build again")
     return out

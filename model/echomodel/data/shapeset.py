@@ -7,7 +7,6 @@ category in that style, C being the number of categories; rooms name it `s{style
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from echomodel.data.folders import claim
+from echomodel.data.folders import claim, read_note
 from echomodel.data.furniture import Choices, Style, sample_size, solids, tsdf_of
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.tsdf import RESOLUTION, TRUNCATION
@@ -154,7 +153,7 @@ class ShapeSet:
                 "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no shapes.json"
             )
             raise ValueError(f"{self.directory}: not a shape set ({hint})")
-        self.info: dict = json.loads(index.read_text("utf-8"))
+        self.info: dict = read_note(index, count=int, categories=list)
         self.categories: tuple[str, ...] = tuple(self.info["categories"])
         paths = sorted(self.directory.glob("shapes-*.bin"))
         self._shards = [np.memmap(path, np.uint8, mode="r") for path in paths]

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-from safetensors import safe_open
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
@@ -181,18 +181,27 @@ class Trainer:
         path = self.folder / "checkpoint.safetensors"
         if not path.exists():
             raise ValueError(f"{path}: no checkpoint to resume from")
-        with safe_open(path, "pt") as handle:
-            metadata = handle.metadata()
-            tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
-        other = changed_fields(json.loads(metadata["recipe"]), json.loads(to_json(self.recipe)))
+        try:
+            with safe_open(path, "pt") as handle:
+                metadata = handle.metadata()
+                tensors = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
+            step, recipe = int(metadata["step"]), dict(json.loads(metadata["recipe"]))
+        except (SafetensorError, OSError, KeyError, TypeError, ValueError, RecursionError) as error:
+            raise ValueError(f"{path}: not a checkpoint of a training ({error})") from None
+        other = changed_fields(recipe, json.loads(to_json(self.recipe)))
         if other:
             told = "; ".join(f"{name} was {was!r}, is {now!r}" for name, was, now in other)
             raise ValueError(f"{path}: is a checkpoint of another recipe ({told})")
         try:
             state = {key[6:]: value for key, value in tensors.items() if key.startswith("model.")}
             self.model.load_state_dict(state)
-        except RuntimeError as error:
-            raise ValueError(f"{path}: does not fit the recipe's model: {str(error).splitlines()[1].strip()}") from None
+            self._continue_from(tensors)
+        except (RuntimeError, KeyError) as error:
+            told = str(error).splitlines()[:2][-1].strip()
+            raise ValueError(f"{path}: does not fit the recipe's model: {told}") from None
+        self.step = step
+
+    def _continue_from(self, tensors: dict[str, torch.Tensor]) -> None:
         averaged = dict(self.average.named_parameters())
         with torch.no_grad():
             for name, parameter in self.trained.items():
@@ -202,7 +211,6 @@ class Trainer:
                         key: tensors[f"optimizer.{key}.{name}"].to(parameter.device)
                         for key in ("step", "exp_avg", "exp_avg_sq")
                     }
-        self.step = int(metadata["step"])
 
 
 def changed_fields(was: dict[str, Any], now: dict[str, Any], above: str = "") -> list[tuple[str, Any, Any]]:

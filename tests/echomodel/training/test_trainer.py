@@ -284,3 +284,10 @@ def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(data
     told = rf"another recipe \(model.layout.width was {width}, is {2 * width}; seed was {recipe.seed}, is 8\)"
     with pytest.raises(ValueError, match=told):
         open_run(other, tmp_path, resume=True)
+    path = tmp_path / "checkpoint.safetensors"
+    whole = path.read_bytes()
+    renamed = whole.replace(b'"average.', b'"averaga.', 1)
+    for damaged, said in ((whole[:-9], "not a checkpoint of a training"), (renamed, "does not fit the recipe's model")):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match=rf"checkpoint.safetensors: {said}"):
+            open_run(recipe, tmp_path, resume=True)
