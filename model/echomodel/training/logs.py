@@ -48,11 +48,14 @@ class RunLog:
 
 
 def read_log(path: Path) -> list[tuple[int, str, float]]:
-    """Rows (step, name, value) of a log file, none where there is no file."""
+    """Rows (step, name, value) of a log file, none where there is no file; raises ValueError for other files."""
     if not path.exists():
         return []
-    with path.open(newline="") as handle:
-        return [(int(row["step"]), row["name"], float(row["value"])) for row in csv.DictReader(handle)]
+    try:
+        with path.open(encoding="utf-8", newline="") as handle:
+            return [(int(row["step"]), row["name"], float(row["value"])) for row in csv.DictReader(handle)]
+    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ValueError(f"{path}: not the log of a training ({error})") from None
 
 
 def plot_log(log: Path, out: Path) -> None:

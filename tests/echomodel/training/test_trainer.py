@@ -291,3 +291,8 @@ def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(data
         path.write_bytes(damaged)
         with pytest.raises(ValueError, match=rf"checkpoint.safetensors: {said}"):
             open_run(recipe, tmp_path, resume=True)
+    path.write_bytes(whole)
+    for content in (b"step,name,value\n1,l\xffss,0.5\n", b"step,name\n1,loss\n", b"a,b\n1,2\n"):
+        (tmp_path / "log.csv").write_bytes(content)
+        with pytest.raises(ValueError, match=r"log.csv: not the log of a training"):
+            read_log(tmp_path / "log.csv")

@@ -27,6 +27,12 @@ def test_in_a_corner(words):
     assert read(words).node("plant").place == "in_corner"
 
 
+def test_at_a_thing_is_near_it_and_at_a_wall_against_it():
+    found = read("armchair at table", "sofa at wall")
+    assert [str(relation) for relation in found.relations] == ["armchair close_by table"]
+    assert found.node("sofa").place == "against_wall"
+
+
 @pytest.mark.parametrize(
     "words",
     [
