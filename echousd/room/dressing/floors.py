@@ -12,17 +12,21 @@ from echousd.room.dressing.setting import Setting, Standing, Thing, rectangle
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
 LARGEST = (4.0, 3.0)
+AROUND = 1.2  # metres from a table: a seat that belongs to it
 SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
 SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -share[0] * share[1])
 
 
 def rugs(setting: Setting) -> None:
-    """One rug below every sofa group, bed and dining table that has room for it; else below an armchair or a desk."""
+    """One rug below every sofa group, bed and dining table that has room for it; else below the table that armchairs
+    stand around, below an armchair or a desk."""
     done: list[shapely.Polygon] = []
     hosts = setting.inviting("rug")
     seats = [o for o in hosts if o.row.role == "seat"]
     desks = [o for o in hosts if o.row.role == "board" and o.row.access]
-    groups = [o for o in hosts if o not in seats and o not in desks] or seats or desks
+    near = {o.name: sum(o.footprint.distance(s.footprint) < AROUND for s in seats) for o in setting.stands("before")}
+    shared = [o for o in setting.stands("before") if near[o.name] > 1]
+    groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks
     for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
         rng = setting.rng(host.name, "rug")
         variant = int(rng.integers(1 << 30))
@@ -53,7 +57,7 @@ def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, flo
         return {host.name, *near}, (0.0, 0.25), (wide, long)
     if host.row.role == "sofa":
         front = d / 2
-        tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < 1.2]
+        tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
         reach = 1.7
         for table in tables[:1]:
             cos, sin = np.cos(host.yaw), np.sin(host.yaw)

@@ -14,7 +14,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.dressing import KINDS, SMALL
 from echomodel.openings import Opening
 from echousd.checks import check
-from echousd.graph import RoomSpec
+from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.dressing import upholstery
@@ -223,6 +223,20 @@ def test_rugs_are_as_large_as_fits_each_way():
     wide, _, deep = room.boxes.size[room.names.index("bed")].tolist()
     assert rug.size[0] < wide + 1.2  # the wardrobe stands there
     assert rug.size[2] == pytest.approx(min(0.75 * deep + 0.5, 2.4), abs=0.01)
+
+
+def test_armchairs_around_a_table_share_a_rug():
+    places = {"a": (-1.1, np.pi / 2), "b": (1.1, -np.pi / 2)}
+    chairs = [
+        Node(name, "armchair", size=(0.8, 0.8, 0.8), position=(x, 0.0, 0.0), yaw=yaw)
+        for name, (x, yaw) in places.items()
+    ]
+    table = Node("table", "coffee_table", size=(0.9, 0.4, 0.6), position=(0.0, 0.0, 0.0), yaw=0.0)
+    graph = SceneGraph(RoomSpec("living_room", size=(5.0, 4.4)), (*chairs, table))
+    made = echousd.generate(graph, shapes="boxes", repair=False)
+    rugs = [t for t in placed(replace(made, options=RoomOptions(walls=True, dress="some"))) if t.kind == "rug"]
+    assert [rug.on for rug in rugs] == ["table"]
+    assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
 
 
 def test_cushions_lie_before_the_pillows_of_wide_beds():
