@@ -75,14 +75,13 @@ def cases() -> Iterator[Case]:
         yield Case(f"floor, {corners} corners, {area:,} m² around it", round_floor(area, corners), "boxes")
     for megabytes, count in ((2, 5_000), (7.9, 5_000), (8.2, 5_000), (1, 5_001)):
         yield Case(f"text graph read, {megabytes:g} MiB, {count:,} objects", text_of(megabytes, count))
-    for count in (10, 50, 401):
+    for count in (10, 50, 201):
         yield Case(f"boxes, {count} objects", groups(count), "boxes")
     for count in (10, 50):
         yield Case(f"parts, {count} objects", groups(count), "parts")
     for count in (100, 200):
         yield Case(f"boxes, {count} objects", groups(count), "boxes")
     yield Case("parts, 100 objects", groups(100), "parts")
-    yield Case("boxes, 400 objects", groups(400), "boxes")
 
 
 def measured(case: Case, longest: int) -> str:
