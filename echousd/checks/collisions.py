@@ -6,7 +6,6 @@ Depth is measured to the other's faces, so that boards thinner than twice `DEEP`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import trimesh
@@ -14,24 +13,12 @@ from scipy.spatial import cKDTree
 from trimesh.triangles import closest_point
 
 from echousd.repair.geometry import axes, pair_indices, separation
+from echousd.repair.report import Collision
 from echousd.stage.contents import RoomObject
 
 TOUCH = 0.01  # metres: boxes that overlap less than this only touch
 DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision
 SAMPLES = 600  # points per surface and pair
-
-
-@dataclass(frozen=True)
-class Collision:
-    """Two objects whose meshes run into each other, by `depth` metres."""
-
-    first: str
-    second: str
-    depth: float
-
-    def to_json(self) -> dict:
-        """The entry of the report."""
-        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
 
 
 def find_collisions(objects: Sequence[RoomObject]) -> tuple[Collision, ...]:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd
 
-from echousd.checks.collisions import Collision, find_collisions
+from echousd.checks.collisions import find_collisions
 from echousd.checks.living import find_living
 from echousd.checks.placement import Misplacement, find_misplaced
 from echousd.checks.relations import MeasuredRelation, measured_relations
 from echousd.checks.validity import Fault, find_faults
 from echousd.repair.living import LivingFault
+from echousd.repair.report import Collision
 from echousd.stage.contents import RoomContents, read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source

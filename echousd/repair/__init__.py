@@ -2,9 +2,11 @@
 
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.repair import Conflict, RepairedBoxes, RepairResult, repair, repair_boxes
+from echousd.repair.report import Collision
 from echousd.repair.solver import RepairConfig
 
 __all__ = [
+    "Collision",
     "Conflict",
     "RepairConfig",
     "RepairResult",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,22 @@ if TYPE_CHECKING:
     from echousd.graph import SceneGraph
 
 TOUCH = 0.01  # metres: deeper than this into another box is a collision, further than this outside is outside
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Two objects that run into each other, by `depth` metres."""
+
+    first: str
+    second: str
+    depth: float
+
+    def __str__(self) -> str:
+        return f"{self.first} and {self.second} collide by {self.depth:.2f} m"
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry of the manifest, and of a check's report."""
+        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from echousd.room.styles import style_groups
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.graph import SceneGraph
+    from echousd.repair.report import Collision
     from echousd.room.geometry import Geometry
 
 
@@ -92,22 +93,6 @@ class Verdict:
         margin = None if self.margin is None else round(self.margin, 4)
         triple = {"subject": self.subject, "predicate": self.predicate, "object": self.object}
         return {**triple, "state": self.state, "margin": margin}
-
-
-@dataclass(frozen=True)
-class Collision:
-    """Two objects whose boxes run into each other, by `depth` metres."""
-
-    first: str
-    second: str
-    depth: float
-
-    def __str__(self) -> str:
-        return f"{self.first} and {self.second} collide by {self.depth:.2f} m"
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry of the manifest."""
-        return {"objects": [self.first, self.second], "depth": round(self.depth, 4)}
 
 
 @dataclass(frozen=True)

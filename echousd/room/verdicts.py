@@ -13,8 +13,8 @@ from echousd.graph import SceneGraph
 from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import pair_indices, separation
 from echousd.repair.placements import stated_placements
-from echousd.repair.report import TOUCH
-from echousd.room.room import Collision, LayoutOutcome, RoomData, Verdict
+from echousd.repair.report import TOUCH, Collision
+from echousd.room.room import LayoutOutcome, RoomData, Verdict
 from echousd.room.tensors import floor_centre, graph_batch
 
 ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre

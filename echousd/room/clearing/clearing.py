@@ -11,10 +11,11 @@ import shapely
 from echomodel.boxes import Boxes
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.repair.living import living_faults
+from echousd.repair.report import Collision
 from echousd.room.clearing.scene import REACH, Scene, scene_of
 from echousd.room.geometry import Geometry
 from echousd.room.reproducible import rounded_boxes
-from echousd.room.room import Collision, LayoutOutcome
+from echousd.room.room import LayoutOutcome
 from echousd.room.verdicts import relation_verdicts
 
 DEEP = 0.001  # metres that solids may reach into one another
