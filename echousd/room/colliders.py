@@ -41,7 +41,11 @@ def colliders_of(mesh: trimesh.Trimesh, category: str) -> tuple[Collider, ...]:
     out = []
     for number, piece in enumerate(pieces):
         share = (np.asarray(piece.vertices) - low) / np.maximum(high - low, 1e-9)
-        hull = trimesh.convex.convex_hull(snapped(mesh.bounds[0] + share * np.ptp(mesh.bounds, axis=0), mesh.bounds))
+        points = mesh.bounds[0] + share * np.ptp(mesh.bounds, axis=0)
+        level = snapped(points, mesh.bounds)
+        if np.ptp(level[:, 1]) > 0:  # a thin top lies all in what would be one plane
+            points = level
+        hull = _hull(points)
         out.append(Collider("collider" if len(pieces) == 1 else f"collider_{number + 1}", hull, "convexHull"))
     return tuple(out)
 
@@ -78,9 +82,7 @@ def collider(mesh: trimesh.Trimesh, category: str) -> Collider:
 def standing_hull(mesh: trimesh.Trimesh, name: str = "collider") -> Collider:
     """One hull of a mesh (metres) that stands on a plane, however its base is rounded."""
     light = flush(_reduced(mesh.convex_hull, HULL_FACES), mesh.bounds)
-    # corners nearer to one another than what is written would be one corner there, with faces that have two
-    points = np.unique(np.concatenate([light.vertices, soles(mesh)]).round(DIGITS), axis=0)
-    return Collider(name, trimesh.convex.convex_hull(points), "convexHull")
+    return Collider(name, _hull(np.concatenate([light.vertices, soles(mesh)])), "convexHull")
 
 
 def flush(mesh: trimesh.Trimesh, bounds: np.ndarray) -> trimesh.Trimesh:
@@ -117,6 +119,11 @@ def soles(mesh: trimesh.Trimesh, directions: int = 16) -> np.ndarray:
         outline[:, 1] = level
         found.append(outline)
     return np.concatenate(found)
+
+
+def _hull(points: np.ndarray) -> trimesh.Trimesh:
+    # corners nearer to one another than what is written would be one corner there, with faces that have two
+    return trimesh.convex.convex_hull(np.unique(points.round(DIGITS), axis=0))
 
 
 def _reduced(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:

@@ -262,8 +262,8 @@ def overhead(setting: Setting, state: State, i: int) -> list[Row]:
             continue
         taste = 0.8 * _hanging_over(setting, state, i, j) + 0.4 * (kind.stands == "beside") + HIGH_UP * (not low)
         price, (x, _, z), yaw = 0.0 if j in told else taste, state.position[j].tolist(), float(state.yaw[j])
+        long = yaw if setting.size[j, 0] >= setting.size[j, 2] else yaw - HALF_PI
         for away in _row_over(setting, i, j):  # along its long side
-            long = yaw if setting.size[j, 0] >= setting.size[j, 2] else yaw - HALF_PI
             rows.append((x + math.cos(long) * away, z - math.sin(long) * away, yaw, price))
     middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
     rows.append((float(middle[0]), float(middle[1]), setting.grain, 0.9 if low and rows else 0.0))

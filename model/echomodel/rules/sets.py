@@ -182,7 +182,7 @@ MEANS = {
     "right": _BESIDE.format("+Z"),
     "front": _BESIDE.format("+X"),
     "behind": _BESIDE.format("-X"),
-    "close_by": f"a corner of one within {NEAR} m of a corner of the other",
+    "close_by": f"a corner of one within {NEAR} m of a corner of the other, or their sides within {SIDES} m",
     "above": f"over its footprint and higher than its top by {TOUCH} m at least",
     "standing_on": f"the bottom within {TOUCH} m of its top, the centre over it",
     "bigger_than": f"the volume larger by {VOLUME:.0%} of the larger one at least",
@@ -242,9 +242,8 @@ SGFRONT.rules["behind"] = replace(SGFRONT.rules["behind"], label=_beside(0, -1.0
 SGFRONT.rules["standing_on"] = replace(SGFRONT.rules["standing_on"], label=None)
 SGFRONT.rules["above"] = Rule(None, _higher)
 
-STRICT.rules["close_by"] = Rule(
-    _near, _close, means=f"a corner of one within {NEAR} m of a corner of the other, or their sides within {SIDES} m"
-)  # what is learned stays what is published
+# what is learned stays what is published
+STRICT.rules["close_by"] = replace(STRICT.rules["close_by"], margin=_near, label=_close)
 
 RULE_SETS = {rules.name: rules for rules in (STRICT, SGFRONT)}
 

@@ -80,6 +80,17 @@ def test_hulls_of_small_things_are_closed_as_they_are_written(kind, number):
     assert written.area_faces.min() > 1e-12
 
 
+def test_a_convex_piece_as_thin_as_a_table_top_keeps_its_thickness(monkeypatch):
+    top, legs = trimesh.creation.box((1.2, 0.01, 0.8)), trimesh.creation.box((0.1, 0.74, 0.1))
+    top.apply_translation((0, 0.745, 0))
+    legs.apply_translation((0, 0.37, 0))
+    monkeypatch.setattr("echousd.room.colliders.find_spec", lambda name: name)
+    monkeypatch.setattr("echousd.room.colliders.convex_pieces", lambda mesh: [top, legs])
+    plate, post = colliders_of(trimesh.util.concatenate([top, legs]), "dining_table")
+    np.testing.assert_allclose(plate.mesh.bounds[:, 1], (0.74, 0.75), atol=1e-4)
+    np.testing.assert_allclose(post.mesh.bounds[0, 1], 0.0, atol=1e-4)
+
+
 def test_what_would_topple_has_ballast_in_its_base():
     foot, arm = trimesh.creation.box((0.3, 0.02, 0.3)), trimesh.creation.box((1.0, 0.02, 0.02))
     foot.apply_translation((0, 0.01, 0))

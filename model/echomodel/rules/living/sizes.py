@@ -84,7 +84,7 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
 
 
 def fitting_loads(categories: Sequence[str], size: np.ndarray, carrier: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(n, 3) float: sizes in which no screen or lamp is larger in plan than what carries it, where their kinds allow.
+    """(n, 3) float: sizes in which nothing is larger in plan than what carries it, where its kind allows.
 
     Arguments:
         categories: n words. size: (n, 3) float, metres.
