@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 EVERY, CONTACT = "every-camera", "sheet"
 VIEWS = ("top", "perspective", "eye", EVERY, CONTACT)
 COLORS = ("materials", "class")
-SHEET = ("perspective", "eye", "top")  # its first row; below, the views from the other corners
+SHEET = ("eye", "top")  # beside the best corner in the first row; below, the views from the others
 LARGEST = 4096
 FRAMES = (2, 360)  # pictures that a turn may have
 
@@ -87,8 +86,8 @@ def render_stage(
         return _image(np.concatenate([trace(scenery, camera, size, rays=rays) for camera in cameras], axis=1))
     if view != CONTACT:
         return _image(_seen(scenery, view, size, rays))
-    first = [_seen(scenery, word, size, rays) for word in SHEET]
-    others = [trace(shown, corner, size, rays=rays) for corner, shown in islice(corner_views(scenery), 1, None)]
+    corner, *others = (trace(shown, camera, size, rays=rays) for camera, shown in corner_views(scenery))
+    first = [corner, *(_seen(scenery, word, size, rays) for word in SHEET)]
     return _image(np.concatenate([np.concatenate(row, axis=1) for row in (first, others)]))
 
 

@@ -96,14 +96,20 @@ def _connect(
     shader.CreateInput(name, kinds.get(name, Sdf.ValueTypeNames.Float)).ConnectToSource(output)
 
 
+def tint_factor(base: Look, look: Look) -> list[float]:
+    """What the image of a material is multiplied with, to be in the colours of `look`; paintings have their own."""
+    if base.pattern.startswith("painting_"):
+        return [1.0, 1.0, 1.0]
+    return [round(b / max(a, 1e-4), 4) for a, b in zip(base.color, look.color, strict=True)]
+
+
 def tint_material(stage: Usd.Stage, path: str, base: Look, look: Look) -> None:
     """Author, for a variant, how a material comes from its images in the colours of `base` to those of `look`."""
     if base.pattern.startswith("painting_"):
         return
     if base.pattern:
         image = UsdShade.Shader(stage.OverridePrim(f"{path}/{IMAGES['diffuseColor']}"))
-        ratio = [round(b / max(a, 1e-4), 4) for a, b in zip(base.color, look.color, strict=True)]
-        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*ratio, 1.0))
+        image.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*tint_factor(base, look), 1.0))
         return
     shader = UsdShade.Shader(stage.OverridePrim(f"{path}/surface"))
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*look.color))

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pxr import Gf, Sdf, Usd, UsdShade
 
 from echousd.room.looks import Look
-from echousd.room.materials import LOOKS, look_images
+from echousd.room.materials import LOOKS, look_images, tint_factor
 
 CONTEXT = "mtlx"  # the render context of the outputs
 SURFACE = "ND_UsdPreviewSurface_surfaceshader"
@@ -74,9 +74,7 @@ def _network(stage: Usd.Stage, path: str, look: Look, harmony: str) -> None:
 def _tint(stage: Usd.Stage, path: str, base: Look, look: Look) -> None:
     """What a harmony makes of a material: the factor of its image, or its plain colour."""
     if base.pattern:
-        painted = base.pattern.startswith("painting_")
-        factor = [1.0 if painted else b / max(a, 1e-4) for a, b in zip(base.color, look.color, strict=True)]
-        node, name, value = "mtlx_tint", "in2", Gf.Vec3f(*(round(one, 4) for one in factor))
+        node, name, value = "mtlx_tint", "in2", Gf.Vec3f(*tint_factor(base, look))
     else:
         node, name, value = "mtlx_surface", "diffuseColor", Gf.Vec3f(*look.color)
     UsdShade.Shader(stage.OverridePrim(f"{path}/{node}")).CreateInput(name, Types.Color3f).Set(value)

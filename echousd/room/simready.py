@@ -13,7 +13,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
 from echousd.room.manifest import find_manifest
-from echousd.room.paths import coarse_name, component_file, payload_name
+from echousd.room.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.room.stored import asset_from, shelf_of
 from echousd.room.thumbnails import picture
 from echousd.room.within import inside
@@ -55,7 +55,7 @@ def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "Ech
     layers, left, hangs = [], [], []
     for name in names or known:
         own = _files(root, manifest, name)
-        if any("/original/" in path for path in own) or f"assets/{name}/{payload_name(name)}" not in own:
+        if any("/original/" in path for path in own) or payload_file(name) not in own:
             left.append(f"{name}: a model of somebody else's, which is packed where it comes from")
             continue
         place = out / name / INSIDE
@@ -75,10 +75,9 @@ def package(name: str, files: Mapping[str, bytes], *, author: str, source: str) 
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
         scratch = Path(folder)
         (scratch / "payload").mkdir()
-        for file in (payload_name(name), coarse_name(name)):
-            content = files.get(f"assets/{name}/{file}")
-            if content is not None:
-                _turned(scratch, file, content).Export(str(scratch / "payload" / file))
+        for file, path in ((payload_name(name), payload_file(name)), (coarse_name(name), coarse_file(name))):
+            if path in files:
+                _turned(scratch, file, files[path]).Export(str(scratch / "payload" / file))
                 (scratch / file).unlink()
         layer = _turned(scratch, f"{name}.usda", files[component_file(name)])
         UsdUtils.ModifyAssetPaths(layer, lambda path: f"./payload/{path[2:]}" if path.endswith(".usdc") else path)
