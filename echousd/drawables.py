@@ -140,7 +140,7 @@ def _part(
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
     normals = np.repeat(flat[:, None], 3, axis=1)
-    paints = tuple(_paints(prim, surface.face[face], known))
+    paints = tuple(paints_of(prim, surface.face[face], known))
     if surface.normals is not None:
         return triangles, surface.normals[index[corner]], None, paints
     if not prim.IsA(UsdGeom.Mesh):
@@ -198,8 +198,12 @@ def _flattened(primvar: UsdGeom.Primvar) -> Any:
     return np.asarray(found)[index]
 
 
-def _paints(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
-    """Materials of a surface with the triangles that they colour."""
+def paints_of(prim: Usd.Prim, face: np.ndarray, known: dict[str, Paint]) -> list[tuple[Paint, np.ndarray]]:
+    """Materials of a surface with the triangles that they colour; later ones win.
+
+    Arguments:
+        face: (t,) int, face of each triangle. known: materials that were read already, by path; grows.
+    """
     paints = [(_bound(prim, known), np.arange(len(face)))]
     for subset in UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets():
         chosen = np.zeros(int(face.max(initial=0)) + 1, bool)

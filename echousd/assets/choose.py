@@ -1,4 +1,4 @@
-"""Which model of a library stands for which object: by category, fit in the box, style; none repeated needlessly."""
+"""Which model of a library stands for which object: by category, box, style and colours; none repeated needlessly."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ import numpy as np
 
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
+from echousd.assets.colors import MOST, oklab
 from echousd.assets.licences import allowed
+from echousd.assets.matching import apart, told_colors
+from echousd.assets.matching import costs as color_costs
+from echousd.assets.matching import table as color_table
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import Library, read_library
 
@@ -120,6 +124,11 @@ class Shelf:
         """(n,) float, what is not known for sure of category and front."""
         return np.array([2 - record.confidence - record.front_confidence for record in self.records])
 
+    @cached_property
+    def colors(self) -> np.ndarray:
+        """(n, k, 4) float, shares and OKLab of colours."""
+        return color_table([record.colors for record in self.records], MOST)
+
     def oddness(self, category: str) -> np.ndarray:
         """(n,) float, how far a model is out of the sizes of a category (logarithm, along its worst axis); 0 within."""
         table = size_statistics(category)
@@ -130,13 +139,17 @@ class Shelf:
 
 @dataclass(frozen=True)
 class Asked:
-    """One object that needs a model: its name, category, style, box (3) in metres, and who shares its model."""
+    """One object that needs a model: name, category, style, box (3) in metres, who shares its model.
+
+    `told` are words of its graph, whose colours it shall have where they name any.
+    """
 
     name: str
     category: str
     style: str
     size: tuple[float, float, float]
     shares: str = ""
+    told: str = ""
 
 
 @dataclass
@@ -154,13 +167,14 @@ def choose(
     *,
     kept: Mapping[str, AssetRecord] | None = None,
     nearness: Mapping[str, Mapping[str, float]] | None = None,
+    palette: np.ndarray | None = None,
 ) -> Choice:
     """A model for each object; equal arguments give equal choices.
 
     Arguments:
         asked: objects in the order in which they choose; those of one `shares` get one model.
         kept: object name -> model that is chosen already. nearness: object name -> id of a model -> cost of its shape
-            against the one that was generated (`--shapes guided`).
+            against the one that was generated (`--shapes guided`). palette: (p, 3) linear colours of the room.
     """
     out = Choice(dict(kept or {}))
     groups: dict[str, AssetRecord] = {}
@@ -170,13 +184,16 @@ def choose(
             groups.setdefault(one.shares or one.name, out.chosen[one.name])
             styles.setdefault(one.style, []).append(out.chosen[one.name])
     used = {record.id for record in out.chosen.values()}
+    tones = oklab(np.asarray(palette, float).reshape(-1, 3)) if palette is not None else np.zeros((0, 3))
+    if len(tones):
+        tones = np.concatenate([tones, np.reshape(told_colors(wishes.text), (-1, 3))])
     for one in asked:
         if one.name in out.chosen:
             continue
         found = groups.get(one.shares) if one.shares else None
         if found is None:
             near = (nearness or {}).get(one.name)
-            found = _best(wishes, one, used, styles.get(one.style, ()), f"{seed} {one.shares or one.name}", near)
+            found = _best(wishes, one, used, styles.get(one.style, ()), f"{seed} {one.shares or one.name}", near, tones)
         if found is None:
             out.missing.append(one.name)
             continue
@@ -202,14 +219,16 @@ def _best(
     company: Sequence[AssetRecord],
     seed: str,
     nearness: Mapping[str, float] | None,
+    tones: np.ndarray,
 ) -> AssetRecord | None:
     ranked: list[tuple[float, str, AssetRecord]] = []
+    told = np.reshape(told_colors(one.told), (-1, 3))
     for category, cost in _shelves_for(one.category, wishes):
         shelf = wishes.shelves[category]
         ratio = np.abs(np.log(np.array(one.size) / shelf.sizes))
         costs = cost + ratio.mean(1) + BEYOND * np.maximum(ratio - math.log(wishes.stretch), 0).sum(1)
         odd = shelf.oddness(one.category)
-        costs += UNSURE * shelf.doubts + BEYOND * odd
+        costs += UNSURE * shelf.doubts + BEYOND * odd + color_costs(shelf.colors, one.category, tones, told)
         if category != one.category:  # nobody dines at a coffee table, however near it is of kin
             costs[odd > 0] = np.inf
         for number in np.argsort(costs, kind="stable")[:64]:
@@ -217,6 +236,7 @@ def _best(
                 break
             record = shelf.records[number]
             total = float(costs[number]) + (AGAIN if record.id in used else 0.0) + UNLIKE * _unlike(record, company)
+            total += apart(record.colors, [other.colors for other in company])
             total += (nearness or {}).get(record.id, 0.0) + wishes.unlikeness.get(record.id, 0.0)
             ranked.append((total, record.id, record))
     if not ranked:

@@ -11,6 +11,7 @@ import numpy as np
 
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues.entry import Entry
+from echousd.assets.colors import dominant
 from echousd.assets.front import SURE, front_by_shape
 from echousd.assets.licences import UNKNOWN, spdx
 from echousd.assets.likeness import named_by_shape
@@ -45,7 +46,7 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
     )
     try:
         record = replace(record, sha256=digest_of(entry.file))
-        return _read(record, entry, measure(entry.file), full, encoder)
+        return _read(record, entry, measure(entry.file, painted=full), full, encoder)
     except ValueError as error:
         return replace(record, fault=str(error))
 
@@ -98,6 +99,7 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
     shape = found.turned(np.array(record.turn).reshape(3, 3))
     shape.apply_scale(np.array(record.dims) / np.maximum(np.array(record.high) - np.array(record.low), 1e-12))
     record = replace(record, placement=placement, supports=supports(shape), thumbnail=thumbnail(shape), fault=fault)
+    record = replace(record, colors=dominant(found.coats))
     if encoder is not None and not fault:
         from echousd.assets.descriptor import descriptors, grid_of
 

@@ -69,7 +69,8 @@ def index(
         why = f" ({said[0]})" if said else ""
         raise ValueError(f"{where}: holds no models; allowed: {kinds}{why}")
     wishes = read_corrections(table) if table is not None and table.exists() else {}
-    before = dict(read_library(file).records) if file.exists() else {}
+    old_index = read_library(file) if file.exists() else None
+    before = old_index.records if old_index is not None and old_index.complete else {}
     done: dict[str, AssetRecord] = {}
     fresh: list[Entry] = []
     for entry in entries:

@@ -1,28 +1,34 @@
-"""Read a model of any kind: stages by USD, glTF by trimesh, OBJ here, as of it only the triangles are wanted."""
+"""Read a model of any kind: stages by USD, glTF by trimesh, OBJ here, whose material libraries are read as well."""
 
 from __future__ import annotations
 
-import re
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import trimesh
 
+from echousd.assets.colors import Coat, flat, pixels
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import STAGES, ModelFile
 from echousd.assets.stages import measured_stage
+from echousd.assets.wavefront import measured_obj
 
 
-def measure(model: ModelFile) -> Measured:
-    """Read a model; raises ValueError that names the file for one that cannot be read or has no surface."""
+def measure(model: ModelFile, *, painted: bool = False) -> Measured:
+    """Read a model, with `painted` its colours as well.
+
+    Raises ValueError that names the file for one that cannot be read or has no surface.
+    """
     try:
         if model.suffix in STAGES:
             with model.opened():
                 pass
-            found = measured_stage(model.path, model.prim)
+            found = measured_stage(model.path, model.prim, painted=painted)
         else:
-            found = _mesh(model)
+            found = _mesh(model, painted)
     except ImportError:
         raise
     except Exception as error:  # readers fail on damaged files in every way there is
@@ -45,15 +51,15 @@ def measure(model: ModelFile) -> Measured:
     return found
 
 
-def _mesh(model: ModelFile) -> Measured:
+def _mesh(model: ModelFile, painted: bool) -> Measured:
     beside = model.beside()
     with model.opened() as file:
         if model.suffix == ".obj":
-            return _obj(model, file.read().decode("utf-8", "replace"))
+            return measured_obj(model, file.read().decode("utf-8", "replace"), painted=painted)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scene = trimesh.load_scene(
-                file, file_type=model.suffix[1:], resolver=beside, process=False, skip_materials=True
+                file, file_type=model.suffix[1:], resolver=beside, process=False, skip_materials=not painted
             )
     parts = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh)]
     if not parts:
@@ -71,39 +77,31 @@ def _mesh(model: ModelFile) -> Measured:
         licence=str(extras.get("license") or ""),
         author=str(extras.get("author") or copyright_),
         missing=tuple(dict.fromkeys(beside.missing)),
+        coats=tuple(_coats(scene)) if painted else (),
     )
 
 
-FACE = re.compile(r"^f[ \t]+(.+?)[ \t]*$", re.MULTILINE)
-VERTEX = re.compile(r"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+def _coats(scene: trimesh.Scene) -> Iterator[Coat]:
+    """What covers the parts of a model, by their areas in the scene."""
+    for node in scene.graph.nodes_geometry:
+        matrix, name = scene.graph[node]
+        part = scene.geometry[name]
+        cover = _cover(part) if isinstance(part, trimesh.Trimesh) else None
+        if cover is not None:
+            yield float(part.area) * abs(float(np.linalg.det(matrix[:3, :3]))) ** (2 / 3), cover
 
 
-def _obj(model: ModelFile, text: str) -> Measured:
-    """An OBJ without its texture coordinates and normals: triangles, names of materials, textures that are missing."""
-    points = np.array(VERTEX.findall(text), float).reshape(-1, 3)
-    lines = re.sub(r"/\S*|#.*", "", "\n".join(FACE.findall(text))).splitlines()
-    counts = np.array([len(line.split()) for line in lines], int)
-    corners = np.array(" ".join(lines).split(), int)
-    if (corners < 0).any():
-        raise ValueError(f"{model}: faces count points from the end, allowed: plain numbers; write it again")
-    starts = np.cumsum(counts) - counts
-    triangles = [np.zeros((0, 3), int)]
-    for count in np.unique(counts[counts > 2]):
-        first = starts[counts == count]
-        for k in range(1, count - 1):
-            triangles.append(corners[np.stack([first, first + k, first + k + 1], 1)] - 1)
-    beside = model.beside()
-    for library in re.findall(r"^mtllib[ \t]+(.+?)[ \t]*$", text, re.MULTILINE):
+def _cover(part: trimesh.Trimesh) -> np.ndarray | None:
+    """A part's texture, its material's colour, or the mean of its points' colours."""
+    material = getattr(part.visual, "material", None)
+    if isinstance(material, trimesh.visual.material.PBRMaterial):
+        factor = np.ones(4) if material.baseColorFactor is None else np.asarray(material.baseColorFactor, float)
+        factor = factor / 255.0 if factor.max(initial=0.0) > 1 else factor
+        image = material.baseColorTexture
         try:
-            content = beside.get(library.strip()).decode("utf-8", "replace")
-        except ValueError:
-            continue
-        for image in re.findall(r"^[ \t]*map_Kd[ \t]+(.+?)[ \t]*$", content, re.MULTILINE | re.IGNORECASE):
-            if image not in beside.images and image not in beside.missing:
-                try:
-                    beside.get(image)
-                except ValueError:
-                    continue
-    used = re.findall(r"^usemtl[ \t]+(.+?)[ \t]*$", text, re.MULTILINE)
-    missing = tuple(dict.fromkeys(beside.missing))
-    return Measured(points, np.concatenate(triangles), materials=tuple(dict.fromkeys(used)), missing=missing)
+            return flat(factor, factor[3]) if image is None else pixels(image, factor)
+        except Exception:  # decoders fail on damaged images in every way there is
+            return None
+    shown: Any = part.visual
+    color = np.asarray(shown.main_color, float) / 255
+    return flat(np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4), 1.0)

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import trimesh
 
+from echousd.assets.colors import Coat
+
 
 @dataclass(frozen=True, eq=False)
 class Measured:
@@ -17,6 +19,7 @@ class Measured:
         metres: per unit, None where the file does not say. z_up: whether +Z points up.
         above: (4, 4) float, from the frame above its root prim to its own frame, as only a prim below others has one.
         yaw: radians by which a prim of a stage stands turned about its up axis, counter-clockwise seen from above.
+        coats: areas of its surface with what covers them (`echousd.assets.colors.Coat`), where they were asked for.
         others: as in `AssetRecord`.
     """
 
@@ -36,6 +39,7 @@ class Measured:
     colliders: bool = False
     variants: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
+    coats: tuple[Coat, ...] = ()
 
     def turned(self, turn: np.ndarray) -> trimesh.Trimesh:
         """The surface after a rotation (3, 3), in the model's own unit."""

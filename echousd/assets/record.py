@@ -33,6 +33,7 @@ class AssetRecord:
         tags: words of its source: style, material, colour. variants: `set=selection` that are there.
         missing: files that the model names and that are not there.
         thumbnail: PNG. descriptor: of its shape, empty where none was made.
+        colors: share, and OKLab, of up to three colours of its surface, the largest share first; empty = not known.
         corrected: what a person's table said of it when it was read, "" = nothing.
         fault: why it cannot be used, "" where it can.
     """
@@ -63,6 +64,7 @@ class AssetRecord:
     missing: tuple[str, ...] = ()
     thumbnail: bytes = b""
     descriptor: tuple[float, ...] = ()
+    colors: tuple[float, ...] = ()
     corrected: str = ""
     fault: str = ""
 

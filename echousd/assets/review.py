@@ -11,13 +11,15 @@ from pathlib import Path
 from PIL import Image, ImageDraw
 
 from echomodel.files import whole_file
+from echousd.assets.colors import swatches
 from echousd.assets.record import AssetRecord
 from echousd.assets.shape import SIDE
 
 WIDE = 10  # pictures in a row of a sheet
 LABEL = 24  # pixels below a picture
 STYLE = """body{font:13px sans-serif;margin:2em}div{display:inline-block;width:11em;vertical-align:top;margin:.4em}
-img{width:96px;height:96px}b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
+img{width:96px;height:96px}u{display:block;width:96px;height:8px;text-decoration:none}s{display:inline-block;height:8px}
+b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
 DOUBT = 0.7  # confidence below which a row is coloured
 
 
@@ -42,9 +44,10 @@ def _card(record: AssetRecord) -> str:
     size = " × ".join(f"{length:.2f}" for length in record.dims)
     doubt = " class=doubt" if min(record.confidence, record.front_confidence) < DOUBT else ""
     told = f"{size} m<br>category {record.confidence:.2f}, front {record.front_confidence:.2f}"
+    spots = "".join(f"<s style='background:rgb{rgb};width:{share:.0%}'></s>" for share, rgb in swatches(record.colors))
     whose = html.escape(f"{record.licence} {record.author}")
     return (
-        f"<div{doubt}><img src='data:image/png;base64,{picture}'><b>{html.escape(record.name)}</b>"
+        f"<div{doubt}><img src='data:image/png;base64,{picture}'><u>{spots}</u><b>{html.escape(record.name)}</b>"
         f"<span>{html.escape(record.id)}</span><span>{told}</span><i>{whose}</i></div>"
     )
 
@@ -68,6 +71,8 @@ def sheet(records: Sequence[AssetRecord], title: str = "") -> Image.Image:
         x, y = number % WIDE * SIDE, 22 + number // WIDE * (SIDE + LABEL)
         with Image.open(io.BytesIO(record.thumbnail), formats=("PNG",)) as picture:
             whole.paste(picture.convert("RGB"), (x, y))
+        for spot, (_, rgb) in enumerate(swatches(record.colors)):
+            draw.rectangle((x + 2 + 9 * spot, y + 2, x + 9 + 9 * spot, y + 9), fill=rgb)
         draw.text((x + 2, y + SIDE), record.name[:16], fill="black")
         draw.text((x + 2, y + SIDE + 11), record.id.rsplit("/", 1)[-1][:16], fill="grey")
     return whole

@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
+import contextlib
 import warnings
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 
+from echousd.assets.colors import Coat, flat, texels
 from echousd.assets.measured import Measured
+from echousd.drawables import Paint, fans, paints_of
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import object_box
-from echousd.stage.forms import SkippedForms, forms
+from echousd.stage.forms import Form, SkippedForms, forms, polygons
 from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
+from echousd.textures import TextureError, texture_bytes
 
 IMAGES = (".png", ".jpg", ".jpeg", ".exr", ".tga", ".tif", ".tiff", ".bmp", ".webp", ".avif", ".hdr")
 
 
-def measured_stage(path: Path, prim_path: str = "") -> Measured:
+def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) -> Measured:
     """What a USD file says of the model in it; raises StageError (a ValueError) as `open_stage` does.
 
     Arguments:
         path: of the file. prim_path: of the model's prim where the stage holds more than it, "" = its root.
+        painted: with its colours.
     """
     stage = open_stage(path)
     root = root_prim(stage, path) if not prim_path else named_prim(stage, path, prim_path)
     cache = UsdGeom.XformCache()
     box = object_box(root) if prim_path else None
     points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
+    coats: list[Coat] = []
+    known: dict[str, Paint] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkippedForms)
         for form in forms(root, cache, _visible):
@@ -39,6 +47,7 @@ def measured_stage(path: Path, prim_path: str = "") -> Measured:
                 points.append(vertices @ form.world[:3, :3].T + form.world[:3, 3])
                 faces.append(triangles + count)
                 count += len(vertices)
+                coats += _coats(form, known) if painted else ()
     prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
     layer = stage.GetRootLayer()
     data = dict(layer.customLayerData)
@@ -64,7 +73,31 @@ def measured_stage(path: Path, prim_path: str = "") -> Measured:
         colliders=any(prim.HasAPI(UsdPhysics.CollisionAPI) for prim in prims),
         variants=variants,
         missing=tuple(missing_files(path)),
+        coats=tuple(coats),
     )
+
+
+def _coats(form: Form, known: dict[str, Paint]) -> Iterator[Coat]:
+    """What covers a surface, by the areas of its materials."""
+    surface = polygons(form.prim)
+    face, corner = fans(surface.counts)
+    a, b, c = np.moveaxis((surface.points @ form.world[:3, :3].T)[surface.indices[corner]], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    covers = np.zeros(len(face), int)
+    paints = list(paints_of(form.prim, surface.face[face], known))
+    for number, (_, inside) in enumerate(paints):  # later ones win
+        covers[inside] = number
+    for (paint, _), share in zip(paints, np.bincount(covers, area, len(paints)), strict=True):
+        if share > 0 and paint != Paint():  # of no material that is known
+            yield float(share), _cover(paint)
+
+
+def _cover(paint: Paint) -> np.ndarray:
+    found = None
+    if paint.texture:
+        with contextlib.suppress(TextureError):
+            found = texels(texture_bytes(paint.texture) or b"", paint.tint)
+    return flat(paint.color, paint.opacity) if found is None else found
 
 
 def root_prim(stage: Usd.Stage, path: Path) -> Usd.Prim:

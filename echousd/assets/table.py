@@ -13,9 +13,11 @@ from typing import Any
 
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
+from echousd.assets.colors import MOST
 from echousd.assets.record import AssetRecord
 
-VERSION = 1
+VERSION = 2
+OLDER = {1: ("colors",)}  # version of an index that can still be used -> columns that it has not
 KEY = b"echousd.assets"
 LARGEST = 4 * 2**30  # bytes of an index when it is unpacked
 KINDS = {"str": "string", "float": "float64", "int": "int64", "bool": "bool_", "bytes": "binary"}
@@ -27,10 +29,12 @@ class Library:
 
     Arguments:
         file: the Parquet file, which paths of records are relative to. records: by id, in the index's order.
+        complete: whether its rows say all that those of today do, so that none is read again for that.
     """
 
     file: Path
     records: Mapping[str, AssetRecord]
+    complete: bool = True
 
     @cached_property
     def by_category(self) -> dict[str, tuple[AssetRecord, ...]]:
@@ -112,16 +116,18 @@ def _read(file: Path, changed: int) -> Library:
     except (pa.ArrowException, OSError, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ValueError(f"{file}: cannot be read as an index ({reason:.120})") from None
-    if not isinstance(about, dict) or about.get("version") != VERSION:
-        version = about.get("version") if isinstance(about, dict) else "none"
+    version = about.get("version") if isinstance(about, dict) else None
+    absent = () if version == VERSION else OLDER.get(version) if isinstance(version, int) else None
+    if absent is None:
+        version = "none" if version is None else version
         raise ValueError(f"{file}: version {version} of an index of assets, allowed: {VERSION}; index the folder again")
-    wanted = _schema()
+    wanted = [column for column in _schema() if column.name not in absent]
     wrong = [f.name for f in wanted if f.name not in table.schema.names or table.schema.field(f.name).type != f.type]
     if wrong:
         raise ValueError(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
     records: dict[str, AssetRecord] = {}
     try:
-        rows = table.select(wanted.names).to_pylist()
+        rows = table.select([column.name for column in wanted]).to_pylist()
     except ValueError as error:  # words that are no UTF-8
         raise ValueError(f"{file}: cannot be read as an index ({error})") from None
     for row in rows:
@@ -134,7 +140,7 @@ def _read(file: Path, changed: int) -> Library:
         if fault:
             raise ValueError(f"{file}: row {len(records) + 1}: {fault}; index the folder again")
         records[record.id] = record
-    return Library(file, records)
+    return Library(file, records, complete=not absent)
 
 
 def _fault(record: AssetRecord) -> str:
@@ -148,9 +154,11 @@ def _fault(record: AssetRecord) -> str:
     for name in ("confidence", "front_confidence"):
         if not 0 <= getattr(record, name) <= 1:
             return f"{name} is {getattr(record, name)}, allowed: 0 to 1"
-    for name in ("supports", "descriptor"):
+    for name in ("supports", "descriptor", "colors"):
         if not all(map(math.isfinite, getattr(record, name))):
             return f"{name} is {getattr(record, name)!s:.60}, allowed: finite numbers"
+    if len(record.colors) % 4 or len(record.colors) > 4 * MOST or min(record.colors[::4], default=0) < 0:
+        return f"colors is {record.colors!s:.60}, allowed: up to {MOST} times share and three numbers"
     if record.category and record.category not in {category.name for category in vocabulary().categories}:
         return f"category is {record.category!r:.60}, allowed: a word of the vocabulary"
     return ""

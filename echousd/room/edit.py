@@ -21,6 +21,7 @@ from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import Draws, best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
+from echousd.room.looks import palette_of_room
 from echousd.room.manifest import FACES, check_seed
 from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
@@ -129,7 +130,8 @@ def edit(
 
     layouts, models, budget = laid_out(given.sizes), given, faces or saved.manifest.get("faces", FACES)
     if fresh and shapes is not None:
-        models = retrieved(graph, layouts[0], styles, shapes, wishes, seed, given, among=fresh)
+        palette = saved.manifest.get("palette") or palette_of_room(saved.manifest["seed"])
+        models = retrieved(graph, layouts[0], styles, shapes, wishes, seed, given, among=fresh, palette=palette)
         layouts = laid_out(models.sizes) if models.sizes != given.sizes else layouts
         notes = (*models.notes, *notes)
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}

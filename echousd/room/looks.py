@@ -13,6 +13,7 @@ import trimesh
 from echomodel.vocabulary import vocabulary
 from echousd.room.finishes.harmonies import HARMONIES, Color, linear, mixed
 from echousd.room.finishes.slots import SECOND, SLOTS
+from echousd.room.styles import ROOM_STYLE
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,11 @@ def palette_for(key: str) -> str:
     """A palette for a style's name, the same in every run."""
     names = sorted(PALETTES)
     return names[int.from_bytes(hashlib.blake2b(key.encode(), digest_size=4).digest(), "big") % len(names)]
+
+
+def palette_of_room(seed: int) -> str:
+    """The palette of a room for which nobody chose one."""
+    return palette_for(f"{ROOM_STYLE} {seed}")
 
 
 @dataclass(frozen=True)

@@ -167,7 +167,10 @@ def generate(
     graph, boxes, notes, more = laid_out(graph)
     left_out = (*left_out, *more)
     near = shape_nearness(graph, boxes, shapes, wishes, seed, echo, steps, timer)
-    models = retrieved(graph, boxes, style_groups(graph), shapes, wishes, seed, given, near, timer=timer)
+    options = options or RoomOptions()
+    models = retrieved(
+        graph, boxes, style_groups(graph), shapes, wishes, seed, given, near, palette=options.palette, timer=timer
+    )
     if models.sizes != sizes:  # real sizes shape the layout
         sizes |= models.sizes
         graph, boxes, notes, more = laid_out(graph)
@@ -188,7 +191,7 @@ def generate(
         graph = with_free_openings(graph, layouts, seed)
     request = ShapeRequest(graph, boxes, styles, seed, echo, steps, faces, timer=timer, retrieved=models)
     made = mixed_shapes(request, shapes)
-    options, floor = options or RoomOptions(), room_floor(graph, layouts)
+    floor = room_floor(graph, layouts)
     own = {name: made.geometry[owner] for name, owner in made.owners.items()}
     geometry = merged(own, options.merge, faces)
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)

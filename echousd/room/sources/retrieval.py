@@ -15,6 +15,8 @@ from echousd.assets.describe import relative
 from echousd.assets.model_file import ModelFile
 from echousd.assets.record import AssetRecord, Vector
 from echousd.graph import SceneGraph
+from echousd.room.finishes.harmonies import HARMONIES, linear
+from echousd.room.looks import palette_of_room
 from echousd.room.originals.loading import is_file, joined, library_file, own_file, own_record, split
 from echousd.room.progress import StageTimer
 from echousd.room.styles import ALIKE, ROOM_STYLE
@@ -141,6 +143,7 @@ def retrieved(
     given: Retrieved,
     nearness: Mapping[str, Mapping[str, float]] | None = None,
     among: Container[str] | None = None,
+    palette: str = "",
     timer: StageTimer | None = None,
 ) -> Retrieved:
     """The models of all objects that come from a library, and the sizes of those that their boxes do not fit.
@@ -148,6 +151,7 @@ def retrieved(
     Arguments:
         boxes: n boxes in the order of the nodes. styles: object name -> style. shapes: the room's source.
         given: what `given_pieces` found. nearness: as for `choose`. among, timer: as for `given_pieces`.
+        palette: harmony of the room, whose colours models shall go with; "" = that which the seed chooses.
     """
     wanted = [
         i
@@ -158,7 +162,10 @@ def retrieved(
         return given
     size = np.asarray(boxes.size, float)
     with (timer or StageTimer()).stage("assets"):
-        found = choose(wishes, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness)
+        tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed)]])
+        found = choose(
+            wishes, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
+        )
         files, sizes = dict(given.files), dict(given.sizes)
         for i in wanted:
             node = graph.nodes[i]
@@ -193,7 +200,8 @@ def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping
             )
             if shares == node.name:
                 heads.append((i, node.name))
-        out.append(Asked(node.name, node.category, style, tuple(map(float, size[i])), shares))  # type: ignore[arg-type]
+        box = (float(size[i][0]), float(size[i][1]), float(size[i][2]))
+        out.append(Asked(node.name, node.category, style, box, shares, f"{style} {node.name}".replace("_", " ")))
     return out
 
 
