@@ -43,7 +43,7 @@ def test_every_measured_word_is_explained():
     rules = rule_set("strict").rules
     assert [name for name, rule in rules.items() if not rule.means] == []
     page = (DOCS / "API.md").read_text("utf-8")
-    assert "| facing | The subject's front looks at the object's centre, to 30 degrees |" in page
+    assert "| facing | The subject's front looks at the object's centre, to 30 degrees, or straight ahead at" in page
     assert "| same_style_as | one style" in page
 
 

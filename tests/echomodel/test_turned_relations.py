@@ -26,6 +26,9 @@ def test_facing():
     assert not kept("facing", (0.0, -2.0), math.radians(31))
     assert kept("looking at", (2.0, 0.0), -math.pi / 2)
     assert not kept("facing", (2.0, 0.0), math.pi / 2)
+    assert kept("facing", (0.45, -0.7), 0.0)  # at the end of a table's side, 33 degrees beside its middle
+    assert not kept("facing", (0.55, -0.7), 0.0)
+    assert not kept("facing", (0.45, 0.7), 0.0)
 
 
 def test_opposite_asks_both():

@@ -29,8 +29,15 @@ def _local(pair: PairGeometry) -> Tensor:
 
 @rule("facing")
 def facing(pair: PairGeometry) -> Tensor:
-    """The subject's front looks at the object's centre, to 30 degrees."""
-    return _faces(pair.yaw_s, -pair.offset[:, [0, 2]])
+    """The subject's front looks at the object's centre, to 30 degrees, or straight ahead at any part of it."""
+    way = -pair.offset[:, [0, 2]]
+    cos, sin = pair.yaw_s.cos(), pair.yaw_s.sin()
+    aside = (cos * way[:, 0] - sin * way[:, 1]).abs()
+    ahead = sin * way[:, 0] + cos * way[:, 1]
+    turn = pair.yaw_o - pair.yaw_s
+    half = pair.footprint_o[0]
+    across = turn.cos().abs() * half[:, 0] + turn.sin().abs() * half[:, 1]
+    return torch.maximum(_faces(pair.yaw_s, way), torch.minimum(across - aside, ahead))
 
 
 @rule("opposite")
