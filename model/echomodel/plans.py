@@ -17,6 +17,7 @@ WAY = 0.9  # metres beside the longest piece
 TUCKED = 0.5  # share of a seat's footprint that counts: the rest is below its table
 # What use takes beside a piece, metres: people pull chairs out by 0.75 m and walk round beds at 0.5 to 0.6 m.
 BEDSIDE, FOOT, PULL, KNEES, VIEW, HANDS = 0.5, 0.5, 0.75, 0.5, 2.1, 0.1
+BEHIND = 0.4  # metres between chairs that are pulled out and a sideboard
 DESK_CHAIR = 0.9  # metres before a desk
 SPREAD = 0.12  # of the logarithm of what is more than needed
 DOOR_AREA = 1.0  # square metres
@@ -205,7 +206,8 @@ def _across(categories: Sequence[str], sizes: Sequence[Sequence[float] | None]) 
         if piece.kind.role == "bed":
             out = max(out, piece.depth + FOOT + 0.4 * bool(storage))
         elif _dines(piece.kind):
-            out = max(out, min(piece.width, piece.depth) + 2 * PULL * (chairs > 1) + storage)
+            behind = BEHIND * bool(storage and chairs > 1)
+            out = max(out, min(piece.width, piece.depth) + 2 * PULL * (chairs > 1) + storage + behind)
         elif piece.kind.role == "sofa":
             screens = [p.depth for p in pieces if p.kind.stands == "opposite"]
             out = max(out, piece.depth + (VIEW + screens[0] if screens else 2 * KNEES + storage))

@@ -100,6 +100,12 @@ FAULTS = [
     (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
     (BEDROOM.moved("wardrobe", at=(0.0, 0.72), yaw=np.pi), ("bed", "bed_foot_free"), "the foot of bed leaves 0.30 m"),
     (SET.moved("chair_1_1", at=(1.05, 0.0), yaw=-HALF), ("table", "chairs_even"), "the chairs of table are uneven"),
+    (
+        BEDROOM.moved("left", at=(-1.45, -1.78)),
+        ("left", "nightstands_alike"),
+        "left stands 0.25 m further from the bed",
+    ),
+    (SET.moved("chair_1_1", at=(0.62, 0.7)), ("table", "chairs_opposite"), "sides of table are staggered by 0.2"),
     (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
     (LIVING.moved("armchair", at=(1.9, -0.3), yaw=HALF), ("armchair", "knees_free"), "m before it, then a wall"),
     (SOFAS.moved("other", yaw=np.pi, at=(0.0, 0.6)), ("stand", "view_free"), "other stands between"),

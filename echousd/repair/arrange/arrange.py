@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from echousd.repair.arrange.costs import least, price, soon_told
-from echousd.repair.arrange.groups import paid_by, seat_evenly, slide_groups
+from echousd.repair.arrange.groups import paid_by, slide_groups
 from echousd.repair.arrange.overlaps import depths
 from echousd.repair.arrange.places import places
+from echousd.repair.arrange.seating import seat_evenly
 from echousd.repair.arrange.setting import Poses, Setting, State
 
 ROUNDS = 4  # orders that are tried

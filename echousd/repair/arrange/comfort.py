@@ -6,10 +6,13 @@ import numpy as np
 
 from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.geometry import depth_inside
 
 UNEVEN = 1.0  # for chairs of a table whose middle lies half a table off its own
-PULLED, AT_WALL = 1.6, 0.9  # for a chair that cannot be pulled out before furniture, before a wall
-PULL, PULL_WALL = 0.4, 0.25  # metres behind a chair
+ODD = 0.9  # half tables by which it may, of an odd number of seats
+PULLED, AT_WALL = 1.6, 1.3  # for a chair that cannot be pulled out before furniture, before a wall
+PULL, PULL_WALL = 0.4, 0.3  # metres behind a chair
+STRIP, FLUSH, PASSED = 0.6, 0.06, 0.4  # for a bed so many metres off the wall beside it: of no use to anybody
 HIDDEN = 2.5  # for something high between a screen and its viewer
 HIGH = 0.65  # metres
 BESIDE = 0.2  # metres beside the line of sight
@@ -32,7 +35,22 @@ def uncomfortable(
         out = out + _uneven(setting, state, i, poses)
     if setting.stances[i] == "at":
         out = out + _uneven(setting, state, i, poses) + _boxed_in(setting, state, i, poses, others)
+    if setting.kinds[i].role == "bed":
+        out = out + STRIP * _strips(setting, i, poses)
     return out + _hiding(setting, state, i, poses)
+
+
+def _strips(setting: Setting, i: int, poses: Poses) -> np.ndarray:
+    """(K,): at how many sides of a bed a strip is left to the wall that is too narrow to get in by."""
+    side = np.stack([np.cos(poses.yaw), -np.sin(poses.yaw)], -1)
+    out = np.zeros(len(poses))
+    for sign in (-1.0, 1.0):
+        near, far = (
+            depth_inside(setting.floor, poses.position[:, [0, 2]] + sign * (setting.size[i, 0] / 2 + away) * side) > 0
+            for away in (FLUSH, PASSED)
+        )
+        out += near & ~far
+    return out
 
 
 def _uneven(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
@@ -46,7 +64,9 @@ def _uneven(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     own = _local(state.position[table], float(state.yaw[table]), poses.position) / half
     there = _local(state.position[table], float(state.yaw[table]), state.position[mates]).reshape(-1, 2) / half
     places = setting.sitting
-    return UNEVEN * np.abs(own * places[i] + (there * places[mates, None]).sum(0)).sum(1)
+    odd = places[(setting.anchor == table) & setting.seats].sum() % 2  # one sits alone
+    middle = np.abs(own * places[i] + (there * places[mates, None]).sum(0))
+    return UNEVEN * (middle - ODD * odd).clip(min=0.0).sum(1)
 
 
 def _local(position: np.ndarray, yaw: float, points: np.ndarray) -> np.ndarray:

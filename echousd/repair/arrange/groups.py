@@ -1,16 +1,14 @@
-"""Whole groups move: a sofa with its table slides along its wall, chairs are dealt evenly around their table."""
+"""Whole groups move: a sofa with its table slides along its wall, a table with its chairs both ways."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
+from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.costs import price
-from echousd.repair.arrange.places import at_anchor
 from echousd.repair.arrange.setting import Poses, Setting, State
 
 SLIDES = np.array([-1.6, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6])  # metres
-EVEN = 0.11  # places at a table that cost more are makeshift
 GAIN = 0.05  # that a slide must save
 AT_WALL = 0.15  # metres: what stands so near a wall slides along it
 
@@ -27,34 +25,6 @@ def paid_by(setting: Setting, state: State, i: int, own: np.ndarray) -> float:
     return state.bills[key]
 
 
-def seat_evenly(setting: Setting, state: State, own: np.ndarray) -> None:
-    """Deal the chairs of every table to its own even places at once, where that costs less; `state` is changed.
-
-    Arguments:
-        state: all boxes placed. own: (n,) float, as `paid_by`; those of dealt chairs are changed.
-    """
-    for table in np.flatnonzero(setting.laid).tolist():
-        seats = np.array([stance == "at" for stance in setting.stances]) & (setting.anchor == table)
-        chairs = np.flatnonzero(seats & ~setting.fixed & ~setting.turned)
-        if len(chairs) < 2 or len(chairs) < seats.sum() or not setting.standing(table):
-            continue
-        before = sum(paid_by(setting, state, int(i), own) for i in chairs)
-        if before < GAIN * len(chairs):
-            continue
-        kept = state.position[chairs].copy(), state.yaw[chairs].copy(), own[chairs].copy()
-        state.placed[chairs] = False
-        first = at_anchor(setting, state, int(chairs[0]), table)
-        places = Poses.of([row for row in first if row[3] <= EVEN], float(state.position[chairs[0], 1]))
-        if len(places) >= len(chairs):
-            cost = np.stack([price(setting, state, int(i), places) for i in chairs])
-            rows, slots = linear_sum_assignment(cost)
-            state.position[chairs[rows]], state.yaw[chairs[rows]] = places.position[slots], places.yaw[slots]
-            own[chairs[rows]] = places.price[slots]
-        state.placed[chairs] = True
-        if sum(paid_by(setting, state, int(i), own) for i in chairs) > before - GAIN:
-            state.position[chairs], state.yaw[chairs], own[chairs] = kept
-
-
 def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
     """Slide every group as one to where its members pay least together; `state` is changed.
 
@@ -69,16 +39,16 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
         if before < GAIN:
             continue
         for way in _ways(setting, state, root):
-            shift = _best_slide(setting, state, members, own, way)
-            if not shift.any():
-                continue
-            kept = state.position[members].copy()
-            state.position[members] += shift
-            after = sum(paid_by(setting, state, int(i), own) for i in members)
-            if after < before - GAIN:
-                before = after
-            else:
-                state.position[members] = kept
+            for shift in (_best_slide(setting, state, members, own, way), _mirror_slide(setting, state, members, way)):
+                if not shift.any():
+                    continue
+                kept = state.position[members].copy()
+                state.position[members] += shift
+                after = sum(paid_by(setting, state, int(i), own) for i in members)
+                if after < before - GAIN:
+                    before = after
+                else:
+                    state.position[members] = kept
 
 
 def _ways(setting: Setting, state: State, root: int) -> list[np.ndarray]:
@@ -103,3 +73,13 @@ def _best_slide(setting: Setting, state: State, members: np.ndarray, own: np.nda
         total += price(setting, state, i, poses)
     state.placed[members] = True
     return SLIDES[int(total.argmin())] * way
+
+
+def _mirror_slide(setting: Setting, state: State, members: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """(3,) float: the slide along a way that brings two members which mirror each other to the room's middle."""
+    mirrors = vocabulary().predicate_id("symmetrical_to")
+    told = setting.triplets[setting.triplets[:, 1] == mirrors][:, [0, 2]]
+    for pair in told[np.isin(told, members).all(1)]:
+        away = setting.centre - state.position[pair][:, [0, 2]].mean(0)
+        return float(away @ way[[0, 2]]) * way
+    return np.zeros(3)

@@ -158,10 +158,11 @@ def stance(setting: Setting, i: int, anchor: int) -> str:
 
 def at_anchor(setting: Setting, state: State, i: int, anchor: int) -> list[Row]:
     """The slots of box i at its anchor as it stands now."""
-    return [_out_of(state.position[anchor], float(state.yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
+    return [out_of(state.position[anchor], float(state.yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
 
 
-def _out_of(position: np.ndarray, yaw: float, slot: Slot) -> Row:
+def out_of(position: np.ndarray, yaw: float, slot: Slot) -> Row:
+    """Where a slot of something at a position (3,) lies in the room."""
     lateral, forward, turn, price = slot
     c, s = math.cos(yaw), math.sin(yaw)
     x, z = position[0] + c * lateral + s * forward, position[2] - s * lateral + c * forward

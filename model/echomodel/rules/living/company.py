@@ -14,6 +14,7 @@ from echomodel.rules.living.plan import FAR, Plan
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
 PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
 ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
+STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite, where both sides have as many
 AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
@@ -44,6 +45,28 @@ def chairs_even(plan: Plan) -> Found:
     odd = (n % 2)[:, None] * (ODD * plan.size[who][:, [0, 2]] + 0.3) / n[:, None]
     margin, axis = (EVEN + odd - shift).min(1)
     return found(who, margin, measure=shift.gather(1, axis[:, None])[:, 0])
+
+
+def chairs_opposite(plan: Plan) -> Found:
+    """Where both sides of a table have as many chairs, each has another one opposite."""
+    i, j = plan.attended("at", "foot")
+    tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
+    keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
+    i, j = i[keep], j[keep]
+    lateral, forward = plan.local(i, j)
+    half = plan.size[j][:, [0, 2]].detach() / 2
+    ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
+    along, across = torch.where(ahead, lateral, forward), torch.where(ahead, forward, lateral)
+    side = 4 * j + 2 * ahead + (across > 0)
+    same = side[:, None] == side[None]
+    order = torch.arange(len(i))
+    before = (along[None] < along[:, None]) | ((along[None] == along[:, None]) & (order < order[:, None]))
+    rank, count = (same & before).sum(1), same.sum(1)
+    faced = (side[:, None] == (side ^ 1)[None]) & (rank[:, None] == rank[None]) & (count[:, None] == count[None])
+    one, other = faced.nonzero(as_tuple=True)
+    least, _ = worst(j[one], STAGGERED - (along[one] - along[other]).abs(), i[one], len(plan), FAR)
+    who = j[one].unique()
+    return found(who, least[who], measure=STAGGERED - least[who])
 
 
 def sofas_in_circle(plan: Plan) -> Found:

@@ -15,7 +15,7 @@ APART = {
     ("seat", "seat"): 0.06, ("seat", "storage"): 0.12, ("bed", "seat"): 0.05, ("bed", "sofa"): 0.12,
     ("bed", "bed"): 0.15,
 }  # fmt: skip
-PULL, PULL_WALL = 0.22, 0.08  # metres behind a chair, before furniture and before a wall
+PULL, PULL_WALL = 0.22, 0.1  # metres behind a chair, before furniture and before a wall
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
 LAMP = 0.35  # metres before a front that lamps and plants keep free

@@ -18,6 +18,7 @@ COMPANY = 2.5  # metres: an armchair further away stands for itself
 REACH = 0.6  # metres between a seat's front and its table: 99 % of real dining chairs are nearer
 BEFORE = (0.12, 1.0)  # metres between a sofa and its coffee table: less than 0.3 is tight, a hand is too little
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
+PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may differ: 98 % of real ones differ less
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
 HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
 TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as their bed
@@ -85,6 +86,23 @@ def nightstand_at_head(plan: Plan) -> Found:
     keep = rank < 2
     measure = torch.stack([beside, beside, back.abs(), torch.rad2deg(off)], -1)
     return _first_of(i[keep], j[keep], margin[keep], measure[keep])
+
+
+def nightstands_alike(plan: Plan) -> Found:
+    """The nightstands at both sides of a bed are as far from it as each other."""
+    i, j = plan.attended("head")
+    lateral, forward = plan.local(i, j)
+    half_width, half_depth = plan.reach(i, j)
+    beside = lateral.abs() - half_width - plan.size[j, 0] / 2
+    at_head = ((forward - half_depth + plan.size[j, 2] / 2).abs() < HEAD) & (beside < BESIDE) & (beside > -IN_BED)
+    right = lateral > 0
+    pairs = (j[:, None] == j[None]) & (at_head & right)[:, None] & (at_head & ~right)[None]
+    one, other = pairs.nonzero(as_tuple=True)
+    apart = (beside[one] - beside[other]).abs()
+    swap = (beside[one] < beside[other]).detach()
+    return found(
+        torch.where(swap, i[other], i[one]), PAIR - apart, other=torch.where(swap, i[one], i[other]), measure=apart
+    )
 
 
 def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:

@@ -1,0 +1,49 @@
+"""Tables are laid by plans: even sides, chairs opposite each other, benches with a side of their own."""
+
+import numpy as np
+import pytest
+
+from echousd.repair import repair_boxes
+from echousd.repair.arrange.seating import plans
+
+FLOOR = np.array([(-2.5, -2.5), (2.5, -2.5), (2.5, 2.5), (-2.5, 2.5)])
+CLOSE, FACING = 5, 16
+
+
+def laid(kinds, *, seed=0, told=()):
+    """A dining table with seats that were drawn anywhere, repaired; positions relative to the table's, turned to it."""
+    rng = np.random.default_rng(seed)
+    size = np.array([(1.6, 0.75, 0.9), *((1.2, 0.45, 0.4) if k == "bench" else (0.5, 0.9, 0.5) for k in kinds)])
+    position = np.array([(0.0, 0.0, 0.0), *((x, 0.0, z) for x, z in rng.uniform(-1.5, 1.5, (len(kinds), 2)))])
+    done = repair_boxes(
+        ["dining_table", *kinds], size, position, np.zeros(len(size)), np.array(told, int).reshape(-1, 3),
+        floor_polygon=FLOOR, height=2.6,
+    )  # fmt: skip
+    away = (done.position[1:] - done.position[0])[:, [0, 2]]
+    c, s = np.cos(done.yaw[0]), np.sin(done.yaw[0])
+    return np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], -1), done
+
+
+def test_plans_fill_sides_before_ends_and_leave_benches_alone():
+    assert plans(4, 0, 2, 1)[0].chairs == (2, 2, 0, 0)
+    assert plans(6, 0, 2, 1)[0].chairs == (2, 2, 1, 1)
+    assert {plan.chairs for plan in plans(2, 1, 2, 1)[:2]} == {(0, 2, 0, 0), (2, 0, 0, 0)}
+    assert all(plan.chairs[plan.benches[0]] == 0 for plan in plans(3, 1, 2, 1))
+    assert plans(9, 0, 2, 1) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_four_chairs_sit_opposite_each_other(seed):
+    told = [row for i in range(1, 5) for row in ((i, CLOSE, 0), (i, FACING, 0))]
+    seats, done = laid(["dining_chair"] * 4, seed=seed, told=told)
+    assert (done.verdict == 1).all()
+    for sign in (-1, 1):
+        assert (sign * seats[:, 1] > 0.4).sum() == 2
+    left, right = (np.sort(seats[sign * seats[:, 1] > 0, 0]) for sign in (-1, 1))
+    assert np.abs(left - right).max() < 0.12
+
+
+def test_a_bench_has_a_side_of_its_own():
+    seats, _ = laid(["bench", "dining_chair", "dining_chair"], told=[(1, CLOSE, 0), (2, CLOSE, 0), (3, CLOSE, 0)])
+    assert abs(seats[0, 0]) < 0.12
+    assert (seats[1:, 1] * seats[0, 1] < 0).all()
