@@ -13,7 +13,7 @@ import numpy as np
 from echousd.repair.arrange.costs import least, price, soon_told
 from echousd.repair.arrange.groups import paid_by, slide_groups
 from echousd.repair.arrange.overlaps import depths
-from echousd.repair.arrange.places import places
+from echousd.repair.arrange.places import expect_followers, places
 from echousd.repair.arrange.seating import seat_evenly
 from echousd.repair.arrange.setting import Poses, Setting, State
 
@@ -24,6 +24,7 @@ BLOCK, FEW = 64, 24  # poses that are looked at together at first, and those tha
 HAIR = 1e-9  # of rounding in sums of the same costs in another order
 CLOSE = 0.5  # metres: what is so near is in the way
 BAD = 1.8  # a piece that pays more comes earlier in the next round
+SCREEN = 0.3  # of what a screen stands on: right after its sofa or bed, before all that keeps out of the view
 FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
 
 
@@ -95,7 +96,7 @@ def _rank(setting: Setting, i: int) -> float:
     if setting.fixed[i]:
         return -100.0
     kind = setting.kinds[i]
-    rank = (2.0 if setting.stances[i] == "opposite" else FIRST.get(kind.role, 6.0)) - 0.3 * min(
+    rank = (SCREEN if setting.stances[i] == "opposite" else FIRST.get(kind.role, 6.0)) - 0.3 * min(
         float(setting.size[i, 0] * setting.size[i, 2]), 3.0
     )
     steps, at = 0, i
@@ -115,6 +116,7 @@ def _built(
     order = np.array(_anchors_first(setting, order), int)
     for i in order:
         own[i], _ = _put(setting, state, int(i))
+        expect_followers(setting, state, int(i))
     attended = set(setting.anchor.tolist()) | set(setting.carrier.tolist())
     for _ in range(SWEEPS):  # what others attend stays: they would not follow
         for i in order:

@@ -13,9 +13,9 @@ ODD = 0.9  # half tables by which it may, of an odd number of seats
 PULLED, AT_WALL = 1.6, 1.3  # for a chair that cannot be pulled out before furniture, before a wall
 PULL, PULL_WALL = 0.4, 0.3  # metres behind a chair
 STRIP, FLUSH, PASSED = 0.6, 0.06, 0.4  # for a bed so many metres off the wall beside it: of no use to anybody
-HIDDEN = 2.5  # for something high between a screen and its viewer
+HIDDEN = 3.5  # for something high between a screen and its viewer
 HIGH = 0.65  # metres
-BESIDE = 0.2  # metres beside the line of sight
+BESIDE = 0.3  # metres beside the line of sight
 ON_SIGHT = np.linspace(0.15, 0.85, 7)[:, None]  # places on the line of sight
 SOLID = ("sofa", "board", "bed", "storage")
 

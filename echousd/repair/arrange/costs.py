@@ -20,12 +20,13 @@ GRAZE = 0.01  # metres
 PULL, TURN = 0.35, 0.25  # per metre from the draft, and for looking the other way than the draft
 FOLLOWS = 0.3  # share of that pull of chairs at their table: they go where it goes
 FARTHEST = 4.0  # metres that the pull counts
-UNPLACED = 0.15  # weight of relations to what is not placed yet, whose draft counts
+UNPLACED, GUESSED = 0.15, 0.4  # weight of relations to what is not placed yet: as drafted, at what it attends
 BLOCKED = 3.0  # for a front that cannot be opened
 ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regretted
 CROWDED = 0.7  # for a chair in the way of a front
 SEATED, ENDS = 0.75, 4  # metres from a table to behind its chairs; more chairs than that sit at its ends, too
-ELBOWS, ELBOW = 1.0, 0.2  # for an armchair so many metres before its own sofa's seat
+ELBOWS, ELBOW = 1.5, 0.2  # for a seat or lamp so many metres before a seat of its own group
+TABLES = ("before", "foot", "near", "opposite", "at")  # stances of what may stand before a seat of its group
 FOOT = 0.4  # metres at the foot of a bed
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
 GLARE = 0.2  # metres of a stand before a window
@@ -84,7 +85,7 @@ def soon_told(setting: Setting, state: State, i: int, poses: Poses, bound: np.nd
     floor = bound + hit + left
     if aside.shape[1]:
         _, other, sides = setting.told[i]
-        weight = np.where(state.placed[other[sides]], 1.0, UNPLACED)
+        weight = _weight(setting, state, i, other[sides])
         floor = floor + ((BROKEN * (aside > SLACK) + FAR * aside) * weight).sum(1)
     return Known(others, depth, bound, hit, left, aside, floor)
 
@@ -124,9 +125,9 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
     out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
-    if setting.stances[i] == "company":  # of its own sofa an armchair leaves the knees free
-        sofas = [j for j in others if setting.at_home[i, j] and setting.kinds[j].role == "sofa"]
-        zones = fronts(setting, state, sofas)
+    circle = [j for j in others if setting.at_home[i, j] and setting.stances[j] not in TABLES]
+    if setting.stances[i] not in TABLES:  # of its own group's seats it leaves the knees free
+        zones = fronts(setting, state, [j for j in circle if setting.kinds[j].role in ("sofa", "seat")])
         deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
         out = out + ELBOWS * (deep > ELBOW).sum(1)
     front = own_front(setting, i)
@@ -134,6 +135,9 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
         return out
     size, forward = front
     ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
+    if setting.kinds[i].role in ("sofa", "seat"):
+        deep = depths(size, ahead, setting.size[circle], state.position[circle], state.yaw[circle])
+        out = out + ELBOWS * (deep > ELBOW).sum(1)
     solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
     solid = [j for j in solid if not setting.at_home[i, j]]
     depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])
@@ -221,7 +225,7 @@ def _aside(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     if not sides.any():
         return np.zeros((len(poses), 0))
     other = other[sides]
-    where = np.where(state.placed[other, None], state.position[other], setting.draft[other])
+    where = state.position[other]
     asked = setting.order[other, i]
     along = (poses.position[:, None, [0, 2]] - where[:, [0, 2]]) * asked
     return np.where(asked != 0, APART + SLACK - along, 0.0).max(2).clip(min=0)
@@ -233,12 +237,19 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
     count = len(poses)
     if not len(told):
         return np.zeros(count)
-    weight = np.where(state.placed[other], 1.0, UNPLACED)
+    weight = _weight(setting, state, i, other)
     missed = np.zeros((count, len(told)))
     missed[:, sides] = aside
     if (~sides).any():
         missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides])
     return ((BROKEN * (missed > SLACK) + FAR * missed) * weight).sum(1)
+
+
+def _weight(setting: Setting, state: State, i: int, other: np.ndarray) -> np.ndarray:
+    """(r,) float: how much relations of box i count, by what is at their other ends; what attends it will follow it."""
+    anchor = setting.anchor[other]
+    guess = np.where((anchor >= 0) & state.placed[anchor], GUESSED, UNPLACED)
+    return np.where(state.placed[other], 1.0, np.where(anchor == i, 0.0, guess))
 
 
 def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
@@ -248,11 +259,10 @@ def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarr
         involved = [one.subject, *one.others]
         if i not in involved:
             continue
-        position = np.where(state.placed[:, None], state.position, setting.draft)
-        yaw = np.where(state.placed, state.yaw, setting.heading)
         margin = placement_margins_at(
-            one, i, (poses.position, poses.yaw), setting.surroundings, setting.categories, setting.size, position, yaw
-        )
+            one, i, (poses.position, poses.yaw), setting.surroundings, setting.categories, setting.size,
+            state.position, state.yaw,
+        )  # fmt: skip
         missed = np.maximum(SLACK - margin, 0.0)
         weight = 1.0 if all(state.placed[k] for k in involved if k != i) else UNPLACED
         out = out + weight * (BROKEN * (missed > SLACK) + FAR * missed)
@@ -260,13 +270,11 @@ def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarr
 
 
 def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray) -> np.ndarray:
-    """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose, the others placed or drafted."""
-    where = np.where(state.placed[:, None], state.position, setting.draft)
+    """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose, the others as they are so far."""
     count, n = len(poses), len(setting.size)
     every = np.concatenate([np.arange(n), np.full(count, i)])
-    heading = np.where(state.placed, state.yaw, setting.heading)
-    position = np.concatenate([where, poses.position])
-    yaw = np.concatenate([heading, poses.yaw])
+    position = np.concatenate([state.position, poses.position])
+    yaw = np.concatenate([state.yaw, poses.yaw])
     rows = np.empty((count, *told.shape), told.dtype)
     rows[:] = told
     rows[:, (told == i) & [True, False, True]] = n + np.arange(count)[:, None]

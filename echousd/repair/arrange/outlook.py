@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.places import slots_at, stance, wrapped
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.slots import Slot
@@ -16,7 +17,13 @@ MISSING = 1.6  # for each place that those who attend a piece would not find
 UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
 BESIDE = 0.8  # share of its half extent that a place lies off the piece's middle, to be on a side of it
 ELBOW = 0.3  # metres behind a chair, to pull it out
-VIEW = 1.1  # per metre that a television is beside the line of sight
+VIEW = 1.1  # per metre that a screen is beside the line of sight
+OFF_AXIS, ASIDE = 0.4, 1.5  # tangent of the angle from which on a screen is off its viewer's axis, and for that
+NEAR, FAR = 1.6, 4.3  # metres between a screen and its viewer
+RANGE, OUT_OF_RANGE = 4.9, 2.0  # metres from which on nobody watches, and for that
+SHIFTS = (0.0, -0.4, 0.4)  # metres beside the axis at which a place for a screen is looked for
+BLOCKED = 2.0  # for such a place that a door, furniture or a corner takes
+TURNED_AWAY, BACK = math.cos(math.radians(115.0)), 1.8  # for a seat that turns the back on its group's screen
 
 
 def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
@@ -86,14 +93,20 @@ def _distinct(slots: Sequence[Slot], apart: float) -> list[tuple[float, float]]:
 
 
 def unseen(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
-    """(K,): what it costs a television not to be opposite a seat or bed, and a viewer not to be opposite it."""
+    """(K,): what it costs a screen not to be before its sofa or bed, these not to have a place for it before them, and
+    others who sit there to turn the back on it."""
     out = np.zeros(len(poses))
     anchor = int(setting.anchor[i])
     if anchor >= 0 and state.placed[anchor] and stance(setting, i, anchor) == "opposite":
         out += _view(poses.position, poses.yaw, state.position[anchor], state.yaw[anchor])
-    for j in np.flatnonzero((setting.anchor == i) & state.placed):
-        if stance(setting, int(j), i) == "opposite":
-            out += _view(state.position[j], state.yaw[j], poses.position, poses.yaw)
+    if setting.stances[i] in ("company", "with") and setting.kinds[i].front:
+        out += _behind(setting, state, i, poses)
+    for j in np.flatnonzero(setting.anchor == i).tolist():
+        if stance(setting, j, i) == "opposite":
+            if state.placed[j]:
+                out += _view(state.position[j], state.yaw[j], poses.position, poses.yaw)
+            elif setting.standing(j):
+                out += _no_place(setting, state, i, j, poses)
     return out
 
 
@@ -102,5 +115,58 @@ def _view(screen: np.ndarray, screen_yaw: np.ndarray, seat: np.ndarray, seat_yaw
     lateral = np.abs(np.cos(seat_yaw) * away[..., 0] - np.sin(seat_yaw) * away[..., 1])
     forward = np.sin(seat_yaw) * away[..., 0] + np.cos(seat_yaw) * away[..., 1]
     facing = np.abs(wrapped(np.asarray(screen_yaw - seat_yaw - math.pi)))
-    far = np.maximum(forward - 4.5, 0) + 2 * np.maximum(1.6 - forward, 0)
-    return VIEW * np.minimum(lateral, 3.0) + np.minimum(1.6 * facing, 3.0) + 0.6 * np.minimum(far, 4.0)
+    aside = ASIDE * (lateral > OFF_AXIS * forward)
+    return VIEW * np.minimum(lateral, 3.0) + np.minimum(1.6 * facing, 3.0) + aside + _far(forward)
+
+
+def _far(forward: np.ndarray) -> np.ndarray:
+    """What it costs that so many metres lie between a screen and its viewer."""
+    far = np.maximum(forward - FAR, 0) + 2 * np.maximum(NEAR - forward, 0)
+    return 0.6 * np.minimum(far, 4.0) + OUT_OF_RANGE * (forward > RANGE)
+
+
+def _behind(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,): the price of turning the back on the screen that one's group watches."""
+    out = np.zeros(len(poses))
+    for k in np.flatnonzero(state.placed & (setting.group == setting.group[i])).tolist():
+        if setting.stances[k] != "opposite":
+            continue
+        away = (state.position[k] - poses.position)[:, [0, 2]]
+        forward = np.sin(poses.yaw) * away[:, 0] + np.cos(poses.yaw) * away[:, 1]
+        out += BACK * (forward < TURNED_AWAY * np.linalg.norm(away, axis=1))
+    return out
+
+
+def _no_place(setting: Setting, state: State, i: int, screen: int, poses: Poses) -> np.ndarray:
+    """(K,): what the best place at the wall before each pose would cost a screen that is not placed yet."""
+    width, height, depth = setting.size[screen]
+    front = np.stack([np.sin(poses.yaw), np.cos(poses.yaw)], -1)
+    side = np.stack([np.cos(poses.yaw), -np.sin(poses.yaw)], -1)
+    others = [j for j in np.flatnonzero(state.placed).tolist() if j != i and setting.standing(j)]
+    best = np.full(len(poses), np.inf)
+    for lateral in SHIFTS:
+        from_ = poses.position[:, [0, 2]] + lateral * side
+        forward = _to_wall(setting, from_, front) - depth / 2 - 0.02
+        at = from_ + forward[:, None] * front
+        there = Poses(np.stack([at[:, 0], np.zeros(len(at)), at[:, 1]], -1), poses.yaw + math.pi, poses.price)
+        size, doors, light = np.array([width, height, depth]), setting.doors, setting.windows
+        cost = (depths(size, there, doors.size, doors.position, doors.yaw) > 0.04).any(1) * BLOCKED
+        cost += (depths(size, there, light.size, light.position, light.yaw) > 0.2) @ light.price
+        hit = depths(size, there, setting.size[others], state.position[others], state.yaw[others]) > 0.01
+        cost += BLOCKED * (hit.any(1) | (beyond(setting, size, there) > 0.05))
+        best = np.minimum(best, cost + VIEW * abs(lateral) + _far(forward))
+    return best
+
+
+def _to_wall(setting: Setting, start: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """(K,) float: metres from points (K, 2) along directions (K, 2) to the first wall."""
+    out = np.full(len(start), 30.0)
+    for corner, along, length, _ in setting.walls:
+        normal = np.array([-along[1], along[0]])
+        speed, away = front @ normal, (corner - start) @ normal
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = away / speed
+        at = (start + np.nan_to_num(reach)[:, None] * front - corner) @ along
+        met = (np.abs(speed) > 1e-6) & (reach > 0) & (at > -1e-6) & (at < length + 1e-6)
+        out = np.where(met, np.minimum(out, reach), out)
+    return out

@@ -22,7 +22,7 @@ LONELY = 2.5  # for a piece that does not stand at what it attends though that i
 HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
 WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
-TOO_FAR, NEARER = 4.6, 0.7  # metres from which on a sofa leaves its wall for that, and what it gains per metre
+TOO_FAR, IN_THE_ROOM = 4.6, 0.2  # metres from which on a sofa may leave its wall for that, and what that costs
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -48,7 +48,7 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     elif kind.wall or (kind.role == "board" and kind.access > 0):
         rows += along_walls(setting, i, lonely)
         if kind.role == "sofa":
-            rows += in_the_open(setting, i, 4.5 + lonely) + _in_view(setting, i)
+            rows += in_the_open(setting, i, 4.5 + lonely) + _in_view(setting, i, rows)
     elif kind.stands == "company":  # an armchair by itself looks into the room from its edge
         rows += [(*row[:3], row[3] + lonely) for row in nooks(setting, i)] + along_walls(setting, i, 0.2 + lonely)
         rows += in_the_open(setting, i, 2.5 + lonely)
@@ -89,8 +89,7 @@ def as_stated(setting: Setting, state: State, i: int) -> list[Row]:
 
 def midway(setting: Setting, state: State, i: int, others: Sequence[int]) -> list[Row]:
     """On the line between the centres of two others and a little beside it, turned as either of them."""
-    at = np.where(state.placed[:, None], state.position, setting.draft)[list(others)][:, [0, 2]]
-    turn = np.where(state.placed, state.yaw, setting.heading)[list(others)]
+    at, turn = state.position[list(others)][:, [0, 2]], state.yaw[list(others)]
     way = at[1] - at[0]
     aside = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
     return [
@@ -114,8 +113,7 @@ def as_drawn(setting: Setting, i: int, draft: tuple[float, float], price: float)
 def _height(setting: Setting, state: State, i: int) -> float:
     carrier = int(setting.carrier[i])
     if carrier >= 0:
-        at = state.position if state.placed[carrier] else setting.draft
-        return float(at[carrier, 1] + setting.size[carrier, 1])
+        return float(state.position[carrier, 1] + setting.size[carrier, 1])
     if carrier == ON_CEILING:
         return setting.height - float(setting.size[i, 1])
     return float(setting.draft[i, 1]) if not setting.standing(i) else 0.0
@@ -161,6 +159,18 @@ def at_anchor(setting: Setting, state: State, i: int, anchor: int) -> list[Row]:
     return [out_of(state.position[anchor], float(state.yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
 
 
+def expect_followers(setting: Setting, state: State, i: int) -> None:
+    """Move what attends box i and is not placed yet to its best slot there, for others to reckon with (in `state`)."""
+    for j in np.flatnonzero((setting.anchor == i) & ~state.placed).tolist():
+        slots = slots_at(setting, j, i) if j != i else []
+        if slots and setting.standing(j):
+            best = min(slots, key=lambda slot: slot[3])
+            state.position[j, 0], state.position[j, 2], state.yaw[j], _ = out_of(
+                state.position[i], float(state.yaw[i]), best
+            )
+            expect_followers(setting, state, j)
+
+
 def out_of(position: np.ndarray, yaw: float, slot: Slot) -> Row:
     """Where a slot of something at a position (3,) lies in the room."""
     lateral, forward, turn, price = slot
@@ -204,19 +214,19 @@ def corners(setting: Setting, i: int, price: float) -> list[Row]:
     return rows
 
 
-def _in_view(setting: Setting, i: int) -> list[Row]:
+def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
     """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
     if not any(stance == "opposite" and a == i for stance, a in zip(setting.stances, setting.anchor, strict=True)):
         return []
     out = []
-    for x, z, yaw, price in along_walls(setting, i, 0.0):
+    for x, z, yaw, price in at_walls:
         front = np.array([math.sin(yaw), math.cos(yaw)])
         steps = np.array([x, z]) + AHEAD[:, None] * front
         inside = depth_inside(setting.floor, steps) > 0
         ahead = float(AHEAD[-1] if inside.all() else AHEAD[inside.argmin()])
         if ahead > max(TOO_FAR, WATCHED + PASSAGE):
-            (dx, dz), gain = ((ahead - WATCHED) * front).tolist(), NEARER * (ahead - TOO_FAR)
-            out.append((x + dx, z + dz, yaw, price - gain))
+            dx, dz = ((ahead - WATCHED) * front).tolist()
+            out.append((x + dx, z + dz, yaw, price + IN_THE_ROOM))
     return out
 
 

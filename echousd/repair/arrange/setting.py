@@ -276,7 +276,7 @@ class State:
     """Where the boxes stand so far.
 
     Arguments:
-        position: (n, 3) float, yaw: (n,) float, placed: (n,) bool.
+        position: (n, 3) float, yaw: (n,) float; placed: (n,) bool, others stand where they are expected.
         regrets: box -> poses that led to a bad end in earlier rounds: x, z, yaw and what that cost.
         bills, zones: what was computed for states and poses before (`groups.paid_by`, `costs.fronts`).
     """

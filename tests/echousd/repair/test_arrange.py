@@ -181,3 +181,35 @@ def test_a_second_sofa_leaves_the_view_to_the_screen_that_the_first_is_told_to_w
     position, _ = arranged(words, size, drawn, [0, np.pi, 0, np.pi], [(3, ID["opposite"], 0)])
     sight = position[0] + np.linspace(0, 1, 40)[:, None] * (position[3] - position[0])
     assert np.abs(sight - position[1])[:, [0, 2]].max(1).min() > 0.45
+
+
+def hall(words, size, position, yaw, told):
+    """Furniture of a hall of 9 by 7 metres, repaired, and its living faults."""
+    floor = np.array([(-4.5, -3.5), (4.5, -3.5), (4.5, 3.5), (-4.5, 3.5)])
+    triplets = np.array([(a, ID[word], b) for a, word, b in told])
+    done = repair_boxes(words, np.array(size), np.array(position), np.array(yaw), triplets, floor_polygon=floor)
+    return done, [fault.rule for fault in faults(done, words, floor, (), triplets)]
+
+
+def test_in_a_hall_the_sofa_comes_to_its_screen_and_its_table_with_it():
+    done, wrong = hall(
+        ["multi_seat_sofa", "coffee_table", "tv_stand"],
+        [(2.2, 0.85, 0.9), (1.1, 0.4, 0.6), (1.8, 0.5, 0.4)],
+        [(-4.0, 0.0, 1.0), (-2.9, 0.0, 1.0), (4.2, 0.0, -0.9)],
+        [np.pi / 2, np.pi / 2, -np.pi / 2],
+        [(1, "front", 0), (2, "opposite", 0)],
+    )
+    assert wrong == []
+    assert (done.verdict == 1).all()
+    assert np.linalg.norm(done.position[2] - done.position[0]) < 4.5
+
+
+def test_an_armchair_does_not_turn_its_back_on_the_screen():
+    _, wrong = hall(
+        ["multi_seat_sofa", "coffee_table", "tv_stand", "armchair"],
+        [(2.2, 0.85, 0.9), (1.1, 0.4, 0.6), (1.8, 0.5, 0.4), (0.8, 0.8, 0.8)],
+        [(0.0, 0.0, -3.0), (0.0, 0.0, -1.9), (0.0, 0.0, 0.4), (0.6, 0.0, -0.8)],
+        [0.0, 0.0, np.pi, np.pi],
+        [(1, "close_by", 0), (2, "opposite", 0), (3, "close_by", 1)],
+    )
+    assert wrong == []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import torch
-from torch import Tensor
 
 from echomodel.floors import known, signed_distance
 from echomodel.rules.living.found import Found, found, worst
@@ -24,8 +23,6 @@ SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
-VIEW_STEPS = 9
-VIEW_HEIGHT = 0.65  # metres: one looks over what is lower
 
 
 def chairs_even(plan: Plan) -> Found:
@@ -113,32 +110,3 @@ def not_alone(plan: Plan) -> Found:
     wall = torch.where(known(floor), wall, 0.0 * wall)
     away = torch.where(loner[who], wall - (EDGE - ALONE), torch.minimum(gap[who], wall))
     return found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
-
-
-def view_free(plan: Plan) -> Found:
-    """Nothing high stands between a screen and the sofa or bed that it is watched from."""
-    i, j = plan.attended("opposite")
-    high = plan.standing & (plan.position[:, 1] + plan.size[:, 1] > VIEW_HEIGHT).detach()
-    who, block = plan.pairs(_mask(i, len(plan)), high)
-    watched = plan.anchor[who]
-    company = (plan.anchor[block] == watched) & ~plan.stands("with")[block]  # they stand at its sides
-    keep = (block != watched) & ~company & ~plan.which(lambda kind: kind.access == 0.3)[block]
-    who, block, watched = who[keep], block[keep], watched[keep]
-    if not len(who):
-        return found(i, torch.full_like(plan.size[i, 0], FAR), other=j)
-    share = torch.linspace(0.15, 0.85, VIEW_STEPS, dtype=plan.size.dtype)[:, None, None]
-    start, end = plan.position[who][:, [0, 2]], plan.position[watched][:, [0, 2]]
-    points = start + share * (end - start)
-    offset = points - plan.position[block][:, [0, 2]]
-    cos, sin = plan.yaw[block].cos(), plan.yaw[block].sin()
-    lateral = (cos * offset[..., 0] - sin * offset[..., 1]).abs() - plan.size[block, 0] / 2
-    forward = (sin * offset[..., 0] + cos * offset[..., 1]).abs() - plan.size[block, 2] / 2
-    clear = torch.maximum(lateral, forward).amin(0)
-    least, about = worst(who, clear, block, len(plan), FAR)
-    return found(i, least[i], other=about[i])
-
-
-def _mask(who: Tensor, count: int) -> Tensor:
-    out = torch.zeros(count, dtype=torch.bool)
-    out[who] = True
-    return out

@@ -17,6 +17,7 @@ APART = {
 }  # fmt: skip
 PULL, PULL_WALL = 0.22, 0.1  # metres behind a chair, before furniture and before a wall
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
+ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
 LAMP = 0.35  # metres before a front that lamps and plants keep free
 MET = 0.25  # share of a width from which on something is before it
@@ -90,13 +91,23 @@ def lamp_aside(plan: Plan) -> Found:
     return found(who, least[who], other=about[who], measure=least[who] + LAMP)
 
 
-def _clear(plan: Plan, who: Tensor, block: Tensor, needed: float, needed_wall: float, *, behind: bool = False) -> Found:
-    """How much more than is needed is free before (or behind) some boxes, to other groups' pieces and to walls."""
+def seat_room(plan: Plan) -> Found:
+    """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair."""
+    seats = ((plan.of("sofa") | plan.stands("company")) & plan.standing).nonzero()[:, 0]
+    block = (plan.of("sofa", "light", "decor", "storage", "bed") | plan.stands("company", "beside")) & plan.standing
+    return _clear(plan, seats, block, ROOM, -FAR, kin=True)
+
+
+def _clear(
+    plan: Plan, who: Tensor, block: Tensor, needed: float, needed_wall: float, *, behind: bool = False,
+    kin: bool = False,
+) -> Found:  # fmt: skip
+    """How much more than is needed is free before (or behind) some boxes, to other groups' pieces (or their own)."""
     sign = -1.0 if behind else 1.0
     mask = torch.zeros(len(plan), dtype=torch.bool)
     mask[who] = True
     i, j = plan.pairs(mask, block)
-    other = ~plan.kin(i, j)
+    other = plan.kin(i, j) == kin
     i, j = i[other], j[other]
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
-from echomodel.rules.living import access, company, crowding, groups, lamps, sizes, walls
+from echomodel.rules.living import access, company, crowding, groups, lamps, sight, sizes, walls
 from echomodel.rules.living.found import Found
 from echomodel.rules.living.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.rules.living.ways import Ways, ways
@@ -60,8 +60,12 @@ RULES = (
     Rule("nightstands_alike", groups.nightstands_alike,
          ("{a} stands {x:.2f} m further from the bed than {b}",),
          REAL + "98 % of pairs differ by less than 0.15 m"),
-    Rule("screen_in_view", groups.screen_in_view, ("{a} faces no seat, sofa or bed",),
-         REAL + "86 % opposite a sofa, 99 % opposite a bed"),
+    Rule("screen_in_view", sight.screen_in_view,
+         ("{a} lies {x:.0f} degrees aside of where {b} looks", "{a} is turned by {x:.0f} degrees away from {b}",
+          "{a} is only {x:.1f} m from {b}, too near to watch", "{a} is {x:.1f} m from {b}, too far to watch"),
+         REAL + "98 % of sofas and 95 % of beds look within 25 and 30 degrees of it, 99 % from within 5.2 m"),
+    Rule("screen_not_behind", sight.screen_not_behind, ("{a} turns its back on {b} ({x:.0f} degrees)",),
+         REAL + "95 % of armchairs are turned less from their group's screen"),
     Rule("pendant_over", lamps.pendant_over, ("{a} hangs {x:.2f} m beside a table",),
          REAL + "half hang over the table itself, others over beds, sofas and the middle"),
     Rule("lamp_on_surface", lamps.lamp_on_surface, ("{a} stands on nothing that carries it",), "what the word means"),
@@ -77,6 +81,8 @@ RULES = (
          REAL + "3rd percentile before furniture, 5th before a wall (0.1 m)"),
     Rule("knees_free", crowding.knees_free, ("{a} has {x:.2f} m before it, then {b}",),
          REAL + "3rd percentile before sofas 0.58 m; armchairs look into the room"),
+    Rule("seat_room", crowding.seat_room, ("one cannot sit down on {a}: {x:.2f} m before it stands {b}",),
+         REAL + "94 % of sofas and armchairs have 0.25 m before them"),
     Rule("bed_foot_free", crowding.bed_foot_free, ("the foot of {a} leaves {x:.2f} m to {b}",),
          REAL + "90 % leave 0.38 m or more"),
     Rule("lamp_aside", crowding.lamp_aside, ("{a} stands {x:.2f} m before the front of {b}",),
@@ -92,7 +98,7 @@ RULES = (
          "what the word means; 93 % of real armchairs leave their sofa's knees free"),
     Rule("not_alone", company.not_alone, ("{a} stands alone in the room, {x:.2f} m from everything",),
          REAL + "side tables, lamps and plants stand at something"),
-    Rule("view_free", company.view_free, ("{b} stands between {a} and who watches it",), "a straight line"),
+    Rule("view_free", sight.view_free, ("{b} stands between {a} and who watches it",), "a straight line"),
     Rule("scale", sizes.scale, ("{a} is {x:.2f} m wide", "{a} is {x:.2f} m high", "{a} is {x:.2f} m deep"),
          "a fifth over the 95th percentile of the class, half of the 5th", weight=0.3),
 )  # fmt: skip

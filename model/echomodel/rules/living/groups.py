@@ -1,4 +1,4 @@
-"""Rules of groups: seats at their tables, the table before its sofa, nightstands at the head, the screen in view."""
+"""Rules of groups: seats at their tables, the table before its sofa, nightstands at the head."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from echomodel.rules.living.found import Found, found
-from echomodel.rules.living.plan import FAR, Plan
+from echomodel.rules.living.plan import Plan, facing_angle
 from echomodel.vocabulary import vocabulary
 
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees
@@ -22,9 +22,6 @@ PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may diff
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
 HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
 TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as their bed
-VIEW = math.radians(50.0)  # from a screen's own front to who watches it
-FACING = math.radians(100.0)  # from a viewer's front to the screen: beside a chaise people turn their heads
-NEAREST, FARTHEST = 0.9, 7.0  # metres between a screen and its viewer's middle
 
 
 def seat_faces(plan: Plan) -> Found:
@@ -36,7 +33,7 @@ def seat_faces(plan: Plan) -> Found:
     inside = (lateral.square() + forward.square()).detach() < 1e-6
     centre = plan.local(j, i)
     lateral, forward = _turned(lateral, forward, plan.yaw[j] - plan.yaw[i])
-    off = _angle(torch.where(inside, centre[0], lateral), torch.where(inside, centre[1], forward))
+    off = facing_angle(torch.where(inside, centre[0], lateral), torch.where(inside, centre[1], forward))
     return found(i, LOOK - off, other=j, measure=torch.rad2deg(off))
 
 
@@ -54,7 +51,7 @@ def lounger_faces(plan: Plan) -> Found:
     i, j = plan.attended("company")
     near = plan.gap(i, j).detach() < COMPANY
     i, j = i[near], j[near]
-    off = _angle(*plan.local(j, i))
+    off = facing_angle(*plan.local(j, i))
     return found(i, LOUNGE - off, other=j, measure=torch.rad2deg(off))
 
 
@@ -81,7 +78,7 @@ def nightstand_at_head(plan: Plan) -> Found:
     back = (forward - half_depth) + plan.size[j, 2] / 2
     rank = _rank_at(j, plan.gap(i, j).detach())
     turn = plan.yaw[i] - plan.yaw[j]
-    off = _angle(turn.sin(), turn.cos())
+    off = facing_angle(turn.sin(), turn.cos())
     margin = torch.stack([BESIDE - beside, beside + IN_BED, HEAD - back.abs(), TURNED - off], -1)
     keep = rank < 2
     measure = torch.stack([beside, beside, back.abs(), torch.rad2deg(off)], -1)
@@ -113,21 +110,6 @@ def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:
     return (same & nearer).sum(1)
 
 
-def screen_in_view(plan: Plan) -> Found:
-    """A television is opposite a sofa, seat or bed, at a distance from which people watch."""
-    screens = plan.stands("opposite") | plan.of("screen")
-    i, j = plan.pairs(screens, plan.of("sofa", "bed") | plan.stands("company"))
-    if not len(i):
-        return found(i, plan.size.new_zeros(0))
-    before, back = _angle(*plan.local(j, i)), _angle(*plan.local(i, j))
-    far = (plan.position[i] - plan.position[j])[:, [0, 2]].square().sum(1).clamp_min(1e-12).sqrt()
-    angles = torch.minimum(VIEW - before, FACING - back)
-    margin = torch.minimum(torch.minimum(angles, (far - NEAREST)), FARTHEST - far)
-    best = margin.new_full((len(plan),), -FAR).scatter_reduce(0, i, margin, "amax")
-    who = i.unique()
-    return found(who, best[who])
-
-
 def _first_of(i: Tensor, j: Tensor, margin: Tensor, measure: Tensor) -> Found:
     """Of several demands (P, Q) the one that is missed by most."""
     least, which = margin.min(1)
@@ -138,8 +120,3 @@ def _turned(lateral: Tensor, forward: Tensor, turn: Tensor) -> tuple[Tensor, Ten
     """A direction in a frame that is turned by `turn` to another one, in that other one."""
     cos, sin = turn.cos(), turn.sin()
     return cos * lateral + sin * forward, cos * forward - sin * lateral
-
-
-def _angle(lateral: Tensor, forward: Tensor) -> Tensor:
-    """Angle between the front and a direction, 0 to pi; smooth but at the front itself."""
-    return torch.atan2((lateral.square() + 1e-12).sqrt(), forward)

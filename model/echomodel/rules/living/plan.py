@@ -271,3 +271,8 @@ def kind_of(word: str) -> Category:
         return vocabulary().category(word)
     except ValueError:
         return UNKNOWN
+
+
+def facing_angle(lateral: Tensor, forward: Tensor) -> Tensor:
+    """Angle between a front and a direction in its frame, 0 to pi; smooth but at the front itself."""
+    return torch.atan2((lateral.square() + 1e-12).sqrt(), forward)
