@@ -98,7 +98,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     device = request.options.device
     if not how.ray and how.executor is None:
         network_processes(device)
-    plan = make_plan(request, weights_hash(request.options.weights), how.to)
+    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.to))
     place = shard_folder(out, how.shard)
     with locked(place):
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
@@ -192,6 +192,18 @@ def weights_hash(weights: str) -> str:
     for path in found:
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def _with_libraries(plan: Plan) -> Plan:
+    """The plan that knows its libraries by their bytes; raises ValueError for what its rooms would miss."""
+    for options in plan.options:
+        _ = options.wishes
+        if options.settle:
+            from echousd.settle import require_engine
+
+            require_engine()
+    found = {options.assets: weights_hash(options.assets) for options in plan.options if options.assets}
+    return replace(plan, head={**plan.head, "libraries": found}) if found else plan
 
 
 def _agree_on(plan: Plan, out: Path, *, resume: bool) -> None:

@@ -6,13 +6,17 @@ import itertools
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echousd.room.manifest import MAX_SEED
 from echousd.room.room import RoomOptions
+
+if TYPE_CHECKING:
+    from echousd.assets.choose import AssetWishes
 
 
 class BatchOptions(BaseModel):
@@ -22,6 +26,9 @@ class BatchOptions(BaseModel):
         relations: relations an object that are told of a room drawn from the room generator (`sample`).
         preview: draw a picture of every room (needs the extra `render`).
         weights: weights file or folder, "" for those that ship. assets: index of a library, "" for none.
+        stretch: how much its models may be stretched, 1 to 4. licenses: of models, such as `CC0,CC-BY`, "" = all.
+        text: what models shall be like (extra `text`). collect: take them along with their files.
+        fit: `keep` all that is asked for, or `drop` what has no place. settle: as it comes to rest (extra `sim`).
         device: what the network runs on, `cpu`, `cuda` or `mps`; it is part of the plan, as sums round by it.
         palette: harmony of the room, "" = the seed chooses.
         merge: what of a piece is one mesh, `parts`, `bodies` or `closed`, see `RoomOptions`.
@@ -36,6 +43,12 @@ class BatchOptions(BaseModel):
     preset: str | None = None
     weights: str = ""
     assets: str = ""
+    stretch: Annotated[float, Field(ge=1, le=4)] = 1.15
+    licenses: str = ""
+    text: str = ""
+    collect: bool = False
+    fit: Literal["keep", "drop"] = "keep"
+    settle: bool = False
     device: Literal["cpu", "cuda", "mps"] = "cpu"
     repair: bool = True
     layouts: Annotated[int, Field(ge=1, le=1000)] = 1
@@ -62,6 +75,21 @@ class BatchOptions(BaseModel):
     def look(self) -> RoomOptions:
         """How a room is written; raises ValueError for a word that is not allowed."""
         return RoomOptions(**{field.name: getattr(self, field.name) for field in fields(RoomOptions)})
+
+    @property
+    def wishes(self) -> AssetWishes:
+        """What is asked of a library; raises ValueError for what is not allowed or not there."""
+        index = Path(self.assets)
+        changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
+        return _wishes(self.assets, changed, self.stretch, self.licenses, self.text, self.collect)
+
+
+@lru_cache(maxsize=4)  # words are compared with those of all models once in a process
+def _wishes(assets: str, changed: int, stretch: float, licenses: str, text: str, collect: bool) -> AssetWishes:
+    from echousd.assets.choose import asked_of
+
+    index = Path(assets) if assets else None
+    return asked_of(index, stretch=stretch, licences=licenses or None, collect=collect, text=text)
 
 
 class BatchRequest(BaseModel):
@@ -114,7 +142,7 @@ def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The fields of a `batch.toml`; its sources are relative to it. Raises ValueError naming the file."""
+    """The fields of a `batch.toml`; sources and library are relative to it. Raises ValueError naming the file."""
     try:
         raw = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -122,7 +150,24 @@ def read_toml(path: Path) -> dict[str, Any]:
     sources = raw.get("sources", [])
     if isinstance(sources, list) and all(isinstance(source, str) for source in sources):
         raw["sources"] = [str(path.parent / source) for source in sources]
+    options = raw.get("options")
+    if isinstance(options, dict) and isinstance(options.get("assets"), str) and options["assets"]:
+        options["assets"] = str((path.parent / options["assets"]).absolute())
     return raw
+
+
+def parse_options(words: Sequence[str]) -> dict[str, Any]:
+    """`ceiling=true`, `palette=oak` as options, whose values are those of TOML or words; raises ValueError."""
+    found: dict[str, Any] = {}
+    for word in words:
+        name, sign, value = word.partition("=")
+        if not (name and sign):
+            raise ValueError(f"--set is {word!r}, allowed: an option of a room and its value, such as ceiling=true")
+        try:
+            found[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[name] = value
+    return found
 
 
 def parse_sample(text: str) -> dict[str, int]:

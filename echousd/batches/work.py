@@ -170,12 +170,16 @@ def generated(job: Job, *, here: bool = False) -> Any:
     model = load_model(asked.weights or None, asked.preset, device=asked.device if here else CPU)
     if asked.device != CPU and not here:
         model = ElsewhereModel(model, job.answers)
-    return generate(
-        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.assets or None, model=model,
-        preset=asked.preset,
+    made = generate(
+        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.wishes, model=model, preset=asked.preset,
         repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
-        options=asked.look, drawn=drawn,
+        options=asked.look, drawn=drawn, fit=asked.fit,
     )  # fmt: skip
+    if not asked.settle:
+        return made
+    from echousd.settle import settled
+
+    return settled(made).noted
 
 
 def best_of(wanted: DraftsWanted) -> Best:
@@ -198,7 +202,8 @@ def _checked(job: Job) -> Any:
         graph = graph.replaced(room=graph.room.replaced(openings=()))
     check_objects(graph)
     check_doors(graph)
-    check_space(graph)
+    if job.options.fit == "keep":
+        check_space(graph)
     return graph
 
 

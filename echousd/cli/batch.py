@@ -60,14 +60,27 @@ def run(
         str | None, typer.Option(help="parts, sdf, library, boxes; default: the best of the model.")
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
+    stretch: Annotated[
+        float | None, typer.Option(help="How much models may be stretched; default 1.15.", min=1, max=4)
+    ] = None,
+    licenses: Annotated[
+        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
+    ] = None,
+    text: Annotated[
+        str | None, typer.Option(help='What models shall be like, "mid-century oak" (extra: text).')
+    ] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
     device: Annotated[
         str | None, typer.Option(help="Of the network: cpu, cuda (a process for each) or mps; default cpu.")
     ] = None,
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
-    dress: Annotated[str | None, typer.Option(help="Small things: none, some or full.")] = None,
+    dress: Annotated[str | None, typer.Option(help="Small things: none, some or full; default none.")] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
+    more: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Any other option of the rooms, such as ceiling=true, palette=oak, settle=true."),
+    ] = None,
     ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.")] = "",
     to: Annotated[str, typer.Option(help="URL that rooms and store go to (fsspec), such as s3://bucket/night.")] = "",
     self_contained: Annotated[
@@ -78,7 +91,7 @@ def run(
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import run_batch
-    from echousd.batches.options import parse_sample, read_toml, request_of
+    from echousd.batches.options import parse_options, parse_sample, read_toml, request_of
     from echousd.batches.run import RunOptions
     from echousd.batches.verify import finish
 
@@ -93,13 +106,17 @@ def run(
     told: dict[str, Any] = {
         "shapes": shapes,
         "assets": str(assets.absolute()) if assets else None,
+        "stretch": stretch,
+        "licenses": licenses,
+        "text": text,
         "weights": str(weights) if weights else None,
         "device": device,
         "preview": preview,
         "walls": walls,
     }
     told |= {"drafts": drafts, "dress": dress, "self_contained": self_contained}
-    raw["options"] = {**raw.get("options", {}), **{key: value for key, value in told.items() if value is not None}}
+    told = {key: value for key, value in told.items() if value is not None}
+    raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **told}
     request = request_of(raw, files[0] if files else "batch")
     if to and webdataset:
         raise ValueError("--webdataset takes rooms in the run's own folder; leave out --to")

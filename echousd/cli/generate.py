@@ -6,7 +6,6 @@ import gc
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -176,8 +175,7 @@ def generate(
             if settle:
                 with timer.stage("settle"):
                     found = settled(room)
-                moved = tuple(f"{name} stands where it comes to rest" for name in found.moved)
-                room = replace(found.room, notes=(*room.notes, *moved, *found.restless))
+                room = found.noted
                 restless.extend(found.restless)
             written = write_room(room, folder, timer, flat=flat, force=force, store=store)
             for stage, seconds in (*timer.seconds.items(), *room.timings.items()):

@@ -32,6 +32,12 @@ class Settled:
     moved: tuple[str, ...]
     restless: tuple[str, ...]
 
+    @property
+    def noted(self) -> Room:
+        """The room that says what was moved and what does not rest."""
+        said = (*(f"{name} stands where it comes to rest" for name in self.moved), *self.restless)
+        return replace(self.room, notes=(*self.room.notes, *said))
+
 
 def settled(room: Room) -> Settled:
     """Simulate every layout of a room and write the poses at rest where they differ; what is locked stays.

@@ -1,0 +1,125 @@
+"""Options that a batch takes from `generate`: what of a library is allowed, what has no place, what comes to rest."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import torch
+from inline_batches import QUICK, Inline
+from small_models import small_library
+from small_room import small_graph
+
+from echomodel import text as texts
+from echousd.assets.index import index
+from echousd.batches.batch import batch
+from echousd.batches.journal import read_journals
+from echousd.batches.options import parse_options, read_toml, request_of
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("library")
+    return index([small_library(folder / "models")], folder / "lib.parquet").file
+
+
+@pytest.fixture
+def source(tmp_path):
+    path = tmp_path / "graph.json"
+    path.write_text(small_graph().to_json())
+    return path
+
+
+def manifests(folder):
+    return [json.loads(path.read_text()) for path in sorted((folder / "rooms").glob("*/*/*.json"))]
+
+
+def made(source, folder, **options):
+    how = {"executor": Inline(), "workers": 1, **QUICK, **options}
+    assert batch(source, folder, **how).complete, list(read_journals(folder).values())
+    return manifests(folder)
+
+
+def test_a_batch_asks_a_library_as_generate_does(library, source, tmp_path, monkeypatch):
+    shelf = {"shapes": "library", "assets": str(library)}
+    (room,) = made(source, tmp_path / "all", collect=True, **shelf)
+    assert {one["source"] for one in room["meshes"].values()} == {"library"}
+    layers = [path.read_text() for path in (tmp_path / "all").rglob("*.usda")]
+    assert not [text for text in layers if str(library.parent / "models") in text]  # nothing refers to the library
+    (room,) = made(source, tmp_path / "none", licenses="MIT", **shelf)
+    assert "library" not in {one["source"] for one in room["meshes"].values()}
+    options = {"assets": str(library), "stretch": 1.5}
+    wishes = request_of({"sample": {"bedroom": 1}, "options": options}, "test").options.wishes
+    assert (wishes.stretch, wishes.licences, wishes.collect) == (1.5, (), False)
+
+    asked = []
+
+    class Encoder:
+        def __call__(self, said):
+            asked.append(said[0])
+            return torch.eye(len(said))
+
+    monkeypatch.setattr(texts, "ClipTextEncoder", Encoder)
+    made(source, tmp_path / "words", text="mid-century oak", count=2, **shelf)
+    assert asked == ["mid-century oak"]  # the words of all models are compared once, not for each room
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"text": "oak"}, "--text 'oak' needs models to choose from"),
+        ({"assets": "none.parquet"}, "none.parquet: no such file, allowed: an index"),
+        ({"stretch": 9.0}, "options.stretch is 9.0"),
+        ({"licenses": ","}, "--licenses is ',', allowed: licences with commas between"),
+        ({"fit": "squeeze"}, "options.fit is 'squeeze'"),
+    ],
+)
+def test_what_a_library_lacks_is_told_before_the_first_room(source, tmp_path, options, said):
+    with pytest.raises(ValueError, match=said):
+        batch(source, tmp_path / "run", executor=Inline(), **{**QUICK, **options})
+    assert not (tmp_path / "run").exists()
+
+
+def test_another_library_is_another_plan(library, source, tmp_path):
+    file = tmp_path / "lib.parquet"
+    file.write_bytes(library.read_bytes())
+    options = {"shapes": "library", "assets": str(file), "executor": Inline(), "workers": 1}
+    folder = small_library(tmp_path / "models")
+    batch(source, tmp_path / "run", **{**QUICK, **options})
+    (folder / "storage/thing_17.usda").unlink()
+    file.unlink()
+    index([folder], file)
+    with pytest.raises(ValueError, match=r"another plan \(libraries\..*lib\.parquet was .*, now "):
+        batch(source, tmp_path / "run", resume=True, **{**QUICK, **options})
+
+
+def test_what_has_no_place_is_left_out_if_wanted(source, tmp_path):
+    source.write_text(small_graph(size=(1.7, 1.9)).to_json())
+    (room,) = made(source, tmp_path / "run", fit="drop")
+    assert len(room["graph"]["nodes"]) < len(small_graph().nodes)
+    (row,) = read_journals(tmp_path / "run").values()
+    assert any(note.startswith("left out: ") for note in row["notes"])
+
+
+def test_rooms_come_to_rest_if_wanted(source, tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    from echousd import settle
+
+    calm = settle.settled
+    monkeypatch.setattr(settle, "settled", lambda room: replace(calm(room), moved=("lamp",)))
+    made(source, tmp_path / "run", settle=True)
+    (row,) = read_journals(tmp_path / "run").values()
+    assert "lamp stands where it comes to rest" in row["notes"]
+
+
+def test_any_option_is_set_by_its_name(echousd_command, tmp_path):
+    assert parse_options(["ceiling=true", "palette=oak", "faces=900", 'text="x"']) == {
+        "ceiling": True, "palette": "oak", "faces": 900, "text": "x",
+    }  # fmt: skip
+    told = echousd_command("batch", "--sample", "bedroom:1", "--set", "ceiling", "-o", tmp_path / "run")
+    assert (told.code, "--set is 'ceiling', allowed: an option of a room and its value" in told.err) == (2, True)
+    told = echousd_command("batch", "--sample", "bedroom:1", "--set", "ceilin=true", "-o", tmp_path / "run")
+    assert (told.code, "unknown field, allowed: shapes" in told.err) == (2, True)
+    path = tmp_path / "batch.toml"
+    path.write_text('[sample]\nbedroom = 1\n[options]\nassets = "lib.parquet"\nlicenses = "CC0"\nstretch = 1.3\n')
+    options = request_of(read_toml(path), str(path)).options
+    assert (options.assets, options.licenses, options.stretch) == (str(tmp_path / "lib.parquet"), "CC0", 1.3)
