@@ -14,7 +14,7 @@ from echousd.batches.devices import CPU, network_processes
 from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
-from echousd.batches.plan import PACK, STATE, URL, Plan, difference, load_plan, make_plan, save_plan
+from echousd.batches.plan import STATE, URL, Plan, difference, load_plan, make_plan, packed, save_plan
 from echousd.batches.remote import Remote, complete
 from echousd.batches.run import Run, RunOptions
 from echousd.naming import free_name
@@ -133,9 +133,8 @@ def generate_many(
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
     load_model(asked.weights or None, asked.preset, device=asked.device)
-    waiting = iter(graphs)
     number = 0
-    while pack := [graph for _, graph in zip(range(PACK), waiting)]:  # noqa: B905  # the last pack is shorter
+    for pack in packed(graphs):
         own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
         jobs = [Job("", "", s, asked, graph.to_json()) for s, graph in zip(own, pack, strict=True)]
         sampled = layouts(jobs)

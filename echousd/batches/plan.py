@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import echousd
 from echomodel.files import whole_file
@@ -24,8 +25,10 @@ STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
 # of a URL, though `Path` made one slash of its two; no drive, and no chain of file systems (`zip://a::file:///b`)
 URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/(?!.*::)")
-PACK = 32  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
+PACK, LEAST = 32, 4  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
 SHELF = 1000  # rooms in one folder
+
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -95,8 +98,16 @@ class Plan:
 
     def packs(self, shard: tuple[int, int] = (0, 1)) -> list[tuple[Entry, ...]]:
         """Rooms whose layouts are sampled together; shard i of n takes every n-th pack from number i on."""
-        groups = [self.entries[start : start + PACK] for start in range(0, len(self.entries), PACK)]
-        return groups[shard[0] :: shard[1]]
+        return list(packed(self.entries))[shard[0] :: shard[1]]
+
+
+def packed(rooms: Iterable[Item]) -> Iterator[tuple[Item, ...]]:
+    """Rooms whose layouts are sampled together, of which the first are two halves: two workers begin at once."""
+    waiting, first = iter(rooms), True
+    while group := tuple(islice(waiting, PACK)):
+        middle = len(group) // 2 if first and len(group) >= 2 * LEAST else len(group)
+        yield from filter(None, (group[:middle], group[middle:]))
+        first = False
 
 
 def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
@@ -128,7 +139,7 @@ def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
         "echousd_batch": 1,
         "version": echousd.__version__,
         "weights": weights,
-        "pack": PACK,
+        "pack": [PACK // 2, PACK],
         "rooms": len(entries),
         "request": request.model_dump(),
         **({"to": to} if to else {}),

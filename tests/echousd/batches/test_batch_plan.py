@@ -37,6 +37,15 @@ def test_shards_share_the_plan_out():
     assert sorted(itertools.chain(*parts)) == sorted(entry.id for entry in plan.entries)
 
 
+@pytest.mark.parametrize(
+    ("rooms", "sizes"), [(3, [3]), (7, [7]), (8, [4, 4]), (13, [6, 7]), (32, [16, 16]), (70, [16, 16, 32, 6])]
+)
+def test_the_first_rooms_are_two_packs(rooms, sizes):
+    packs = plan_of(sample={"bedroom": rooms}).packs()
+    assert [len(pack) for pack in packs] == sizes
+    assert [entry.number for pack in packs for entry in pack] == list(range(rooms))
+
+
 def test_a_difference_is_told():
     old, new = plan_of(sample={"bedroom": 2}), plan_of(sample={"bedroom": 2}, options={"walls": False})
     assert difference(old, new) == "options.walls was true, now false"
