@@ -69,7 +69,7 @@ def layout(
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
     from echomodel.metrics.layout_sources import model_layouts, true_layouts
     from echousd.cli.terminal import Terminal
-    from echousd.repair.drafts import best_repaired
+    from echousd.repair.drafts import repaired
 
     found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(
@@ -88,7 +88,7 @@ def layout(
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
             found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total),
-            best_repaired(rules) if repair else None,
+            repaired(rules) if repair else None,
         )  # fmt: skip
     if out is not None:
         write_json(out, plain_json(result))

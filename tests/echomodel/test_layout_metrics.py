@@ -95,6 +95,24 @@ def test_edits_are_scored_apart(rooms):
     assert torch.equal(again[1].graph.triplets, change.graph.triplets)
 
 
+def test_rooms_without_a_fault_are_drafted_no_further(rooms):
+    some, sampled, finished = rooms[:6], [], []
+
+    def sample(edited):
+        sampled.append(edited.graph.num_scenes)
+        return truth(some)(edited) if len(sampled) == 1 else Boxes.cat([Boxes.from_room(some[0])] * sampled[-1])
+
+    def finish(room, triplets):
+        finished.append(len(triplets))
+        return room, (0 if len(finished) in (1, 2, 3, 5, 6, 8) else 9 - len(finished),)
+
+    some = [some[0]] * 6  # so that the draft of any is that of all
+    evaluate_layout(some, sample, LayoutEvaluation(told=1.0, drafts=4, scenes=6), finish=finish)
+    assert sampled == [6, 1, 1]  # the fourth had a fault, then one again, then none
+    assert len(finished) == 8
+    assert len(set(finished)) == 1
+
+
 def test_completion_gives_half_of_the_true_boxes(rooms):
     seen = []
 

@@ -48,7 +48,7 @@ class EditedGraph:
 
 
 LayoutSource = Callable[[EditedGraph], Boxes]
-Finish = Callable[[Sequence[RoomBoxes], Tensor], RoomBoxes]
+Finish = Callable[[RoomBoxes, Tensor], tuple[RoomBoxes, tuple[int, ...]]]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class LayoutEvaluation:
         contradictions: keep what contradicts a changed relation, as the published evaluation does.
         scenes: scenes in a batch.
         judge: also let a judge tell the layouts, and the room generator's, from the true ones.
-        drafts: layouts of each room that `finish` chooses from.
+        drafts: layouts of each room that are finished at most, of which the best is kept.
         seeds: of the first `VARIED` rooms, layouts to compare with one another; 0 = none.
     """
 
@@ -99,7 +99,8 @@ def evaluate_layout(
         sample: gives the N boxes of some scenes, in the order of their nodes.
         settings: rules, dropping, edits.
         progress: called with (scenes done, in all).
-        finish: what becomes of the drafts of each room and the (e, 3) relations told of it, a repair for instance.
+        finish: what becomes of a draft of a room and the (e, 3) relations told of it, a repair for instance, and how
+            many faults that has, the worse ones first; rooms without any are drafted no further.
 
     Returns:
         `rooms` scored, `settings`, `generation` (and `change`, `add`, `complete`): shares of relations kept per
@@ -128,9 +129,7 @@ def evaluate_layout(
             if mode == "generation":
                 made = _rooms_of(rooms[part], edited.graph, boxes)
                 if finish is not None:
-                    more = [_rooms_of(rooms[part], edited.graph, sample(edited)) for _ in range(settings.drafts - 1)]
-                    drafts = zip(made, *more, strict=True)
-                    made = [finish(d, graph.triplets) for d, graph in zip(drafts, graphs[part], strict=True)]
+                    made = _finished(made, rooms[part], graphs[part], sample, finish, settings.drafts)
                     boxes = Boxes.cat([Boxes.from_room(room) for room in made])
                 drawn += made
             found.append(boxes.to("cpu"))
@@ -157,6 +156,28 @@ def evaluate_layout(
 
         out["variety"] = variety_scores(graphs[:VARIED], boxes_of, settings.seeds, settings.rules)
     return out
+
+
+def _finished(
+    drawn: Sequence[RoomBoxes],
+    rooms: Sequence[RoomBoxes],
+    graphs: Sequence[GraphBatch],
+    sample: LayoutSource,
+    finish: Finish,
+    drafts: int,
+) -> list[RoomBoxes]:
+    """The best of so many drafts of each room, `drawn` being the first; others are drawn only of rooms with faults."""
+    best = [finish(room, graph.triplets) for room, graph in zip(drawn, graphs, strict=True)]
+    for _ in range(drafts - 1):
+        open_ = [number for number, (_, faults) in enumerate(best) if any(faults)]
+        if not open_:
+            break
+        graph = GraphBatch.pack([graphs[number] for number in open_])
+        none = torch.zeros(graph.num_nodes, dtype=torch.bool)
+        more = _rooms_of([rooms[number] for number in open_], graph, sample(EditedGraph(graph, None, none, none)))
+        for number, room in zip(open_, more, strict=True):
+            best[number] = min(best[number], finish(room, graphs[number].triplets), key=lambda one: one[1])
+    return [room for room, _ in best]
 
 
 def told_graphs(rooms: Sequence[RoomBoxes], settings: LayoutEvaluation, rng: np.random.Generator) -> list[GraphBatch]:
