@@ -26,6 +26,7 @@ ALIKE = 0.8  # metres: poses that are nearer count as the same when one is regre
 CROWDED = 0.7  # for a chair in the way of a front
 SEATED, ENDS = 0.75, 4  # metres from a table to behind its chairs; more chairs than that sit at its ends, too
 ELBOWS, ELBOW = 1.5, 0.2  # for a seat or lamp so many metres before a seat of its own group
+TUCKED = 0.35  # metres of the space before a second sofa that the coffee table of the group may take
 TABLES = ("before", "foot", "near", "opposite", "at")  # stances of what may stand before a seat of its group
 FOOT = 0.4  # metres at the foot of a bed
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
@@ -125,11 +126,16 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     zones = fronts(setting, state, strangers)
     deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
     out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
-    circle = [j for j in others if setting.at_home[i, j] and setting.stances[j] not in TABLES]
+    home = [j for j in others if setting.at_home[i, j]]
+    circle = [j for j in home if setting.stances[j] not in TABLES]
     if setting.stances[i] not in TABLES:  # of its own group's seats it leaves the knees free
         zones = fronts(setting, state, [j for j in circle if setting.kinds[j].role in ("sofa", "seat")])
         deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
         out = out + ELBOWS * (deep > ELBOW).sum(1)
+    elif setting.stances[i] == "before":  # and a table those of a second sofa
+        zones = fronts(setting, state, [j for j in circle if setting.stances[j] == "with"])
+        deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
+        out = out + ELBOWS * (deep > TUCKED).sum(1)
     front = own_front(setting, i)
     if front is None:
         return out
@@ -138,6 +144,10 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     if setting.kinds[i].role in ("sofa", "seat"):
         deep = depths(size, ahead, setting.size[circle], state.position[circle], state.yaw[circle])
         out = out + ELBOWS * (deep > ELBOW).sum(1)
+    if setting.stances[i] == "with":
+        low = [j for j in home if setting.stances[j] == "before"]
+        deep = depths(size, ahead, setting.size[low], state.position[low], state.yaw[low])
+        out = out + ELBOWS * (deep > TUCKED).sum(1)
     solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
     solid = [j for j in solid if not setting.at_home[i, j]]
     depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])

@@ -19,10 +19,11 @@ HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
 LONELY = 2.5  # for a piece that does not stand at what it attends though that is there; chairs pay twice
+ENOUGH, SPARE = 2, 0.3  # armchairs in a group, and LONELY for a further one that nothing is told of
 HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
 WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
-TOO_FAR, IN_THE_ROOM = 4.6, 0.2  # metres from which on a sofa may leave its wall for that, and what that costs
+TOO_FAR, IN_THE_ROOM = 4.9, 0.5  # metres from which on a sofa may leave its wall for that, and what that costs
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -39,6 +40,8 @@ def places(setting: Setting, state: State, i: int) -> Poses:
         rows = at_anchor(setting, state, i, anchor)
     seated = setting.stances[i] == "at" and not kind.solid
     lonely = LONELY * (1 + seated) if anchor >= 0 and rows else 0.0
+    if _spare(setting, state, i):
+        lonely = min(lonely, SPARE)
     if kind.support == "ceiling":
         rows += overhead(setting, state, i)
     elif setting.carrier[i] >= 0:
@@ -70,6 +73,15 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     ]
     out = Poses.of([*rows, *as_stated(setting, state, i)], height)
     return _as_told(setting, i, out)
+
+
+def _spare(setting: Setting, state: State, i: int) -> bool:
+    """Whether box i is an armchair that its group, which has enough of them, is told nothing of."""
+    if setting.stances[i] != "company":
+        return False
+    group = setting.group == setting.group[i]
+    mates = [k for k in np.flatnonzero(group & state.placed).tolist() if setting.stances[k] == "company" and k != i]
+    return len(mates) >= ENOUGH and not group[setting.told[i][1]].any()
 
 
 def as_stated(setting: Setting, state: State, i: int) -> list[Row]:
