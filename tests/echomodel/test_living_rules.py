@@ -12,6 +12,7 @@ from echomodel.data.rooms.generator import generate_rooms
 from echomodel.openings import Opening
 from echomodel.rules.living import RULES, faults, faults_of, missed, plan_of
 from echomodel.rules.living.ways import ways
+from echomodel.vocabulary import vocabulary
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 HALF = np.pi / 2
@@ -264,3 +265,17 @@ def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
     assert len(found) < 0.12 * sum(len(room) for room in rooms)
+
+
+def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
+    words = ["multi_seat_sofa", "loveseat_sofa", "coffee_table", "tv_stand"]
+
+    class Boxes:
+        size = np.array([(2.4, 0.85, 0.9), (1.6, 0.85, 0.9), (1.1, 0.4, 0.6), (1.8, 0.5, 0.4)])
+        position = np.array([(0.0, 0.0, -1.5), (-1.7, 0.0, 0.0), (0.0, 0.0, -0.4), (0.0, 0.0, 1.8)])
+        yaw = np.zeros(4)
+
+    opposite, near = vocabulary().predicate_id("opposite"), vocabulary().predicate_id("close_by")
+    assert plan_of(Boxes, words).joins.tolist() == [-1, 0, -1, -1]
+    told = np.array([(3, opposite, 1), (2, near, 0)])
+    assert plan_of(Boxes, words, None, (), told).joins.tolist() == [1, -1, -1, -1]

@@ -66,7 +66,10 @@ class Plan:
 
     @cached_property
     def joins(self) -> Tensor:
-        """(N,) int64, for sofas that share a coffee table with the largest sofa of their room that sofa, -1 = none."""
+        """(N,) int64, for sofas that share a coffee table with the first sofa of their room that sofa, -1 = none.
+
+        The first is the one that most tables and screens are told to stand before or opposite, of these the largest.
+        """
         out = torch.full((len(self),), -1, dtype=torch.int64)
         sofas = [k for k, kind in enumerate(self.kinds) if kind.role == "sofa" and kind.wall]
         tables = [k for k, kind in enumerate(self.kinds) if kind.stands == "before"]
@@ -75,10 +78,19 @@ class Plan:
             here = [k for k in sofas if scene[k] == room]
             if len(here) < 2 or sum(scene[k] == room for k in tables) >= len(here):
                 continue  # every sofa has a table of its own
-            largest = max(here, key=lambda k: (round(float(self.size[k, 0]), 2), -k))
+            first = max(here, key=lambda k: (self._served(k), round(float(self.size[k, 0]), 2), -k))
             for k in here:
-                out[k] = largest if k != largest else -1
+                out[k] = first if k != first else -1
         return out
+
+    def _served(self, sofa: int) -> int:
+        """How many tables and screens are told to stand before or opposite a sofa, not only near it."""
+        near, served = vocabulary().predicate_id("close_by"), 0
+        for a, predicate, b in self.triplets.tolist():
+            other = b if a == sofa else a
+            if sofa in (a, b) and predicate != near and self.kinds[other].stands in ("before", "opposite"):
+                served += 1
+        return served
 
     def which(self, asked: Callable[[Category], object]) -> Tensor:
         """(N,) bool, boxes whose row answers a question with yes."""
