@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
 
+from echomodel.triangles import area_normals
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.forms import forms, polygons
@@ -137,7 +138,7 @@ def _part(
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     triangles = points[index[corner]]
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = area_normals(triangles)
     flat = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-12)
     normals = np.repeat(flat[:, None], 3, axis=1)
     paints = tuple(paints_of(prim, surface.face[face], known))

@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.openings import inward_normal
+from echomodel.triangles import cross
 from echousd.sight import Furniture
 
 APERTURE = 36.0  # mm, width of the picture in the camera
@@ -26,10 +27,10 @@ def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     """(4, 4) float camera to world, column vectors; the camera looks along its -Z with +Y up."""
     back = eye - target
     back = back / np.linalg.norm(back)
-    right = np.cross((0.0, 1.0, 0.0), back)
+    right = cross(np.array([0.0, 1.0, 0.0]), back)
     right /= np.linalg.norm(right)
     matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, np.cross(back, right), back, eye
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, cross(back, right), back, eye
     return matrix
 
 

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from echomodel.data.furniture.assembly import Piece, pieces_of
 from echomodel.data.furniture.solids import FINEST, Solid
+from echomodel.triangles import area_normals, cross
 from echousd.room.ballast import ballasted
 from echousd.room.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
 
@@ -160,7 +161,7 @@ def _hull(points: np.ndarray) -> trimesh.Trimesh:
         flat.apply_translation((points.max(0) + points.min(0)) / 2)
         return flat
     corner = points[hull.simplices]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal = area_normals(corner)
     inwards = (normal * hull.equations[:, :3]).sum(1) < 0
     faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
     used, index = np.unique(faces, return_inverse=True)
@@ -170,7 +171,7 @@ def _hull(points: np.ndarray) -> trimesh.Trimesh:
 def _enclosed(piece: Piece) -> float:
     """The volume inside a closed mesh, m³."""
     one, two, three = (piece.vertices - piece.vertices[0])[piece.faces].transpose(1, 0, 2)
-    return float((one * np.cross(two, three)).sum() / 6)
+    return float((one * cross(two, three)).sum() / 6)
 
 
 def mass_of(pieces: Sequence[Piece]) -> Mass:

@@ -11,6 +11,7 @@ import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from echomodel.triangles import area_normals
 from echousd.room.finishes.slots import metres_of
 
 NUDGE = 4e-6  # metres between points of different boards at one place
@@ -73,7 +74,7 @@ def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.n
     """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
     faces = np.asarray(mesh.faces)
     triangles = np.asarray(mesh.vertices)[faces]
-    area_normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area_normal = area_normals(triangles)
     unit = area_normal / np.maximum(np.linalg.norm(area_normal, axis=1, keepdims=True), 1e-20)
     corner_vertex = faces.ravel()
     corner_face = np.repeat(np.arange(len(faces)), 3)
@@ -104,13 +105,13 @@ def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[n
     the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
     is of the whole thing get all of it on the side that they show.
     """
-    st = box_projection(mesh)
     points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    axis, way = facing_axis(points[faces])
+    st = _projected(points[faces], axis, way)
     board = connected_pieces(faces, len(points))
     low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
     np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
     np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
-    axis = facing_axis(points[faces])[0]
     extent = (high - low)[board]
     rows = np.arange(len(faces))
     across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
@@ -182,7 +183,7 @@ def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
 
 def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(f,) int, the axis that each triangle (f, 3, 3) looks at most, and (f,) float, 1 or -1: which way."""
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal = area_normals(triangles)
     axis = np.abs(normal).argmax(1)
     return axis, np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)
 
@@ -190,7 +191,10 @@ def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def box_projection(mesh: trimesh.Trimesh) -> np.ndarray:
     """(f, 3, 2) float: texture coordinates in metres along the axis that each face looks at most."""
     triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
-    axis, way = facing_axis(triangles)
+    return _projected(triangles, *facing_axis(triangles))
+
+
+def _projected(triangles: np.ndarray, axis: np.ndarray, way: np.ndarray) -> np.ndarray:
     facing = way[:, None]
     x, y, z = triangles[..., 0], triangles[..., 1], triangles[..., 2]
     u = np.choose(axis[:, None], [-z * facing, x, x * facing])

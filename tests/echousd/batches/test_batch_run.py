@@ -1,7 +1,11 @@
 """Runs in one process: rooms that are complete stay, what fails is told, what another run does is respected."""
 
 import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
 import tarfile
 from pathlib import Path
 
@@ -312,3 +316,27 @@ def test_weights_are_known_by_their_bytes(tmp_path):
     assert front.weights_hash("") == front.weights_hash("")
     with pytest.raises(ValueError, match="no weights there"):
         front.weights_hash(str(tmp_path))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills a process by a signal")
+def test_a_killed_run_and_its_killed_worker_leave_the_same_bytes(calm, tmp_path):
+    source, folder, _ = calm
+    script = (
+        "import os, signal, sys\nfrom echousd.batches.batch import batch\n\n"
+        "def tell(progress):\n    if progress.made:\n        os.kill(os.getpid(), signal.SIGKILL)\n\n"
+        "def kill(pool):\n    os.kill(pool.processes[0], signal.SIGKILL)\n\n"
+        "if __name__ == '__main__':\n"
+        "    from echousd.batches.executor import LocalWorkers\n    pool = LocalWorkers(1)\n    kill(pool)\n"
+        f"    batch(sys.argv[1], sys.argv[2], executor=pool, progress=tell, **{QUICK!r})\n"
+    )
+    (tmp_path / "night.py").write_text(script)
+    ended = subprocess.run(
+        [sys.executable, str(tmp_path / "night.py"), str(source), str(tmp_path / "run")], check=False
+    )
+    assert ended.returncode == -signal.SIGKILL
+    rooms = [row["room"] for row in read_journals(tmp_path / "run").values() if row["state"] == "done"]
+    assert len(rooms) == 1
+    again = Inline()
+    assert batch(source, tmp_path / "run", executor=again, resume=True, **QUICK).done == 2
+    assert f"room {rooms[0]}" not in again.calls
+    assert digests(tmp_path / "run") == digests(folder)

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from echomodel.data.furniture.surfaces import cube_surface, loft, superellipse
+from echomodel.triangles import cross
 
 Array = np.ndarray
 IDENTITY = np.eye(3)
@@ -35,7 +36,7 @@ def upright(bottom: Array, top: Array) -> Array:
     x = IDENTITY[0] if abs(y[0]) < 0.9 else IDENTITY[2]
     x = x - y * (x @ y)
     x = x / np.linalg.norm(x)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    return np.stack([x, y, cross(x, y)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -273,7 +274,7 @@ class Tube(Solid):
                 x = upright(np.zeros(3), y)[:, 0]
             x = x - y * (x @ y)
             x = x / np.linalg.norm(x)
-            rings.append(point + circle[:, :1] * x + circle[:, 1:] * np.cross(x, y))
+            rings.append(point + circle[:, :1] * x + circle[:, 1:] * cross(x, y))
         return loft(rings)
 
     def inradius(self, scale: Array) -> float:
