@@ -12,10 +12,11 @@ from echousd.drawables import Drawable, Paint, paint_image, read_drawables
 from echousd.sight import Furniture
 
 GOLDEN = 0.61803398875
+LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
-HUNG = ("picture", "mirror", "curtain", "wall_shelf", "wall_clock", "coats")  # goes with the wall that it hangs on
+HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +77,12 @@ class Scenery:
     def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
         """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
         out = self.flat_colors[face]
-        for number, image in enumerate(self.images):
-            here = np.flatnonzero(self.texture[face] == number)
-            if len(here):
+        texture = self.texture[face]
+        order = np.argsort(texture, kind="stable")
+        ends = np.searchsorted(texture[order], np.arange(len(self.images) + 1))
+        for image, start, end in zip(self.images, ends, ends[1:], strict=False):
+            if start < end:
+                here = order[start:end]
                 st = (self.st[face[here]] * bary[here, :, None]).sum(1)
                 height, width = image.shape[:2]
                 column = (st[:, 0] % 1.0 * width).astype(int) % width
@@ -144,7 +148,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
             if paint.texture:
                 key = (paint.texture, paint.tint)
                 if key not in images:
-                    linear = (paint_image(paint).astype(np.float32) / 255) ** 2.2
+                    linear = LINEAR[paint_image(paint)]
                     images[key] = (len(images), linear * np.array(paint.tint, np.float32))
                 part["texture"][faces] = images[key][0]
         parts.append(part)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# points of a box of 1 m that stands on the origin
-GRID = np.stack(np.meshgrid(*[np.linspace(-0.5, 0.5, 7)] * 3, indexing="ij"), -1).reshape(-1, 3) + np.array(
-    [0.0, 0.5, 0.0]
-)
+CUT = 3.0  # how much more what is cut off by a picture's border disturbs
+# rays through a picture whose half width at distance 1 is 1, and what each of them counts
+RAYS = np.stack([*(g.ravel() for g in np.meshgrid(*[np.linspace(-1, 1, 13)] * 2)), np.full(169, -1.0)], 1)
+WEIGHTS = np.where(np.abs(RAYS[:, :2]).max(1) > 0.8, CUT, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,43 +42,57 @@ class Furniture:
         return np.clip(1.0 - away / reach, 0.0, 1.0)
 
     def filled(self, view: np.ndarray, half: float, reach: float) -> float:
-        """Share of a square picture that boxes nearer than `reach` metres fill, the nearer the more.
+        """Share of a square picture that boxes nearer than `reach` metres fill: the nearer the more, and what the
+        picture's border cuts off `CUT` times; `view`, `half`: as `away`.
+        """
+        near = self.nearness(view[:3, 3], reach) > 0
+        if not near.any():
+            return 0.0
+        away = Furniture(self.size[near], self.position[near], self.yaw[near]).away(view, half)
+        return float((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean())
+
+    def away(self, view: np.ndarray, half: float) -> np.ndarray:
+        """(169,) metres to the nearest box along `RAYS` through a square picture, inf where there is none.
 
         Arguments:
             view: (4, 4) float camera to world. half: half of the picture's width at distance 1.
-            reach: metres.
         """
-        near = self.nearness(view[:3, 3], reach)
-        share = np.zeros(len(near))
-        for number in np.flatnonzero(near):
-            cos, sin = np.cos(self.yaw[number]), np.sin(self.yaw[number])
-            local = GRID * self.size[number]
-            points = np.stack(
-                [cos * local[:, 0] + sin * local[:, 2], local[:, 1], cos * local[:, 2] - sin * local[:, 0]], 1
-            )
-            x, y, z = ((points + self.position[number] - view[:3, 3]) @ view[:3, :3]).T
-            seen = np.stack([x, y], 1)[z < -0.05] / -z[z < -0.05, None] / half
-            seen = seen[(np.abs(seen) < 1.15).all(1)]
-            if len(seen):
-                share[number] = np.ptp(np.clip(seen, -1, 1), axis=0).prod() / 4
-        return float(near @ share)
+        ways = (RAYS * (half, half, 1.0)) @ view[:3, :3].T
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        turn = self._turns()
+        start = np.einsum("nij,nj->ni", turn, view[:3, 3] - self.position - self.size * (0.0, 0.5, 0.0))
+        way = (turn.reshape(-1, 3) @ ways.T).reshape(len(turn), 3, -1).transpose(0, 2, 1)
+        enter, leave = _crossing(start[:, None], way, 0.5 * self.size[:, None])
+        return np.asarray(np.where((enter < leave) & (leave > 0), np.maximum(enter, 0.0), np.inf).min(0))
 
     def hidden(self, eye: np.ndarray) -> float:
         """How many objects are hidden behind others from `eye` (3,): shares of 27 points in each box, summed."""
-        n = len(self.size)
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        turn = np.zeros((n, 3, 3))  # object frame -> room frame
-        turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cos, sin, 1.0, -sin, cos
+        return float(self.blocked(eye)[1].mean(1).sum())
+
+    def blocked(self, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 27, 3) points in each box, metres, and (n, 27) whether another box hides them from `eye` (3,)."""
+        n, turn = len(self.size), self._turns()
         middle = self.position + self.size * (0.0, 0.5, 0.0)
         grid = np.stack(np.meshgrid(*[(-0.45, 0.0, 0.45)] * 3, indexing="ij"), -1).reshape(-1, 3)
-        points = middle[:, None] + np.einsum("nij,nkj->nki", turn, grid * self.size[:, None])
+        points = middle[:, None] + np.einsum("nij,nkj->nki", turn.transpose(0, 2, 1), grid * self.size[:, None])
         # every line of sight (object a, point k) in the frame of every box b
-        start = np.einsum("bij,bi->bj", turn, eye - middle)[:, None, None]
-        way = np.einsum("bij,aki->bakj", turn, points - eye)
-        way = np.where(np.abs(way) < 1e-9, 1e-9, way)
-        half = 0.5 * self.size[:, None, None]
-        first, second = (-half - start) / way, (half - start) / way
-        enter, leave = np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)
-        blocked = (enter < leave) & (leave > 0) & (enter < 1)
-        blocked[np.arange(n), np.arange(n)] = False
-        return float(blocked.any(0).mean(1).sum())
+        start = np.einsum("bij,bj->bi", turn, eye - middle)[:, None, None]
+        way = np.einsum("bij,akj->baki", turn, points - eye)
+        enter, leave = _crossing(start, way, 0.5 * self.size[:, None, None])
+        hides = (enter < leave) & (leave > 0) & (enter < 1)
+        hides[np.arange(n), np.arange(n)] = False
+        return points, np.asarray(hides.any(0))
+
+    def _turns(self) -> np.ndarray:
+        """(n, 3, 3) from the room's frame to each object's."""
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        turn = np.zeros((len(self.size), 3, 3))
+        turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cos, -sin, 1.0, sin, cos
+        return turn
+
+
+def _crossing(start: np.ndarray, way: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where rays enter and leave boxes around 0 of these half sizes, in its lengths; later than that, they miss."""
+    way = np.where(np.abs(way) < 1e-9, 1e-9, way)
+    first, second = (-half - start) / way, (half - start) / way
+    return np.minimum(first, second).max(-1), np.maximum(first, second).min(-1)

@@ -53,23 +53,30 @@ RINGS = (1, 2, 4)  # pixels between neighbours, pass by pass
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Mean of the light over neighbours on the same flat piece of surface (joint bilateral filter), (h, w, 3) each."""
     height, width = light.shape[:2]
+    light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))
+    here = _along(normal, point)
     for apart in RINGS:  # passes with ever wider holes reach far with few neighbours ("a trous")
-        edge = ((apart, apart), (apart, apart), (0, 0))
+        edge = ((0, 0), (apart, apart), (apart, apart))
         padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
-        total, weight = np.zeros_like(light), np.zeros((height, width, 1), np.float32)
+        total, weight = np.zeros_like(light), np.zeros((height, width), np.float32)
         for down in (0, apart, 2 * apart):
             for across in (0, apart, 2 * apart):
-                there = slice(down, down + height), slice(across, across + width)
+                there = slice(None), slice(down, down + height), slice(across, across + width)
                 other_light, other_normal, other_point = (a[there] for a in padded)
-                turn = np.clip(np.einsum("hwc,hwc->hw", normal, other_normal), 0, 1)[..., None]
-                step = np.abs(np.einsum("hwc,hwc->hw", normal, other_point - point))[..., None]
+                turn = np.clip(_along(normal, other_normal), 0, 1)
+                step = np.abs(_along(normal, other_point) - here)
                 for _ in range(4):  # to the 16th power
                     turn *= turn
                 share = turn * (step < 0.02)
                 total += share * other_light
                 weight += share
         light = np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
-    return light
+    return light.transpose(1, 2, 0)
+
+
+def _along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h, w) scalar products of vectors whose components are planes, (3, h, w) each."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
 SUN = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
@@ -121,7 +128,7 @@ def _shade(
         return out.reshape(-1, size, LAYERS)
     face = hit["primID"][seen]
     bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
-    point = np.einsum("ncx,nc->nx", scenery.triangles[face], bary)
+    point = origin[seen] + hit["tfar"][seen, None] * direction[seen]
     normal = np.einsum("ncx,nc->nx", scenery.normals[face], bary)
     normal = _unit(normal)
     toward = -direction[seen]

@@ -13,10 +13,14 @@ APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
 WIDE = 21.0  # mm, for a camera inside: 81 degrees across
 EYES = 0.62  # of the height of the walls: where a camera inside is
-BEFORE = 2.0  # metres: what is nearer to the eye fills the picture
-FILLED = 30.0  # metres of depth that a picture full of what is near is worth
+STEEPEST = 0.3  # metres that a camera inside looks down for a metre ahead
+BEFORE, WALLED = 2.0, 0.9  # metres: what is nearer to the eye fills the picture, and which walls do
+FILLED = 250.0  # metres of depth that a picture full of what is near is worth
+SHOWN, FAR = 20.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
+PANS = (0.0, -0.3, 0.3)  # radians that a camera inside may turn aside from the middle
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
-STEPS = (0.3, 0.5, 0.8)  # metres from a corner that a camera inside may stand
+STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
+APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
 ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.25  # or along a wall, as shares of its length, and metres from it
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
@@ -93,28 +97,51 @@ def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Fu
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
     aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
-    best, most = middle + 0.1, -np.inf
+    near = [(things, BEFORE) for things in (furniture, hung) if things is not None and len(things.size)]
+    near.append((_walls(np.asarray(floor, float), height), WALLED))
+    best, most = _level_view(middle + 0.1, aim, height), -np.inf
     for spot in _spots(np.asarray(floor, float), middle):
         if not room.contains(shapely.LineString([spot, middle])):
             continue
-        view = _level_view(spot, aim, height)
-        eye = view[:3, 3]
-        merit = _depth(room, spot, aim - spot) + (spot - middle) @ furniture.facing - furniture.hidden(eye)
-        for things in (furniture, hung):
-            if things is not None and len(things.size):
-                merit -= FILLED * things.filled(view, APERTURE / 2 / WIDE, BEFORE)
-                merit -= FILLED * float((things.nearness(eye, BEFORE) > TOUCHED).any())
-        if merit > most:
-            best, most = spot, merit
-    return _level_view(best, aim, height)
+        points, blocked = furniture.blocked(np.array([spot[0], EYES * height, spot[1]]))
+        fixed = (spot - middle) @ furniture.facing
+        for pan in PANS:
+            way = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ (aim - spot)
+            view = _level_view(spot, spot + way, height)
+            merit = fixed + min(_depth(room, spot, way), FAR)
+            if len(points):
+                merit -= (blocked | ~_framed_points(points, view)).mean(1).sum()
+                merit += SHOWN * np.isfinite(furniture.away(view, APERTURE / 2 / WIDE)).mean()
+            for things, reach in near:
+                merit -= FILLED * things.filled(view, APERTURE / 2 / WIDE, reach)
+            for things, reach in near[:-1]:
+                merit -= FILLED * float((things.nearness(view[:3, 3], reach) > TOUCHED).any())
+            if merit > most:
+                best, most = view, merit
+    return best
+
+
+def _framed_points(points: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """(...) bool: which points (..., 3) are in the picture of a camera inside."""
+    x, y, z = np.moveaxis((points - view[:3, 3]) @ view[:3, :3], -1, 0)
+    return np.asarray((z < 0) & (np.maximum(np.abs(x), np.abs(y)) < -z * (APERTURE / 2 / WIDE)))
+
+
+def _walls(floor: np.ndarray, height: float) -> Furniture:
+    """The walls as thin boxes that stand outside of a floor (k, 2)."""
+    way = np.roll(floor, -1, 0) - floor
+    outwards = -np.array([inward_normal(floor, edge) for edge in range(len(floor))])
+    middle = floor + way / 2 + 0.05 * outwards
+    size = np.stack([np.linalg.norm(way, axis=1), np.full(len(floor), height), np.full(len(floor), 0.1)], 1)
+    return Furniture(size, np.insert(middle, 1, 0.0, axis=1), np.arctan2(outwards[:, 0], outwards[:, 1]))
 
 
 def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
     """Where a camera inside may stand, (2,) x and z each, metres: in the corners, then along the walls."""
     spots = []
     for corner in floor:
-        inwards = (middle - corner) / max(float(np.linalg.norm(middle - corner)), 1e-9)
-        spots += [corner + step * inwards for step in STEPS]
+        away = max(float(np.linalg.norm(middle - corner)), 1e-9)
+        spots += [corner + step / away * (middle - corner) for step in STEPS if step < max(away - APART, 0.9)]
     for edge in range(len(floor)):
         start, end = floor[edge], floor[(edge + 1) % len(floor)]
         spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
@@ -123,7 +150,9 @@ def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
 
 def _level_view(spot: np.ndarray, aim: np.ndarray, height: float) -> np.ndarray:
     """(4, 4) float camera to world from eye height over `spot` to a little lower over `aim`, x and z each."""
-    return view_matrix(np.array([spot[0], EYES * height, spot[1]]), np.array([aim[0], 0.3 * height, aim[1]]))
+    eye = np.array([spot[0], EYES * height, spot[1]])
+    lower = max(0.3 * height, eye[1] - STEEPEST * float(np.linalg.norm(aim - spot)))
+    return view_matrix(eye, np.array([aim[0], lower, aim[1]]))
 
 
 def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:

@@ -72,7 +72,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         files.update(asset.files)
     if room.options.thumbnails:
         files |= thumbnails(files, [*made, *small])
-    built = structure.shell_prims(room)
+    built = structure.shell_prims(room, dressing.bare)
     harmony = room.options.palette or looks.palette_of_room(room.provenance.seed)
     slots = _slots(small)
     table, bindings = room_looks(room, made, built, slots, harmony)

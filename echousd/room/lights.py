@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import shapely
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from echomodel.boxes import Boxes
@@ -28,17 +29,20 @@ SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
 SKY = "layers/sky.jpg"  # stays with the room where a store has the images
 BULB = 0.04  # metres, radius
 # Kelvin. White is 6504 to a renderer, which adapts to nothing as eyes do: lamps of 2,900 K would turn a room orange.
-DAYLIGHT, BULBS = 6500.0, 3900.0
+DAYLIGHT, BULBS = 6500.0, 4700.0
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
 SUN, OVERHEAD = 1.4, 0.55
 ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
-# What is left of sky, panel, sun and lamps.
-TIMES: Mapping[str, tuple[float, float, float, float]] = {
-    "day": (1.0, 1.0, 1.0, 0.15),
-    "evening": (0.16, 0.25, 0.0, 1.0),
-    "night": (0.02, 0.0, 0.0, 1.0),
+# What is left of sky, sun and lamps.
+TIMES: Mapping[str, tuple[float, float, float]] = {
+    "day": (1.0, 1.0, 0.15),
+    "evening": (0.16, 0.0, 1.0),
+    "night": (0.02, 0.0, 1.0),
 }
+# Lumens on a square metre of floor: what people have on at a time (the panel gives what the lamps do not, at least
+# `FILL`), and from where on a camera would expose less.
+LIT, FILL, BRIGHT = {"evening": 85.0, "night": 75.0}, 20.0, 160.0
 Intensities = dict[Sdf.Path, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
 
 
@@ -60,19 +64,27 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
         sky.CreateTextureFileAttr(Sdf.AssetPath(f"./{SKY}"))
         sky.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
     kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
-    above, panel = SHARES[kind]
-    full: Intensities = {sky.GetPath(): (0, 0.5 * above), **_panel(stage, volume, room.height, panel)}
+    above, share = SHARES[kind]
+    panel, flux = _panel(stage, volume, room.height)
+    full: Intensities = {sky.GetPath(): (0, 0.5 * above)}
     if room.options.walls:
         full |= _sun(stage, room)
-    full |= _lamps(stage, room)
+    lamps = _lamps(stage, room)
+    full |= lamps
+    lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / shapely.Polygon(room.floor).area
     times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
     for name, shares in TIMES.items():
         times.AddVariant(name)
         times.SetVariantSelection(name)
+        exposed, radiance = 1.0, share * min(20.0, 1.6 * room.height**2 * np.pi * NITS / flux)
+        if name in LIT:
+            exposed = min(1.0, BRIGHT / max(lumens, 1.0))
+            radiance = max(LIT[name] - lumens, FILL) * shapely.Polygon(room.floor).area / flux
         with times.GetVariantEditContext():
+            UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
             for path, (column, intensity) in full.items():
                 light = UsdLux.LightAPI(stage.OverridePrim(path))
-                light.CreateIntensityAttr(round(intensity * shares[column], 4))
+                light.CreateIntensityAttr(round(intensity * shares[column] * exposed, 4))
     times.SetVariantSelection("day")
 
 
@@ -81,8 +93,9 @@ def image_files(room: RoomData) -> dict[str, bytes]:
     return {SKY: baking.sky_image()} if room.options.walls else {}
 
 
-def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Intensities:
-    """A warm panel below the ceiling; of radiance L and area A it lights the floor with about L A / h²."""
+def _panel(stage: Usd.Stage, volume: Volume, height: float) -> tuple[Sdf.Path, float]:
+    """A panel below the ceiling, and its lumens at radiance 1; of radiance L and area A it lights the floor with about
+    L A / h²."""
     panel = UsdLux.RectLight.Define(stage, f"{LIGHTS}/ceiling")
     side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
     width, depth = (max(float(s), 0.5) for s in side)
@@ -92,7 +105,7 @@ def _panel(stage: Usd.Stage, volume: Volume, height: float, share: float) -> Int
     panel.CreateColorTemperatureAttr(DAYLIGHT)
     panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
     panel.AddRotateXOp().Set(-90.0)
-    return {panel.GetPath(): (1, share * min(20.0, 1.6 * height**2 / (width * depth)))}
+    return panel.GetPath(), np.pi * NITS * width * depth
 
 
 def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
@@ -114,7 +127,7 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
     sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
-    return {sun.GetPath(): (2, SUN if room.options.ceiling else OVERHEAD)}
+    return {sun.GetPath(): (1, SUN if room.options.ceiling else OVERHEAD)}
 
 
 def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
@@ -130,7 +143,7 @@ def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
         bulb.CreateEnableColorTemperatureAttr(True)
         bulb.CreateColorTemperatureAttr(BULBS)
         bulb.AddTranslateOp()
-        full[bulb.GetPath()] = (3, LUMENS[row.support] / (np.pi * NITS))
+        full[bulb.GetPath()] = (2, LUMENS[row.support] / (np.pi * NITS))
     if len(room.layouts) < 2:
         _hang_bulbs(stage, room, room.boxes)
         return full

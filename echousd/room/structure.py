@@ -63,14 +63,14 @@ class ShellPrim:
         return np.array(self.joint.anchor) if self.joint else np.zeros(3)
 
 
-def shell_prims(room: RoomData) -> list[ShellPrim]:
-    """All parts of a room's shell, walls before what is in them."""
+def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[ShellPrim]:
+    """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
     corners = room.graph.room.corners
     plan = room.floor if corners is None else corners
     slab = Piece(piece_name("Floor", "mesh"), "floor", floor_mesh(room.floor))
     parts = [ShellPart("Floor", "floor", (slab,))]
     if room.options.walls:
-        parts += walls(plan, room.height, room.graph.room.openings)
+        parts += walls(plan, room.height, room.graph.room.openings, bare)
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]

@@ -45,20 +45,22 @@ class ShellPart:
     joint: Joint | None = None
 
 
-def walls(polygon: np.ndarray, height: float, openings: Sequence[Opening] = ()) -> list[ShellPart]:
+def walls(
+    polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset()
+) -> list[ShellPart]:
     """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
 
     Arguments:
         polygon: (k, 2) float, corners (x, z) of the floor, metres, in the turn that the openings count edges in.
         height: of the room, metres.
-        openings: in these walls.
+        openings: in these walls. bare: names of the windows that have no curtain rail.
     """
     corners = np.ascontiguousarray(polygon, float)
-    return list(_walls(corners.tobytes(), height, tuple(openings)))
+    return list(_walls(corners.tobytes(), height, tuple(openings), bare))
 
 
 @lru_cache(maxsize=4)  # furniture is moved away from them before they are written
-def _walls(corners: bytes, height: float, openings: tuple[Opening, ...]) -> tuple[ShellPart, ...]:
+def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str]) -> tuple[ShellPart, ...]:
     polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
     parts = []
@@ -73,7 +75,10 @@ def _walls(corners: bytes, height: float, openings: tuple[Opening, ...]) -> tupl
         if boards is not None:
             pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         left_first = signed_area(polygon) > 0
-        inner = [_filled(name, opening, frame, float(length), height, left_first) for opening in here]
+        inner = [
+            _filled(name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first)
+            for opening in here
+        ]
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
     return tuple(parts)
 
@@ -131,7 +136,7 @@ def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Open
 def _filled(
     wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool
 ) -> ShellPart:
-    """What stands in an opening; passages have a frame and nothing else."""
+    """What stands in an opening; passages have a frame and nothing else. `height`: below which a rail must be."""
     name = f"{wall}_{opening.name}"
 
     def made(what: str, look: str, mesh: trimesh.Trimesh | None, solid: bool = True) -> tuple[Piece, ...]:

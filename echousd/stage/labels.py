@@ -12,7 +12,9 @@ from echousd.stage.values import texts
 
 LABELS_SCHEMA = "SemanticsLabelsAPI:"
 OLD_SCHEMA = "SemanticsAPI:"  # Omniverse before UsdSemantics
-STRUCTURE = frozenset({"floor", "wall", "walls", "ceiling", "door", "window", "room", "building", "curtain", "rug"})
+STRUCTURE = frozenset(
+    {"floor", "wall", "walls", "ceiling", "door", "window", "room", "building", "curtain", "blind", "rug"}
+)
 
 
 def labels(prim: Usd.Prim) -> Iterator[str]:

@@ -85,13 +85,17 @@ def test_nvidia_validator_reports_no_issues(rooms: list[Path], tmp_path: Path) -
             assert "No issues found" in run(command, "--no-variants", file, accepted=(0, 1)), file
 
 
-def test_materialx_knows_every_node(tmp_path: Path) -> None:
-    options = echousd.RoomOptions(walls=True, dress="some", materialx=True)
+def test_materialx_makes_shaders_of_every_material(tmp_path: Path) -> None:
+    options = echousd.RoomOptions(walls=True, ceiling=True, dress="full", materialx=True)
     made = echousd.generate("samples/study.usda", seed=5, shapes="boxes", options=options)
     room = made.save(tmp_path / "study", preview=False)
     found = json.loads(run(python_of("simready"), HERE / "materialx_check.py", room))
     assert found["nodes"] > 50
     assert found["wrong"] == []
+    assert found["invalid"] == []
+    assert len(set(found["shaders"].values())) == 1  # GLSL, ESSL, OSL and MDL of every material
+    stage = Usd.Stage.Open(str(room))
+    assert found["shaders"]["glsl"] == len(stage.GetPrimAtPath("/Room/Looks").GetChildren())
     # it runs on usd-core, which comes without UsdMtlx and knows no node of MaterialX
     said = run(python_of("nvidia").with_name("nvidia_usd_validate"), "--no-variants", room, accepted=(0, 1))
     assert all("shaderId 'ND_" in line for line in said.splitlines() if "validation:[" in line)

@@ -52,11 +52,13 @@ class Dressing:
         layouts: for every layout of the room, name of a thing -> the thing.
         assets: name of a thing -> name of its asset; one name is one asset in all layouts.
         geometry: name of an asset -> its geometry.
+        bare: names of the windows that have curtains in no layout.
     """
 
     layouts: tuple[Mapping[str, Thing], ...]
     assets: Mapping[str, str]
     geometry: Mapping[str, Geometry]
+    bare: frozenset[str] = frozenset()
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -80,10 +82,13 @@ def dress(room: RoomData) -> Dressing:
     known: dict[tuple, str] = {}
     kinds: dict[str, tuple] = {}
     taken = {*room.names, *room.assets.values()}
+    bare = {o.name for o in room.graph.room.openings if o.kind == "window" and room.options.dress != "none"}
     if room.options.dress != "none":
         for number in range(max(len(room.layouts), 1)):
             named: dict[str, Thing] = {}
-            for found in placed(room, number):
+            setting = dressed(room, number)
+            bare -= setting.curtained
+            for found in setting.placed:
                 key = (found.kind, *np.round(found.size, 4).tolist(), found.variant)
                 if key not in known:
                     known[key] = free_name(f"small_{found.kind}", taken | set(geometry))
@@ -94,15 +99,20 @@ def dress(room: RoomData) -> Dressing:
                     name = free_name(word, taken | set(named) | set(kinds))
                 named[name], assets[name] = found, known[key]
             layouts.append(named)
-    return Dressing(tuple(layouts), assets, geometry)
+    return Dressing(tuple(layouts), assets, geometry, frozenset(bare))
 
 
 def placed(room: RoomData, layout: int = 0) -> list[Thing]:
     """The things of one layout, in the order in which they were placed."""
+    return dressed(room, layout).placed
+
+
+def dressed(room: RoomData, layout: int = 0) -> Setting:
+    """One layout after all rules."""
     setting = setting_of(room, layout)
     for rule in RULES:
         rule(setting)
-    return setting.placed
+    return setting
 
 
 def setting_of(room: RoomData, layout: int = 0) -> Setting:

@@ -102,6 +102,7 @@ class Setting:
         full: place as much as looks good, not only a little.
         seed: of all choices.
         placed: the things so far. carriers: those of them that others stand on.
+        curtained: names of the windows that have curtains.
     """
 
     objects: Mapping[str, Standing]
@@ -113,6 +114,7 @@ class Setting:
     seed: int
     placed: list[Thing] = field(default_factory=list)
     carriers: dict[str, Standing] = field(default_factory=dict)
+    curtained: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.room = shapely.Polygon(self.floor)
@@ -217,5 +219,8 @@ def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
         over = (start[:, 1] - level) * (end[:, 1] - level) < 0
         share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
         found.append(start[over] + share[:, None] * (end[over] - start[over]))
-    inside = np.concatenate(found)
-    return shapely.convex_hull(shapely.multipoints(inside[:, [0, 2]])) if len(inside) else shapely.Polygon()
+    inside = np.concatenate(found)[:, [0, 2]]
+    if not len(inside):
+        return shapely.Polygon()
+    # a line has the hull of its points and is one object rather than thousands
+    return shapely.convex_hull(shapely.linestrings(np.concatenate([inside, inside[:1]])))

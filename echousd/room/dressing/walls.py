@@ -15,6 +15,7 @@ EYE = 1.52  # metres, height of a picture's middle on an empty wall
 OVER = 0.22  # metres between furniture and what hangs over it
 NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
 SIDE = 0.32  # metres that curtains take beside a window
+BLIND = 0.016  # metres, thickness of a roller blind, which hangs between a window's jambs
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,10 @@ def walls_of(setting: Setting) -> list[Wall]:
 
 
 def curtains(setting: Setting) -> None:
-    """A curtain on either side of every window that has a rail, down to the floor, the sill or what stands there."""
+    """A curtain on either side of every window, down to the floor, the sill or what stands there.
+
+    Where there is no room for two, a roller blind in the window.
+    """
     if not setting.walls:
         return
     above, before, beyond = RAIL
@@ -57,6 +61,7 @@ def curtains(setting: Setting) -> None:
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
             if rail > setting.height - 0.05:
+                _blind(setting, wall, window)
                 continue
             rng = setting.rng(window.name, "curtain")
             wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
@@ -79,7 +84,20 @@ def curtains(setting: Setting) -> None:
                 ]
                 if None not in sides:  # one alone looks forgotten
                     setting.placed += [one for one in sides if one is not None]
+                    setting.curtained.add(window.name)
                     break
+            else:
+                _blind(setting, wall, window)
+
+
+def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
+    """A roller blind, let down over a part of the pane."""
+    rng = setting.rng(window.name, "blind")
+    tall = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3)
+    size = np.array([round(window.width - 0.012, 3), tall, BLIND])
+    middle = (window.offset + window.end) / 2
+    place = wall.at(middle, -BLIND / 2 - 0.003, window.sill + window.height - 0.004 - tall)
+    setting.placed.append(Thing("blind", size, place, wall.yaw))
 
 
 def pictures(setting: Setting) -> None:

@@ -26,6 +26,7 @@ from echousd.room.dressing.walls import curtains
 from echousd.room.geometry import Collider, Geometry, Origin, Part
 from echousd.room.sources.boxes import ORIGIN
 from echousd.room.sources.solid import solid_geometry
+from echousd.room.walls import walls
 from echousd.stage import read_graph
 
 
@@ -97,6 +98,24 @@ def test_things_stay_in_the_room_and_out_of_each_other(room):
                 one.position[1], other.position[1]
             )
             assert apart or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
+
+
+def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
+    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
+    setting = Setting({}, floor, (window,), 2.7, True, False, 0)
+    setting.placed = [Thing("floor_vase", np.array([3.4, 2.4, 0.35]), np.array([0.0, 0.0, -1.8]), 0.0)]
+    curtains(setting)
+    (blind,) = setting.placed[1:]
+    assert blind.kind == "blind"
+    assert not setting.curtained
+    assert -2.02 < blind.footprint.bounds[1] < blind.footprint.bounds[3] < -2.0  # between the jambs, not in the room
+    assert blind.footprint.bounds[0] > -0.9
+    assert blind.position[1] + blind.size[1] < 2.2
+    for bare, rails in ((frozenset(), 1), (frozenset({"window"}), 0)):
+        pieces = [piece.name for part in walls(floor, 2.7, (window,), bare)[0].inner for piece in part.pieces]
+        assert len(pieces) == 3 + rails
+        assert sum(name.endswith("rail") for name in pieces) == rails
 
 
 def test_nothing_stands_over_an_edge_or_in_the_air(room):

@@ -40,6 +40,17 @@ def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
     return [Sheet(front=front + thick, back=front - thick, material="curtain")]
 
 
+def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A roller blind let down: cloth from the roller at its top to the bar at its foot."""
+    w, h, d = size
+    roller, bar = min(0.03, 0.2 * h), min(0.02, 0.1 * h)
+    return [
+        box((-w / 2, h - roller, -d / 2), (w / 2, h, d / 2), "frame", 0.3 * d),
+        box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), "curtain"),
+        box((-0.49 * w, 0, -0.3 * d), (0.49 * w, bar, 0.3 * d), "frame", 0.1 * d),
+    ]
+
+
 def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A square cushion that leans back."""
     w, h, d = size
