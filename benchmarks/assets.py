@@ -27,7 +27,7 @@ from echousd.assets.describe import described
 from echousd.assets.front import front_by_shape
 from echousd.assets.likeness import named_by_shape
 from echousd.assets.measure import measure
-from echousd.assets.naming import category_of
+from echousd.assets.naming import category_of, fitted
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import Library
 
@@ -88,7 +88,7 @@ def judged(entries: list, held: dict, split: str) -> None:
     draw = random.Random(0)
     for entry in entries:
         row = held.get(entry.key)
-        if row is None:
+        if row is None or fitted(row.category, entry.name, entry.group):  # units of a kitchen are none of ours
             continue
         found, _ = category_of((), entry.name, entry.group, entry.dims)
         if found:

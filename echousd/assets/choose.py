@@ -223,12 +223,17 @@ def _best(
 ) -> AssetRecord | None:
     ranked: list[tuple[float, str, AssetRecord]] = []
     told = np.reshape(told_colors(one.told), (-1, 3))
+    loud = True  # until there is one whose colours are not
     for category, cost in _shelves_for(one.category, wishes):
+        if category != one.category and one.category in wishes.shelves and not loud:
+            break  # kin of what is there stand in for it alone where all of it is loud
         shelf = wishes.shelves[category]
+        colors = color_costs(shelf.colors, one.category, tones, told)
+        loud = loud and bool((colors > OTHER_WORD).all())
         ratio = np.abs(np.log(np.array(one.size) / shelf.sizes))
         costs = cost + ratio.mean(1) + BEYOND * np.maximum(ratio - math.log(wishes.stretch), 0).sum(1)
         odd = shelf.oddness(one.category)
-        costs += UNSURE * shelf.doubts + BEYOND * odd + color_costs(shelf.colors, one.category, tones, told)
+        costs += UNSURE * shelf.doubts + BEYOND * odd + colors
         if category != one.category:  # nobody dines at a coffee table, however near it is of kin
             costs[odd > 0] = np.inf
         for number in np.argsort(costs, kind="stable")[:64]:
@@ -247,13 +252,14 @@ def _best(
 
 
 def _shelves_for(word: str, wishes: AssetWishes) -> list[tuple[str, float]]:
-    """Categories whose models may stand for one, with what that costs; the nearest kind that there is."""
+    """Categories whose models may stand for one, with what that costs; those of the nearest kind, its own first."""
     row = vocabulary().category(word)
     found = [(word, 0.0)] if word in wishes.shelves else []
     for kin, cost in ((_same_word, OTHER_WORD), (_same_family, OTHER_FAMILY)):
+        others = [c.name for c in vocabulary().categories if c.name in wishes.shelves and kin(row, c)]
+        found += [(name, cost) for name in others if name != word]
         if found:
             break
-        found = [(c.name, cost) for c in vocabulary().categories if c.name in wishes.shelves and kin(row, c)]
     return found
 
 

@@ -13,7 +13,7 @@ from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
 MOST = 3  # colours of a model
 TEXELS = 16  # along a side of a texture, made small
 ONE = 0.09  # distance in OKLab within which colours are one
-LEAST = 0.06  # share of a surface below which a colour is none of the model's
+LEAST = 0.012  # share of a surface below which a colour is none of the model's
 CELL = 0.05  # of OKLab, in which colours are counted
 
 CONES = np.array(

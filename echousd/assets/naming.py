@@ -11,11 +11,13 @@ import numpy as np
 from echomodel.data.meshes import class_by_name
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
+from echousd.assets.abroad import english, from_abroad
 
 LABELLED, CALLED, MEANT, SHELVED = 0.97, 0.9, 0.75, 0.55  # confidence in a category by where its word stands
 UNITS = (1.0, 0.01, 0.001, 0.0254)  # metres of units that models come in, the likeliest first
 GENERAL = {"table": "table", "sofa": "sofa", "stool": "stool", "double_bed": "bed"}  # what sizes make more particular
 OFFICE = {"chair": "office_chair", "dining_table": "desk"}  # what a general word means on the shelf of offices
+FITTED = re.compile(r"kitchen|bath ?room|wash ?basin|\bsink\b|\btoilet|ku(e)?chen|cuisine|cocina|cucina|keuken|cozinha")
 SLACK = 1.6  # how far beyond the sizes that 90 % of real ones have a size is still believed
 
 
@@ -35,12 +37,26 @@ def category_of(
             return _refined(found, dims, group), LABELLED * _likeliness(found, dims)
     size = np.ones(3) if dims is None else dims
     for text, confidence in ((name, CALLED), (group, SHELVED)):
-        plain = re.sub(r"[_\-]+", " ", text)
-        found = known_word(text) or _within(text, 2) or class_by_name(plain, group, size) or _within(text)
+        plain = re.sub(r"[_\-]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z0-9])", " ", text))
+        found = known_word(plain) or _abroad(plain, group, size)
+        found = found or _within(plain, 2) or class_by_name(plain, group, size) or _within(plain)
+        if found and fitted(found, text, group):
+            return "", 0.0
         if found:
-            surely = confidence if known_word(text) or _within(text) else min(confidence, MEANT)
+            surely = confidence if known_word(plain) or _within(plain) else min(confidence, MEANT)
             return _refined(found, dims, group), surely * _likeliness(found, dims)
     return "", 0.0
+
+
+def _abroad(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
+    """The category of a name that is no English one, "" where it is one or means nothing of ours."""
+    word = english(text) if from_abroad(text) or not _within(text) else ""
+    return (known_word(word) or class_by_name(word, group, size)) if word else ""
+
+
+def fitted(category: str, *texts: str) -> bool:
+    """Whether a piece of storage is a unit of a kitchen or bathroom by its name or shelf, which stands in no other."""
+    return vocabulary().category(category).role == "storage" and any(FITTED.search(text.lower()) for text in texts)
 
 
 @cache

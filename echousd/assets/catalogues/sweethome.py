@@ -8,6 +8,7 @@ from echomodel.data.catalogues import MeshEntry, read_library
 from echomodel.data.meshes import class_by_name, reviewed
 from echousd.assets.catalogues.entry import Entry, Told
 from echousd.assets.model_file import ModelFile
+from echousd.assets.naming import fitted
 
 SUFFIX = ".sh3f"
 
@@ -37,6 +38,7 @@ def _entry(entry: MeshEntry) -> Entry:
     assert entry.size is not None
     category = class_by_name(entry.name, entry.group, entry.size)
     known = reviewed().get(entry.key, {})
+    category = "" if category and fitted(category, entry.name, entry.group) else category
     category = "" if known.get("use") == "0" else known.get("class", category)
     return Entry(
         entry.key,

@@ -1,7 +1,7 @@
 import pytest
 
 from echousd.assets.licences import allowed, needs_credit, spdx
-from echousd.assets.naming import category_of, likely_unit
+from echousd.assets.naming import category_of, fitted, likely_unit
 
 
 @pytest.mark.parametrize(
@@ -44,10 +44,29 @@ def test_a_filter_lets_through_what_it_names_and_nothing_more():
         ((), "billy bookcase white", None, "bookshelf"),
         ((), "table", (1.0, 0.4, 0.6), "coffee_table"),
         ((), "toaster", None, ""),
+        ((), "bunkBed90x190", (1.1, 1.8, 2.0), "kids_bed"),
+        ((), "Bücherregal", None, "bookshelf"),
+        ((), "Couchtisch Eiche", (1.1, 0.4, 0.6), "coffee_table"),
+        ((), "table_de_chevet", (0.4, 0.5, 0.4), "nightstand"),
+        ((), "Lit 140x190", (1.6, 0.7, 2.0), "double_bed"),
+        ((), "mesilla de noche", None, "nightstand"),
+        ((), "Divano ad angolo", (2.4, 0.8, 1.7), "l_shaped_sofa"),
+        ((), "eetkamerstoel", None, "chair"),
+        ((), "Guarda-roupa", None, "wardrobe"),
+        ((), "Kühlschrank", None, ""),
+        ((), "Küchenschrank", None, ""),
+        ((), "Kitchen upper cabinet", None, ""),
     ],
 )
 def test_words_say_what_a_model_is(labels, name, dims, category):
     assert category_of(labels, name, "", dims)[0] == category
+
+
+def test_units_of_a_kitchen_are_no_cabinets_but_its_chairs_are_chairs():
+    assert category_of((), "Lower cabinet", "Kitchen") == ("", 0.0)
+    assert category_of((), "Wine cabinet", "Living room")[0] == "wine_cabinet"
+    assert category_of((), "Chair", "Kitchen", (0.45, 0.9, 0.5))[0] == "chair"
+    assert fitted("cabinet", "Drawers cabinet", "Kitchen")
 
 
 def test_confidence_falls_with_the_place_of_the_word_and_with_sizes_that_no_such_thing_has():
