@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 from pathlib import Path
 
 from echousd.assets.catalogues.entry import Entry, Told
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
 
+STAND_IN = re.compile(r"[_\-. ](collision|collider|convex|physics|lod_?[1-9])\d*$", re.IGNORECASE)
 GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
 
 
@@ -28,6 +30,8 @@ class PlainFolder:
         files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
         files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
         parts = parts_of_others(files)
+        stems = {(file.parent, file.stem) for file in files}
+        files = [file for file in files if not stands_in(file.stem, {stem for at, stem in stems if at == file.parent})]
         return [self._entry(file, folder) for file in files if file not in parts]
 
     def _entry(self, file: Path, top: Path) -> Entry:
@@ -37,6 +41,14 @@ class PlainFolder:
         licence, author = licence_beside(file.parent, top)
         group = file.parent.name if file.parent != top else ""
         return Entry(key, ModelFile(file, top), name, group=group, licence=licence, author=author)
+
+
+def stands_in(stem: str, others: Set[str]) -> bool:
+    """Whether a file is what stands in for another one beside it: its collision mesh, or a lower level of detail."""
+    found = STAND_IN.search(stem)
+    return found is not None and any(
+        other != stem and other.startswith(stem[: found.start()]) and not STAND_IN.search(other) for other in others
+    )
 
 
 def parts_of_others(files: list[Path]) -> set[Path]:

@@ -18,6 +18,7 @@ from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, Vt
 from echousd.assets.model_file import Beside, ModelFile, checked_image
 from echousd.room.assets import new_stage
 from echousd.room.originals.original import CONVERTED
+from echousd.room.originals.winding import outward
 from echousd.room.surface import box_projection, creased_normals
 from echousd.stage.files import layer_bytes
 
@@ -89,6 +90,7 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
             continue
         points = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces)[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else np.asarray(mesh.faces)
+        faces = outward(points, faces)
         uv = getattr(mesh.visual, "uv", None)
         whole = uv is not None and len(uv) == len(points) and bool(np.isfinite(uv).all())
         yield _Part(points, faces, np.asarray(uv) if whole else None, getattr(mesh.visual, "material", None))
