@@ -32,8 +32,8 @@ def outward(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     edges = np.maximum(np.bincount(of_edge, minlength=pieces), 1)
     even = np.bincount(of_edge, once, pieces) == edges
     closed = np.bincount(of_edge, paired, pieces) >= CLOSED * edges
-    middle = np.stack([np.bincount(of_face, points[faces].mean(1)[:, axis], pieces) for axis in range(3)], 1)
-    middle /= np.maximum(np.bincount(of_face, minlength=pieces), 1)[:, None]
+    sums = np.stack([np.bincount(of_face, points[faces].mean(1)[:, axis], pieces) for axis in range(3)], 1)
+    middle = sums / np.maximum(np.bincount(of_face, minlength=pieces), 1)[:, None]
     a, b, c = (points[faces[:, k]] - middle[of_face] for k in range(3))
     volume = np.bincount(of_face, np.einsum("ij,ij->i", a, np.cross(b, c)), pieces)
     wrong = (even & closed & (volume < 0))[of_face]
