@@ -17,7 +17,8 @@ def files(room: RoomData) -> dict[str, bytes]:
 
 def text(room: str, origins: dict[str, Origin]) -> str:
     """A table of the models, by licence and author."""
-    lines = [f"# Models in {room}", "", "Made by others, and placed and scaled here; a licence may ask that they are named.", ""]
+    told = "Made by others, and placed and scaled here; a licence may ask that they are named."
+    lines = [f"# Models in {room}", "", told, ""]
     lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
     for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
         cells = (name, origin.asset, origin.licence, origin.credit or "unknown")
