@@ -92,8 +92,8 @@ def evaluate_parts(
         spread.append(float(apart.mean()) if len(apart) else 0.0)
         distinct += len({tuple(np.round(vector, 2)) for vector in found.numpy()})
         told("classes", number + 1, len(words))
-    ours = _clouds(meshes)
-    result: dict = {"model": model.hash, **asdict(settings), "pieces": counts, "sets": set_scores(ours, _clouds(fresh))}
+    ours = clouds(meshes)
+    result: dict = {"model": model.hash, **asdict(settings), "pieces": counts, "sets": set_scores(ours, clouds(fresh))}
     if shapes is not None:
         result["shapes_set"] = str(shapes.directory)
         result["shapes_sets"] = set_scores(ours, _references(shapes, ours, rng))
@@ -185,7 +185,7 @@ def _sampled(
     return model.sample_furniture(graph, boxes, generator=generator, steps=steps).float().cpu()
 
 
-def _clouds(meshes: dict[str, list[trimesh.Trimesh]]) -> dict[str, np.ndarray]:
+def clouds(meshes: dict[str, list[trimesh.Trimesh]]) -> dict[str, np.ndarray]:
     """Points on the surfaces in the unit box, class -> (n, POINTS, 3)."""
     return {name: np.stack([_cloud(mesh) for mesh in found]) for name, found in meshes.items() if found}
 

@@ -1,0 +1,123 @@
+"""Part tokens made exact: straight what is nearly straight, in the middle, on the floor, and nothing in the air."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from echomodel.data.furniture.mirroring import solids_of
+from echomodel.data.furniture.solids import Array
+from echomodel.data.furniture.tokens import (
+    CENTRE,
+    EXTENT,
+    GROUPS,
+    HOT,
+    IDENTITY,
+    STARTS,
+    TURN,
+    WORDS,
+    reach_of,
+    say,
+    turn_of,
+    word,
+)  # fmt: skip
+from echomodel.data.furniture.touching import group_of, surface_of
+
+STRAIGHT = np.cos(np.radians(4))  # turns of less are none
+NEAR = 0.02  # metres to a side of the box, or between a middle and the middle, that are none
+CLOSE, FAR = 0.03, 0.15  # metres of air that a part is lengthened over, and over which it is moved; others go
+OVERLAP = 0.004  # metres that parts reach into each other
+ROUNDS = 4
+FREE = ("rod", "bent", "double", "curve", "ring")  # kinds without faces to lengthen
+
+
+def snapped(tokens: Array, size: Array) -> Array:
+    """Tokens (T', WIDTH), T' <= T, that stand on the floor of the box `size` (3,), metres, and all hang together."""
+    size = np.asarray(size, float)
+    out = np.stack([_straightened(token, size) for token in np.asarray(tokens, float)])
+    for _ in range(ROUNDS):
+        loose = loose_tokens(out, size)
+        if not loose:
+            return out
+        out = _joined(out, size, loose)
+    loose = loose_tokens(out, size)
+    return np.delete(out, sorted(loose), axis=0) if len(loose) < len(out) else out[:1]
+
+
+def loose_tokens(tokens: Array, size: Array) -> set[int]:
+    """Numbers of the tokens of which a copy touches nothing that hangs together with the largest body."""
+    group, main = group_of(solids_of(tokens, size))
+    owner = owners(tokens)
+    return {int(owner[number]) for number in np.flatnonzero(group != main)}
+
+
+def owners(tokens: Array) -> Array:
+    """Number of the token behind every solid of `solids_of`."""
+    flag = tokens[:, STARTS["mirror"] : STARTS["mirror"] + GROUPS[-1]].argmax(1)
+    every = np.arange(len(tokens))
+    return np.concatenate([every, every[np.isin(flag, (1, 3))], every[np.isin(flag, (2, 3))], every[flag == 3]])
+
+
+def _straightened(token: Array, size: Array) -> Array:
+    """Words as words, small turns undone, what is nearly in the middle there, sides on the box's; in the box."""
+    out, metre = token.copy(), 2 / size
+    for name, words in WORDS.items():
+        start = STARTS[name]
+        say(out, name, words[int(out[start : start + len(words)].argmax())])
+    out[HOT:] = out[HOT:].clip(-1.3, 1.3)
+    kind, flag = word(out, "kind"), word(out, "mirror")
+    turn = turn_of(out)
+    straight = min(turn[0, 0], turn[1, 1], turn[2, 2]) > STRAIGHT or kind in FREE[:-1]
+    turn = IDENTITY if straight else turn
+    out[TURN] = turn[:, :2].T.ravel()
+    for axis, copies in ((0, ("none", "z")), (2, ("none", "x"))):
+        if abs(out[CENTRE][axis]) < NEAR * metre[axis] and flag in copies:
+            out[CENTRE.start + axis] = 0.0
+    half = ((out[EXTENT].clip(-1, 1) + 1) / 2) ** 2 * reach_of(turn, size) * metre  # of local axes
+    if straight:
+        low, high = out[CENTRE] - half, out[CENTRE] + half
+        low = np.where(low < -1 + NEAR * metre, -1.0, low).clip(-1, 0.98)
+        high = np.where(high > 1 - NEAR * metre, 1.0, high).clip(-0.98, 1)
+        high = np.maximum(high, low + 1e-3 * metre)
+        out[CENTRE] = (low + high) / 2
+        out[EXTENT] = 2 * np.sqrt((high - low) / 2) - 1
+    else:
+        out[CENTRE] = out[CENTRE].clip(-1, 1)
+    return out
+
+
+def _joined(tokens: Array, size: Array, loose: set[int]) -> Array:
+    """Tokens whose copies hang in the air lengthened, moved or left out, by how far away the rest is."""
+    solids, owner = solids_of(tokens, size), owners(tokens)
+    group, main = group_of(solids)
+    ground = np.concatenate([surface_of(solids[i]) for i in np.flatnonzero(group == main)])
+    tree = cKDTree(ground)
+    out, gone = tokens.copy(), []
+    for number in sorted(loose):
+        copies = np.flatnonzero((owner == number) & (group != main))
+        if copies[0] != number:  # the other copy holds: only its mirror image hangs in the air
+            say(out[number], "mirror", "none")
+            continue
+        # all that hangs together with it moves alike: the way of the nearest of them
+        mates = [surface_of(solids[i]) for i in np.flatnonzero(group == group[number])]
+        points = np.concatenate(mates)
+        distance, to = tree.query(points)
+        nearest = int(distance.argmin())
+        if distance[nearest] > FAR:
+            gone.append(number)
+            continue
+        way = ground[to[nearest]] - points[nearest]
+        axis = int(np.abs(way).argmax())
+        lengthened = len(mates) == 1 and word(out[number], "kind") not in FREE
+        if lengthened and abs(way[axis]) <= CLOSE and np.allclose(turn_of(out[number]), IDENTITY):
+            _lengthen(out[number], axis, way[axis] + np.sign(way[axis]) * OVERLAP, size)
+        else:
+            length = max(float(np.linalg.norm(way)), 1e-9)
+            out[number, CENTRE] += way * (1 + OVERLAP / length) * 2 / size
+    return np.delete(out, gone, axis=0) if len(gone) < len(out) else out[:1]
+
+
+def _lengthen(token: Array, axis: int, by: float, size: Array) -> None:
+    half = ((token[EXTENT][axis] + 1) / 2) ** 2 + abs(by) / size[axis]
+    token[EXTENT.start + axis] = 2 * np.sqrt(min(half, 1.0)) - 1
+    token[CENTRE.start + axis] += by / size[axis]
