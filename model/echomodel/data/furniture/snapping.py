@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from echomodel.data.furniture.mirroring import solids_of
-from echomodel.data.furniture.solids import Array
+from echomodel.data.furniture.solids import Array, Solid
 from echomodel.data.furniture.tokens import (
     CENTRE,
     EXTENT,
@@ -25,7 +27,7 @@ from echomodel.data.furniture.touching import group_of, surface_of
 
 STRAIGHT = np.cos(np.radians(4))  # turns of less are none
 NEAR = 0.02  # metres to a side of the box, or between a middle and the middle, that are none
-CLOSE, FAR = 0.03, 0.15  # metres of air that a part is lengthened over, and over which it is moved; others go
+CLOSE, FAR = 0.08, 0.15  # metres of air that a part is lengthened over, and over which it is moved; others go
 OVERLAP = 0.004  # metres that parts reach into each other
 ROUNDS = 4
 FREE = ("rod", "bent", "double", "curve", "ring")  # kinds without faces to lengthen
@@ -45,17 +47,26 @@ def snapped(tokens: Array, size: Array) -> Array:
 
 
 def loose_tokens(tokens: Array, size: Array) -> set[int]:
-    """Numbers of the tokens of which a copy touches nothing that hangs together with the largest body."""
-    group, main = group_of(solids_of(tokens, size))
-    owner = owners(tokens)
+    """Numbers of the tokens of which a copy touches nothing that hangs together with the bulkiest body."""
+    group, main = _bodies(solids_of(tokens, size))
+    owner, _ = owners(tokens)
     return {int(owner[number]) for number in np.flatnonzero(group != main)}
 
 
-def owners(tokens: Array) -> Array:
-    """Number of the token behind every solid of `solids_of`."""
+def owners(tokens: Array) -> tuple[Array, Array]:
+    """Number of the token behind every solid of `solids_of`, and (n, 3) signs by which that one mirrors it."""
     flag = tokens[:, STARTS["mirror"] : STARTS["mirror"] + GROUPS[-1]].argmax(1)
     every = np.arange(len(tokens))
-    return np.concatenate([every, every[np.isin(flag, (1, 3))], every[np.isin(flag, (2, 3))], every[flag == 3]])
+    copies = [every, every[np.isin(flag, (1, 3))], every[np.isin(flag, (2, 3))], every[flag == 3]]
+    signs = np.array([[1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1]])
+    return np.concatenate(copies), np.repeat(signs, [len(some) for some in copies], axis=0)
+
+
+def _bodies(solids: Sequence[Solid]) -> tuple[Array, int]:
+    """As `group_of`, but the main body is the bulkiest: a top and not one of four legs in the air."""
+    group, _ = group_of(solids)
+    bulk = [np.prod(np.ptp(solid.mesh(0)[0], axis=0)) for solid in solids]
+    return group, int(np.bincount(group, bulk).argmax())
 
 
 def _straightened(token: Array, size: Array) -> Array:
@@ -88,36 +99,36 @@ def _straightened(token: Array, size: Array) -> Array:
 
 def _joined(tokens: Array, size: Array, loose: set[int]) -> Array:
     """Tokens whose copies hang in the air lengthened, moved or left out, by how far away the rest is."""
-    solids, owner = solids_of(tokens, size), owners(tokens)
-    group, main = group_of(solids)
+    solids, (owner, signs) = solids_of(tokens, size), owners(tokens)
+    group, main = _bodies(solids)
     ground = np.concatenate([surface_of(solids[i]) for i in np.flatnonzero(group == main)])
     tree = cKDTree(ground)
     out, gone = tokens.copy(), []
     for number in sorted(loose):
-        copies = np.flatnonzero((owner == number) & (group != main))
-        if copies[0] != number:  # the other copy holds: only its mirror image hangs in the air
-            say(out[number], "mirror", "none")
-            continue
+        copy = int(np.flatnonzero((owner == number) & (group != main))[0])
         # all that hangs together with it moves alike: the way of the nearest of them
-        mates = [surface_of(solids[i]) for i in np.flatnonzero(group == group[number])]
-        points = np.concatenate(mates)
+        mates = np.flatnonzero(group == group[copy])
+        points = np.concatenate([surface_of(solids[i]) for i in mates])
         distance, to = tree.query(points)
         nearest = int(distance.argmin())
         if distance[nearest] > FAR:
             gone.append(number)
             continue
-        way = ground[to[nearest]] - points[nearest]
-        axis = int(np.abs(way).argmax())
-        lengthened = len(mates) == 1 and word(out[number], "kind") not in FREE
-        if lengthened and abs(way[axis]) <= CLOSE and np.allclose(turn_of(out[number]), IDENTITY):
-            _lengthen(out[number], axis, way[axis] + np.sign(way[axis]) * OVERLAP, size)
-        else:
-            length = max(float(np.linalg.norm(way)), 1e-9)
-            out[number, CENTRE] += way * (1 + OVERLAP / length) * 2 / size
+        way = (ground[to[nearest]] - points[nearest]) * signs[copy]
+        way = way * (1 + OVERLAP / max(float(np.linalg.norm(way)), 1e-9))
+        if len(mates) > 1 or not _lengthened(out[number], way, size):
+            out[number, CENTRE] += way * 2 / size
     return np.delete(out, gone, axis=0) if len(gone) < len(out) else out[:1]
 
 
-def _lengthen(token: Array, axis: int, by: float, size: Array) -> None:
-    half = ((token[EXTENT][axis] + 1) / 2) ** 2 + abs(by) / size[axis]
+def _lengthened(token: Array, way: Array, size: Array) -> bool:
+    """Whether a token could be made longer by `way` (3,), metres, along one of its own axes, and is, in place."""
+    turn = turn_of(token)
+    local = turn.T @ way
+    axis = int(np.abs(local).argmax())
+    if word(token, "kind") in FREE or abs(local[axis]) > CLOSE or abs(local[axis]) < 0.8 * np.linalg.norm(way):
+        return False
+    half = ((token[EXTENT][axis] + 1) / 2) ** 2 + abs(local[axis]) / 2 / reach_of(turn, size)[axis]
     token[EXTENT.start + axis] = 2 * np.sqrt(min(half, 1.0)) - 1
-    token[CENTRE.start + axis] += by / size[axis]
+    token[CENTRE] += turn[:, axis] * local[axis] / size
+    return True
