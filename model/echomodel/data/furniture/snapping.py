@@ -42,8 +42,9 @@ def snapped(tokens: Array, size: Array) -> Array:
         if not loose:
             return out
         out = _joined(out, size, loose)
-    loose = loose_tokens(out, size)
-    return np.delete(out, sorted(loose), axis=0) if len(loose) < len(out) else out[:1]
+    while loose := loose_tokens(out, size):
+        out = _without(out, size, loose)
+    return out
 
 
 def loose_tokens(tokens: Array, size: Array) -> set[int]:
@@ -119,6 +120,20 @@ def _joined(tokens: Array, size: Array, loose: set[int]) -> Array:
         if len(mates) > 1 or not _lengthened(out[number], way, size):
             out[number, CENTRE] += way * 2 / size
     return np.delete(out, gone, axis=0) if len(gone) < len(out) else out[:1]
+
+
+def _without(tokens: Array, size: Array, loose: set[int]) -> Array:
+    """Fewer tokens: those loose ones that hold on their own lose their mirror copies, the others go; one stays."""
+    group, main = _bodies(solids_of(tokens, size))
+    out = tokens.copy()
+    held = [number for number in loose if group[number] == main]
+    for number in held:
+        say(out[number], "mirror", "none")
+    gone = sorted(loose - set(held))
+    if len(gone) < len(out):
+        return np.delete(out, gone, axis=0)
+    say(out[0], "mirror", "none")
+    return out[:1]
 
 
 def _lengthened(token: Array, way: Array, size: Array) -> bool:
