@@ -46,7 +46,7 @@ def packed(tokens: Sequence[np.ndarray]) -> tuple[Tensor, Tensor]:
     return torch.from_numpy(np.concatenate(tokens)).float(), piece
 
 
-def trained_judge(pieces: TokenSet, seed: int, steps: int = 600) -> tuple[StyleJudge, dict[str, float]]:
+def trained_judge(pieces: TokenSet, seed: int, steps: int = 1500) -> tuple[StyleJudge, dict[str, float]]:
     """A judge that learnt from a set that `build_tokens` drew with this seed, and how well it knows styles held out.
 
     Returns the share of the words that it names and the mean error of the numbers on [-1, 1].
