@@ -56,9 +56,10 @@ def _card(row: dict[str, Any], folder: Path, pictures: Collection[str] | None) -
         told = [row["error"] or "not made yet"]
     else:
         missed = row["relations_asked"] - row["relations_kept"]
-        told += [f"{missed} relations not kept"] * bool(missed)
-        told += [f"{row['collisions']} collisions"] * bool(row["collisions"])
+        told += [f"relations not kept: {missed}"] * bool(missed)
+        told += [f"collisions: {row['collisions']}"] * bool(row["collisions"])
         told += ["fails echousd check"] * (not row["check"])
+        told += [str(text) for text in row["check_errors"]]
         told += row["living_faults"]
     worst = (1000 if row["state"] != "done" else 100 * (not row["check"])) + len(told) * (row["state"] == "done")
     picture = Path(row["root"]).with_suffix(".png") if row["root"] else None

@@ -229,6 +229,8 @@ def _facts(made: Any, root: Path) -> dict[str, Any]:
     floor, geometry = made.floor, made.geometry
     states = Counter(verdict.state for verdict in made.verdicts)
     users = made.asset_users
+    misplaced = [f"{one.object} is {one.problem}" for one in report.placement]
+    errors = [f"{fault.rule} <{fault.prim}>: {fault.message}" for fault in report.errors]
     low, high = floor.min(0), floor.max(0)
     text = made.graph.to_json()
     return {
@@ -245,7 +247,7 @@ def _facts(made: Any, root: Path) -> dict[str, Any]:
         "living_faults": [fault.says for fault in report.layouts[0].living],
         "collisions": len(report.collisions),
         "check": report.ok,
-        "check_errors": [f"{fault.rule} <{fault.prim}>: {fault.message}"[:300] for fault in report.errors][:10],
+        "check_errors": [text[:300] for text in (*misplaced, *errors)][:10],
         "faces": sum(geometry[name].faces for name in users.values()),
         "licences": sorted({geometry[name].origin.licence for name in users.values()} - {""}),
         "bytes": sum(path.stat().st_size for path in root.parent.rglob("*") if path.is_file()),

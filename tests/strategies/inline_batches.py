@@ -1,5 +1,7 @@
 """Batches in the test's own process, of rooms that are made fast."""
 
+import json
+
 from echousd.batches.executor import Outcome, attempt
 from echousd.batches.journal import room_digest
 
@@ -37,3 +39,15 @@ class Inline:
 
 def digests(folder):
     return {path.name: room_digest(path) for path in sorted((folder / "rooms").glob("*/*"))}
+
+
+def small(tmp_path):
+    """Two graphs of two objects, one of them in JSON lines beside a poisonous one."""
+    graph = {"room": {"type": "bedroom"}, "nodes": [], "relations": []}
+    texts = []
+    for things in (("double_bed", "wardrobe"), ("desk", "office_chair")):
+        nodes = [{"name": thing, "category": thing} for thing in things]
+        texts.append(json.dumps({**graph, "nodes": nodes}))
+    path = tmp_path / "graphs.jsonl"
+    path.write_text(f'{texts[0]}\n{{"room": "cellar"\n{texts[1]}\n')
+    return path

@@ -1,16 +1,12 @@
 """Runs in one process: rooms that are complete stay, what fails is told, what another run does is respected."""
 
 import json
-import os
 import shutil
-import signal
-import subprocess
-import sys
 import tarfile
 from pathlib import Path
 
 import pytest
-from inline_batches import QUICK, Inline, digests
+from inline_batches import QUICK, Inline, digests, small
 from pxr import Usd
 
 from echousd.batches import batch as front
@@ -20,6 +16,7 @@ from echousd.batches.batch import batch, generate_many
 from echousd.batches.journal import read_journals, room_digest, shard_folder
 from echousd.batches.manifest import manifest_rows
 from echousd.batches.plan import load_plan
+from echousd.batches.sheet import write_sheet
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import finish, status, verify
 from echousd.batches.webdataset import write_webdataset
@@ -28,18 +25,6 @@ from echousd.room.lock import locked
 from echousd.store import Store
 
 SAMPLES = Path(__file__).parents[3] / "samples"
-
-
-def small(tmp_path):
-    """Two graphs of two objects, one of them in JSON lines beside a poisonous one."""
-    graph = {"room": {"type": "bedroom"}, "nodes": [], "relations": []}
-    texts = []
-    for things in (("double_bed", "wardrobe"), ("desk", "office_chair")):
-        nodes = [{"name": thing, "category": thing} for thing in things]
-        texts.append(json.dumps({**graph, "nodes": nodes}))
-    path = tmp_path / "graphs.jsonl"
-    path.write_text(f'{texts[0]}\n{{"room": "cellar"\n{texts[1]}\n')
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +61,16 @@ def test_manifest_sheet_and_index_hold_every_room(calm):
     assert len(stage.GetPrimAtPath("/Rooms").GetAllChildren()) == 2
     stage.Load()
     assert stage.GetPrimAtPath("/Rooms/graphs_000000/Objects").IsValid()
+
+
+def test_the_sheet_says_why_a_room_fails_the_check(calm, tmp_path):
+    _, folder, _ = calm
+    rows = list(manifest_rows(load_plan(folder), folder))
+    assert [row["check_errors"] for row in rows if row["check"]] == [[]] * sum(row["check"] for row in rows)
+    wrong = {**rows[0], "check": False, "check_errors": ["lamp is floating"], "collisions": 1}
+    page = write_sheet(tmp_path, [*rows[2:], wrong], "a night").read_text()
+    assert '<p class="fault">collisions: 1</p>' in page
+    assert '<p class="fault">fails echousd check</p><p class="fault">lamp is floating</p>' in page
 
 
 def test_a_run_that_was_ended_is_gone_on_with_to_the_same_bytes(calm, tmp_path):
@@ -316,27 +311,3 @@ def test_weights_are_known_by_their_bytes(tmp_path):
     assert front.weights_hash("") == front.weights_hash("")
     with pytest.raises(ValueError, match="no weights there"):
         front.weights_hash(str(tmp_path))
-
-
-@pytest.mark.skipif(os.name != "posix", reason="kills a process by a signal")
-def test_a_killed_run_and_its_killed_worker_leave_the_same_bytes(calm, tmp_path):
-    source, folder, _ = calm
-    script = (
-        "import os, signal, sys\nfrom echousd.batches.batch import batch\n\n"
-        "def tell(progress):\n    if progress.made:\n        os.kill(os.getpid(), signal.SIGKILL)\n\n"
-        "def kill(pool):\n    os.kill(pool.processes[0], signal.SIGKILL)\n\n"
-        "if __name__ == '__main__':\n"
-        "    from echousd.batches.executor import LocalWorkers\n    pool = LocalWorkers(1)\n    kill(pool)\n"
-        f"    batch(sys.argv[1], sys.argv[2], executor=pool, progress=tell, **{QUICK!r})\n"
-    )
-    (tmp_path / "night.py").write_text(script)
-    ended = subprocess.run(
-        [sys.executable, str(tmp_path / "night.py"), str(source), str(tmp_path / "run")], check=False
-    )
-    assert ended.returncode == -signal.SIGKILL
-    rooms = [row["room"] for row in read_journals(tmp_path / "run").values() if row["state"] == "done"]
-    assert len(rooms) == 1
-    again = Inline()
-    assert batch(source, tmp_path / "run", executor=again, resume=True, **QUICK).done == 2
-    assert f"room {rooms[0]}" not in again.calls
-    assert digests(tmp_path / "run") == digests(folder)
