@@ -14,6 +14,7 @@ from echomodel.rules.living import plan_of
 from echomodel.rules.living.sizes import fitting_loads, hung_lamps, laid_tables, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import arrange, setting_of
+from echousd.repair.overhead import lamps_along
 from echousd.repair.placements import stated_placements
 from echousd.repair.problem import Posed, pose, stacked
 from echousd.repair.relations import relation_margins
@@ -236,7 +237,8 @@ def repair_boxes(
             found, at = plain, drawn
     problem, turn, centre = at.problem, at.yaw, at.problem.centre
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
-    end = stacked(found.size, found.position, problem.carrier, None, fixed)
+    hung = lamps_along(categories, at.position, found.position, triplets, fixed) if at is not drawn else found.position
+    end = stacked(found.size, hung, problem.carrier, None, fixed)
     ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)

@@ -14,6 +14,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.repair import RepairConfig, repair_boxes
 from echousd.repair.arrange.costs import least, price
 from echousd.repair.arrange.places import places
+from echousd.repair.overhead import lamps_along
 
 FLOOR = np.array([(-2.2, -1.9), (2.2, -1.9), (2.2, 1.9), (-2.2, 1.9)])
 ID = {p.name: p.id for p in vocabulary().predicates}
@@ -213,3 +214,15 @@ def test_an_armchair_does_not_turn_its_back_on_the_screen():
         [(1, "close_by", 0), (2, "opposite", 0), (3, "close_by", 1)],
     )
     assert wrong == []
+
+
+def test_a_lamp_follows_the_table_that_is_moved_below_it():
+    words, none = ["dining_table", "pendant_lamp", "pendant_lamp"], np.zeros((0, 3), int)
+    before = np.array([(0.0, 0.0, 0.0), (0.05, 1.8, 0.0), (1.5, 1.8, 0.0)])
+    after = before + np.array([(0.3, 0.0, 0.2), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+    free, first = np.zeros(3, bool), np.array([False, True, False])
+    assert lamps_along(words, before, after, none, free)[1] == pytest.approx((0.35, 1.8, 0.2))
+    assert np.array_equal(lamps_along(words, before, after, none, free)[2], before[2])  # it hangs over nothing
+    assert np.array_equal(lamps_along(words, before, after, none, first), after)
+    told = np.array([(1, ID["left"], 2)])
+    assert np.array_equal(lamps_along(words, before, after, told, free), after)

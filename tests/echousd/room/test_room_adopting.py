@@ -105,7 +105,7 @@ def stage_of(path, *pieces):
     return path
 
 
-@pytest.mark.parametrize(("turn", "seen"), [(180, []), (0, ["tv faces no seat, sofa or bed"])])
+@pytest.mark.parametrize(("turn", "seen"), [(180, []), (0, ["tv lies 180 degrees off where sofa looks"])])
 def test_what_a_person_would_point_at_in_their_arrangement_is_told(tmp_path, turn, seen):
     """A sofa with its back to the screen stays as they put it, and is said."""
     loft = stage_of(

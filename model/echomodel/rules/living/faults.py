@@ -61,7 +61,7 @@ RULES = (
          ("{a} stands {x:.2f} m further from the bed than {b}",),
          REAL + "98 % of pairs differ by less than 0.15 m"),
     Rule("screen_in_view", sight.screen_in_view,
-         ("{a} lies {x:.0f} degrees aside of where {b} looks", "{a} is turned by {x:.0f} degrees away from {b}",
+         ("{a} lies {x:.0f} degrees off where {b} looks", "{a} is turned by {x:.0f} degrees away from {b}",
           "{a} is only {x:.1f} m from {b}, too near to watch", "{a} is {x:.1f} m from {b}, too far to watch"),
          REAL + "98 % of sofas and 95 % of beds look within 25 and 30 degrees of it, 99 % from within 5.2 m"),
     Rule("screen_not_behind", sight.screen_not_behind, ("{a} turns its back on {b} ({x:.0f} degrees)",),
