@@ -113,6 +113,17 @@ def test_rooms_without_a_fault_are_drafted_no_further(rooms):
     assert len(set(finished)) == 1
 
 
+def test_variety_looks_at_rooms_from_all_over_the_set(rooms, monkeypatch):
+    seen = []
+    monkeypatch.setattr("echomodel.metrics.layout_evaluation.VARIED", 4)
+    monkeypatch.setattr(
+        "echomodel.metrics.layout_evaluation.variety_scores", lambda graphs, *_: seen.extend(graphs) or {"rooms": 4}
+    )
+    evaluate_layout(rooms, truth(rooms), LayoutEvaluation(seeds=2, scenes=40))
+    counts = [graph.num_nodes for graph in seen]
+    assert counts == [len([room for room in rooms if len(room) > 1][number]) for number in (0, 10, 20, 30)]
+
+
 def test_completion_gives_half_of_the_true_boxes(rooms):
     seen = []
 

@@ -23,8 +23,8 @@ from echomodel.rules import label_rooms
 from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
+VARIED = 30  # rooms, spread over all, whose layouts are compared with one another
 # Predicates that an evaluation changes, and into what (SPEC: the four pairs of opposites).
-VARIED = 30  # rooms whose layouts are compared with one another
 OPPOSITE = {1: 2, 2: 1, 3: 4, 4: 3, 8: 9, 9: 8, 10: 11, 11: 10}
 
 
@@ -67,7 +67,7 @@ class LayoutEvaluation:
         scenes: scenes in a batch.
         judge: also let a judge tell the layouts, and the room generator's, from the true ones.
         drafts: layouts of each room that are finished at most, of which the best is kept.
-        seeds: of the first `VARIED` rooms, layouts to compare with one another; 0 = none.
+        seeds: of `VARIED` rooms, spread over all of them, layouts to compare with one another; 0 = none.
     """
 
     rules: str = "strict"
@@ -154,7 +154,8 @@ def evaluate_layout(
             none = torch.zeros(graph.num_nodes, dtype=torch.bool)
             return sample(EditedGraph(graph, None, none, none))
 
-        out["variety"] = variety_scores(graphs[:VARIED], boxes_of, settings.seeds, settings.rules)
+        some = [graphs[number * len(graphs) // VARIED] for number in range(VARIED)] if len(graphs) > VARIED else graphs
+        out["variety"] = variety_scores(some, boxes_of, settings.seeds, settings.rules)
     return out
 
 
