@@ -100,10 +100,10 @@ def repair_collisions(room: RoomBoxes) -> int:
     from echousd.repair.report import TOUCH
 
     none = np.zeros(len(room), bool)
-    problem, _, _ = pose(
+    problem = pose(
         room.categories, room.size, room.position, room.yaw, np.zeros((0, 3), int),
         floor_polygon=None, height=None, fixed=none, rigid=none, turned=none,
-    )  # fmt: skip
+    ).problem  # fmt: skip
     allowed = allowed_overlap(problem.categories, room.size, problem.pairs)
     return int((separation(room.size, room.position, room.yaw, problem.pairs) + allowed < -TOUCH).sum())
 

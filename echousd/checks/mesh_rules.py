@@ -89,12 +89,12 @@ def _hints(stage: Usd.Stage) -> Iterator[Finding]:
             hint = array(attribute, 3)[:2]
             found = cache.ComputeUntransformedBound(prim).ComputeAlignedRange()
             box = np.array([found.GetMin(), found.GetMax()])
+            slack = HINT * np.linalg.norm(box[1] - box[0])
+            if found.IsEmpty() or (hint.shape == (2, 3) and (np.abs(hint - box) <= slack).all()):
+                continue
             still = _still(cache, prim, box)
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
-        if found.IsEmpty():
-            continue
-        slack = HINT * np.linalg.norm(box[1] - box[0])
         low, high = np.stack([box, still], 1)  # of what is seen, and of what must be in the hint
         within = hint.shape == (2, 3) and (low[0] - slack <= hint[0]).all() and (hint[1] <= high[0] + slack).all()
         if not within or (hint[0] > low[1] + slack).any() or (hint[1] < high[1] - slack).any():

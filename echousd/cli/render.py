@@ -5,18 +5,14 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from echousd.cli.output import check_picture, say
 from echousd.cli.report import say_written
 
-if TYPE_CHECKING:
-    from PIL import Image
-
-
-TURN, TENTH = "turntable", 100  # milliseconds
+TURN = "turntable"
 
 
 def register(app: typer.Typer) -> None:
@@ -54,6 +50,7 @@ def render(
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
     """Draw a room from above, from a corner, from inside, from all around, or through each of its cameras."""
+    from echousd.pictures import gif, png
     from echousd.rendering import render as draw
     from echousd.rendering import render_cameras, render_turn
     from echousd.room.found import room_at
@@ -72,7 +69,7 @@ def render(
         pictures = {output / f"{name}.png": picture for name, picture in drawn.items()}
         for path in pictures:
             check_picture(path, force=force)
-        files = {path: _encoded([picture], "PNG") for path, picture in pictures.items()}
+        files = {path: png(picture) for path, picture in pictures.items()}
     else:
         ending = ".gif" if view == TURN else ".png"
         if output.suffix.lower() != ending:
@@ -81,30 +78,12 @@ def render(
         check_picture(output, force=force)
         if view == TURN:
             turn = render_turn(room, frames=frames, size=size, colors=colors, rays=rays, layout=layout)
-            files = {output: _encoded(turn, "GIF")}
+            files = {output: gif(turn)}
         else:
-            files = {
-                output: _encoded([draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout)], "PNG")
-            }
+            files = {output: png(draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout))}
     write_all(files)
     if json:
         say_written(list(files), started)
         return
     for path in files:
         say(str(path))
-
-
-def _encoded(pictures: list[Image.Image], kind: str) -> bytes:
-    """The pictures' file, which says that it is ours; several move, and begin again."""
-    import io
-
-    from PIL.PngImagePlugin import PngInfo
-
-    buffer, mark = io.BytesIO(), PngInfo()
-    mark.add_text("Software", "echousd")
-    if kind == "PNG":
-        pictures[0].save(buffer, kind, pnginfo=mark)
-    else:
-        small = [picture.quantize(128) for picture in pictures]
-        small[0].save(buffer, kind, save_all=True, append_images=small[1:], duration=TENTH, loop=0, comment=b"echousd")
-    return buffer.getvalue()

@@ -32,6 +32,7 @@ class Problem:
     Arguments:
         categories: n canonical category words.
         triplets: (e, 3) int, [subject, predicate id, object], those that the rules measure.
+        rows: (e,) int, number of each of them among the graph's triplets.
         rules: `strict` or `sgfront`. centre: (2,) float, x and z of the room's centre.
         fixed: (n,) bool, boxes that must not move; rigid: (n,) bool, boxes that must keep their size.
         floor: the floor polygon, or None where the room has none.
@@ -47,6 +48,7 @@ class Problem:
 
     categories: tuple[str, ...]
     triplets: np.ndarray
+    rows: np.ndarray
     rules: str
     centre: np.ndarray
     fixed: np.ndarray
@@ -119,14 +121,15 @@ def pose(
     from echomodel.rules import measured
 
     words = tuple(vocabulary().category(word).name for word in categories)
+    told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
     floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
     n = len(words)
     carrier = carriers(words, size, position, yaw, triplets)
     position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
     wall = np.full((n, 2, 2), np.nan)
     if floor is not None:
-        told = {one.subject for one in stated if one.placement == "against_wall"}
-        wall = lean(words, size, position, yaw, floor, carrier, told)
+        backed = {one.subject for one in stated if one.placement == "against_wall"}
+        wall = lean(words, size, position, yaw, floor, carrier, backed)
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
     behind = kept_behind(words, wall_gaps(wall, size, position, yaw))
@@ -136,7 +139,8 @@ def pose(
     pairs = pairs[apart]
     problem = Problem(
         words,
-        triplets[np.isin(triplets[:, 1], sorted(measured(rules)))],
+        triplets[told],
+        told,
         rules,
         np.zeros(2) if floor_polygon is None else (floor_polygon.max(0) + floor_polygon.min(0)) / 2,
         fixed,

@@ -192,7 +192,7 @@ def repair_boxes(
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rules import measured, verdicts
+    from echomodel.rules import verdicts
 
     started = time.perf_counter()
     n = len(categories)
@@ -205,7 +205,6 @@ def repair_boxes(
     triplets = np.asarray(triplets, int).reshape(-1, 3)
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
-    asked = np.isin(triplets[:, 1], sorted(measured(rules)))
     config = config or RepairConfig()
 
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Posed:
@@ -258,7 +257,7 @@ def repair_boxes(
         yaw=turn,
         verdict=verdict.numpy(),
         margin=margin,
-        conflicts=conflicts(problem, found, np.flatnonzero(asked), failures),
+        conflicts=conflicts(problem, found, failures),
         collisions=hit,
         outside=beyond,
         moved=np.linalg.norm(end - position, axis=1),

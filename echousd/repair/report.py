@@ -73,7 +73,7 @@ def outside(problem: Problem, size: np.ndarray, position: np.ndarray, yaw: np.nd
 
 
 def conflicts(
-    problem: Problem, found: Solution, rows: np.ndarray, failures: tuple[set[int], set[tuple[int, int]], set[int]]
+    problem: Problem, found: Solution, failures: tuple[set[int], set[tuple[int, int]], set[int]]
 ) -> tuple[Conflict, ...]:
     """Groups of demands that could not all be met: violated constraints that share objects that could have moved.
 
@@ -81,7 +81,6 @@ def conflicts(
     constraints around one object are the contradiction.
 
     Arguments:
-        rows: (e,) int, number in the caller's triplets of each of the problem's triplets.
         failures: broken relations, colliding pairs and objects outside; a group without any is no conflict.
     """
     at = found.at
@@ -103,7 +102,7 @@ def conflicts(
     objects_of = dict(zip(violated.tolist(), touched, strict=True))
     every = (
         Conflict(
-            tuple(int(rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
+            tuple(int(problem.rows[r - first[RELATION]]) for r in members if at.kind[r] == RELATION),
             tuple(
                 (int(problem.pairs[pair, 0]), int(problem.pairs[pair, 1]))
                 for pair in (int(at.pair[r - first[COLLISION]]) for r in members if at.kind[r] == COLLISION)

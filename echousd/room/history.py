@@ -99,13 +99,11 @@ def redo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
         manifest = folders.claim(folder, force=False, root=root.stem)
         name = f"{manifest.get('name', root.stem)}.json"
         now = ownership.read(folder, name) if manifest else None
-        for archive in undone(folder) if now is not None else ():
-            files = _read_archive(folder, archive)
-            told = _read_told(folder / archive, files.pop(TOLD, b""))
-            if now is not None and told.after == folders.digest(now):
-                break
-        else:
+        archive = None if now is None else _following(folder, folders.digest(now))
+        if archive is None:
             raise ValueError(f"{root}: no edit that was taken back can be made again")
+        files = _read_archive(folder, archive)
+        told = _read_told(folder / archive, files.pop(TOLD, b""))
         _check_untouched(folder, manifest, (*files, *told.removes), "make the edit again")
         later = read_manifest(folder / name, json.loads(files.get(name, b"{}")))
         strange = [path for path in files if path != name and path not in later["files"]]
@@ -121,6 +119,25 @@ def undone(folder: Path) -> list[str]:
     """Paths of the archives of edits that were taken back, the earliest edit first."""
     found = [path for path in inside(folder, UNDONE, "a file of the room").glob("*.zip") if path.stem.isdecimal()]
     return [f"{UNDONE}/{path.name}" for path in sorted(found, key=lambda path: int(path.stem))]
+
+
+def _following(folder: Path, state: str) -> str | None:
+    """Path of the archive of the edit that follows a state of the room (digest of its manifest), None for none.
+
+    Raises ValueError where none does and an archive is damaged, so that it might have been that one.
+    """
+    damaged: ValueError | None = None
+    for archive in undone(folder):
+        try:
+            told = _read_told(folder / archive, _read_archive(folder, archive, only=TOLD).get(TOLD, b""))
+        except ValueError as error:
+            damaged = damaged or error
+            continue
+        if told.after == state:
+            return archive
+    if damaged is not None:
+        raise damaged
+    return None
 
 
 class _Told(BaseModel):
@@ -158,7 +175,8 @@ def _archive(files: Mapping[str, bytes]) -> bytes:
     return out.getvalue()
 
 
-def _read_archive(folder: Path, path: str) -> dict[str, bytes]:
+def _read_archive(folder: Path, path: str, *, only: str = "") -> dict[str, bytes]:
+    """Entries of an archive by name, all or one alone; raises ValueError where it is damaged."""
     content = ownership.read(folder, path)
     if content is None:
         raise ValueError(f"{folder / path}: is missing, so that the room cannot be put back")
@@ -166,6 +184,6 @@ def _read_archive(folder: Path, path: str) -> dict[str, bytes]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
                 raise zipfile.BadZipFile(f"more than {LARGEST >> 20} MiB")
-            return {entry.filename: archive.read(entry) for entry in archive.infolist()}
+            return {e.filename: archive.read(e) for e in archive.infolist() if only in ("", e.filename)}
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError) as error:
         raise ValueError(f"{folder / path}: is damaged ({error})") from None

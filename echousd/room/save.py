@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import warnings
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from pxr import Sdf
 import echousd
 from echousd.graph import SceneGraph
 from echousd.naming import as_identifier
+from echousd.pictures import is_ours, png
 from echousd.repair.living import living_faults
 from echousd.room import folder as folders
 from echousd.room import ownership, paintings
@@ -124,13 +124,10 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
 
 
 PREVIEW = 400  # pixels
-MARK = ("Software", "echousd")  # text in our previews, which other programs do not keep
 
 
 def write_preview(root: Path) -> Path | None:
     """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
-    from PIL.PngImagePlugin import PngInfo
-
     from echousd.rendering import render
     from echousd.tracing import QUICK, RenderUnavailable
 
@@ -139,14 +136,11 @@ def write_preview(root: Path) -> Path | None:
         picture = render(root, view="perspective", size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
-    buffer, mark = io.BytesIO(), PngInfo()
-    mark.add_text(*MARK)
-    picture.save(buffer, "PNG", pnginfo=mark)
-    if out.is_file() and not _drawn_by_us(out):
+    if out.is_file() and not is_ours(out):
         kept = folders.backup_name(out.parent, out.name)
         out.replace(out.with_name(kept))
         folders.tell_kept(out.parent, out.name, kept)
-    write_whole(out, buffer.getvalue(), left="the room itself is complete")
+    write_whole(out, png(picture), left="the room itself is complete")
     return out
 
 
@@ -159,14 +153,13 @@ def write_sheet(root: Path) -> Path | None:
     The sheet of a room that has only one layout any more is taken away.
     """
     from PIL import Image, ImageDraw
-    from PIL.PngImagePlugin import PngInfo
 
     from echousd.rendering import render
     from echousd.tracing import QUICK, RenderUnavailable
 
     out = root.with_name(f"{root.stem}_layouts.png")
     names = layout_names(open_stage(root))
-    if out.is_file() and not _drawn_by_us(out):
+    if out.is_file() and not is_ours(out):
         return None
     if not names:
         out.unlink(missing_ok=True)
@@ -180,21 +173,8 @@ def write_sheet(root: Path) -> Path | None:
             return None
         ImageDraw.Draw(picture).text((8, 6), name, fill="black")
         sheet.paste(picture, (number % wide * SHEET, number // wide * SHEET))
-    buffer, mark = io.BytesIO(), PngInfo()
-    mark.add_text(*MARK)
-    sheet.save(buffer, "PNG", pnginfo=mark)
-    write_whole(out, buffer.getvalue(), left="the room itself is complete")
+    write_whole(out, png(sheet), left="the room itself is complete")
     return out
-
-
-def _drawn_by_us(path: Path) -> bool:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as picture:
-            return picture.info.get(MARK[0]) == MARK[1]
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return False
 
 
 def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:

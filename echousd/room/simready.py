@@ -51,21 +51,22 @@ def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "Ech
     if unknown:
         raise ValueError(f"{root}: no asset {unknown[0]!r}, allowed: {', '.join(known)}")
     source = manifest.get("source") or "none"
+    assets = {name: _files(root, manifest, name) for name in names or known}
+    ours = [name for name, own in assets.items() if payload_file(name) in own and not any(map(_of_others, own))]
+    there = [place for name in ours if (place := out / name / INSIDE).exists()]
+    if there and not force:
+        raise ValueError(f"{there[0]}: exists; choose another folder or use --force")
     files: dict[Path, bytes] = {}
-    layers, left, hangs = [], [], []
-    for name in names or known:
-        own = _files(root, manifest, name)
-        if any("/original/" in path for path in own) or payload_file(name) not in own:
-            left.append(f"{name}: a model of somebody else's, which is packed where it comes from")
-            continue
+    layers, hangs = [], []
+    for name in ours:
         place = out / name / INSIDE
-        if place.exists() and not force:
-            raise ValueError(f"{place}: exists; choose another folder or use --force")
         layers.append(place / f"{name}.usda")
-        made = package(name, own, author=author, source=source)
+        made = package(name, assets[name], author=author, source=source)
         files |= {place / path: content for path, content in made.items()}
         if b"PhysicsRigidBodyAPI" not in made[f"{name}.usda"]:
             hangs.append(f"{name}: hangs, so that it is no rigid body, which Robotics-Prop asks for")
+    others = [name for name in assets if name not in ours]
+    left = [f"{name}: a model of somebody else's, which is packed where it comes from" for name in others]
     write_all(files)
     return Packed(tuple(layers), tuple(left), tuple(hangs))
 
@@ -119,6 +120,11 @@ def _facts(main: Path, author: str, source: str) -> dict[str, Any]:
         "asset_extents": Gf.Vec3f(*map(float, size)),
         "mass": float(sum(masses)),
     }
+
+
+def _of_others(path: str) -> bool:
+    """Whether a file of an asset is a model as somebody else made it."""
+    return "/original/" in path
 
 
 def _files(root: Path, manifest: Mapping[str, Any], name: str) -> Mapping[str, bytes]:

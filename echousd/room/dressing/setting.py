@@ -194,14 +194,10 @@ def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polyg
     return shapely.Polygon(plan[0])
 
 
-def reaches(thing: Standing, low: float, high: float) -> shapely.Geometry:
-    """What an object covers in plan between two heights: the hull of its mesh there, and its colliders; metres."""
-    # a foot that stands at the lower height reaches over it
-    return shapely.union_all([_section(piece, low + SKIN, high - SKIN) for piece in thing.pieces])
-
-
 def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> bool:
-    """Whether what an object covers between two heights (`reaches`) meets a shape in plan."""
+    """Whether what an object covers in plan between two heights, the hull of its mesh there and its colliders, meets a
+    shape; a foot that stands at the lower height reaches over it.
+    """
     least, most = np.array(plan.bounds).reshape(2, 2)
     near = (thing.spans[:, 0, [0, 2]] <= most).all(1) & (thing.spans[:, 1, [0, 2]] >= least).all(1)
     near &= (thing.spans[:, 0, 1] < high) & (thing.spans[:, 1, 1] > low)

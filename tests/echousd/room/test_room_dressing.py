@@ -19,7 +19,7 @@ from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.dressing import upholstery
 from echousd.room.dressing.dress import RULES, dress, placed, setting_of
-from echousd.room.dressing.setting import Setting, Thing, reaches, standing
+from echousd.room.dressing.setting import Setting, Thing, meets, standing
 from echousd.room.dressing.surfaces import surfaces
 from echousd.room.dressing.upholstery import STEP, _Seat
 from echousd.room.dressing.walls import curtains
@@ -149,7 +149,7 @@ def test_full_rooms_are_full_and_clean(name, least, tmp_path):
         for host in setting.objects.values():
             if one.on != host.name and one.kind not in ("curtain",):
                 within = host.top > low and host.position[1] < high
-                assert not within or reaches(host, low, high).intersection(one.footprint).area < 1e-4, (one, host.name)
+                assert not within or not meets(host, low, high, one.footprint.buffer(-5e-3)), (one, host.name)
     assert check(room.save(tmp_path / name, preview=False)).ok
 
 
@@ -287,7 +287,9 @@ def test_what_stands_at_a_height_reaches_there_with_its_foot():
     part = Part("mesh", foot, {"metal": np.arange(len(foot.faces))})
     geometry = Geometry((part,), (Collider("collider", foot, "convexHull"),), Origin("test"))
     lamp = standing("lamp", "table_lamp", np.array([0.2, 0.4, 0.2]), np.array([0.0, 0.5, 0.0]), 0.0, geometry)
-    assert reaches(lamp, 0.5, 0.6).area > 0.9 * np.pi * 0.1**2
+    assert meets(lamp, 0.5, 0.6, shapely.Point(0.096, 0).buffer(1e-3))
+    assert not meets(lamp, 0.5, 0.6, shapely.Point(0.11, 0).buffer(1e-3))
+    assert not meets(lamp, 0.8, 0.9, shapely.Point(0.096, 0).buffer(1e-3))
 
 
 def test_cushions_lie_on_what_is_level_below_them():

@@ -37,13 +37,20 @@ def test_packages_hold_everything_that_simready_asks_for(room, tmp_path):
     assert meshes
 
 
-def test_wrong_names_and_packages_in_the_way_are_told(room, tmp_path, echousd_command):
+def test_wrong_names_and_packages_in_the_way_are_told(room, tmp_path, echousd_command, monkeypatch):
     done = echousd_command("assets", "pack", room, "-o", tmp_path, "--asset", "sofa")
     assert (done.code, f"{room}: no asset 'sofa', allowed: bed, lamp" in done.err) == (2, True), done.err
     assert echousd_command("assets", "pack", room.parent, "-o", tmp_path, "--asset", "bed").code == 0
     done = echousd_command("assets", "pack", room.parent, "-o", tmp_path, "--asset", "bed")
     assert done.code == 2
     assert "bed/usd: exists; choose another folder or use --force" in done.err
+    drawn = []
+    monkeypatch.setattr("echousd.room.simready.picture", lambda path: drawn.append(path) or b"")
+    with pytest.raises(ValueError, match="bed/usd: exists"):
+        pack(room, tmp_path, names=["wardrobe", "lamp", "bed"])
+    assert not drawn  # refused before any work
+    assert not (tmp_path / "lamp").exists()
+    monkeypatch.undo()
     stage = Usd.Stage.CreateNew(str(tmp_path / "other.usda"))
     stage.Save()
     done = echousd_command("assets", "pack", tmp_path / "other.usda", "-o", tmp_path / "out")
