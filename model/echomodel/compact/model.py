@@ -22,6 +22,7 @@ from echomodel.compact.branches import PARTS
 from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
+from echomodel.compact.rounding import restored, rounded
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.compact.tokens import TokenDenoiser
 from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
@@ -78,12 +79,13 @@ class CompactModel(nn.Module):
 
 
 def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half: bool = True) -> None:
-    """Write parts of a model with everything needed to use them; `half` stores floats as float16."""
-    tensors = {}
+    """Write parts of a model with everything needed to use them; `half` stores floats as float16, some in 8 bits."""
+    tensors: dict[str, Tensor] = {}
     for part in parts:
         for key, value in model.part_tensors(part).items():
             stored = value.half() if half and value.is_floating_point() else value
             tensors[key] = stored.detach().cpu().contiguous()
+    tensors = rounded(tensors) if half else tensors
     metadata = {
         "format": FORMAT,
         "config": to_json(model.config),
@@ -120,10 +122,14 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         try:
             with safe_open(path, "pt") as handle:
                 header = handle.metadata() or {}
-                tensors.update({key: handle.get_tensor(key) for key in handle.keys()})  # noqa: SIM118
+                held = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
             digest.update(path.read_bytes())
         except (OSError, SafetensorError) as error:
             raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+        try:
+            tensors.update(restored(held))
+        except ValueError as error:
+            raise WeightsError(f"{path}: {error}") from None
         if header.get("format") != FORMAT:
             raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
         metadata[path] = header

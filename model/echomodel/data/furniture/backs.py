@@ -63,9 +63,11 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
                 lean(-a, a, 0.12, 1, 0.05, radius=0.022, material="fabric"),
                 *[lean(s * a * 0.8 - post / 2, s * a * 0.8 + post / 2, -0.1, 0.4, post) for s in (-1, 1)],
             ]
+        behind = max(0.0, post * 0.4 - 0.01)  # stiles thicker than the board stand out behind it, not before it
+        stiles = [lean(s * (a - post) - post / 2, s * (a - post) + post / 2, -0.1, 0.5, post * 0.8) for s in (-1, 1)]
         return [
             lean(-a, a, 0.0 if style.contrast < 0.5 else 0.3, 1, 0.025, radius=0.01),
-            *[lean(s * (a - post) - post / 2, s * (a - post) + post / 2, -0.1, 0.5, post * 0.8) for s in (-1, 1)],
+            *[replace(one, centre=one.centre - [0, 0, behind]) for one in stiles],
         ]
     if kind == "oval":
         t = 0.05

@@ -205,6 +205,7 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
             )
             for s in (-1, 1)
         ]
+        parts.append(box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)))
     parts.append(box((-x * 0.82, h * 0.45, -t), (x * 0.82, h * 0.45 + thick, t)))
     return parts
 

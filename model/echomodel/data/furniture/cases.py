@@ -32,10 +32,10 @@ def carcass(
     if kind == "trestle" or (kind == "hairpin" and foot < 0.08):
         kind = "straight"
     thick = float(np.clip(0.045 * style.bulk, 0.03, 0.07)) if foot > 0.08 else 0.05
-    parts = base(style, w * 0.96, d * 0.9, foot, thick, kind) if foot > 0 else []
     crown = style.family in ("classic", "rustic") and h > 0.4
     over = 0.015 + style.overhang * 0.4 if crown else 0.0
     body, lid = w / 2 - over, h - (t if over else 0.0)
+    parts = base(style, 2 * body * 0.96, d * 0.9, foot, thick, kind) if foot > 0 else []
     recessed = style.fronts == "recessed"
     deep = 0.022 if not recessed else 0.02 + min(0.05, 0.1 * d)  # recessed fronts stand behind the boards
     z0, z1 = -d / 2, d / 2 - deep

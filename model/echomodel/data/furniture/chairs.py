@@ -76,11 +76,9 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         arms += [
             Tube(points=np.array([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]]), radius=r * 0.8) for s in (-1, 1)
         ]
+        head = bow[int(np.abs(bow[:6, 2] + z * 0.5).argmin())]  # where the posts behind meet the bow
         arms += [
-            Tube(
-                points=np.array([[s * x, seat, -z * 0.5], [s * x * 0.93, arm + (h - arm) * 0.45, -z * 0.5]]),
-                radius=r * 0.8,
-            )
+            Tube(points=np.array([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]]), radius=r * 0.8)
             for s in (-1, 1)
         ]
         return parts + of_role("arm", arms)

@@ -11,6 +11,8 @@ from echomodel.data.furniture.mirrors import mirror_of
 from echomodel.data.furniture.solids import Solid, Turned
 from echomodel.data.furniture.style import Style
 
+KNEES = 0.45  # metres between what stands on both sides of a seat
+
 
 def _leg(style: Style, width: float, height: float) -> float:
     return float(np.clip(0.045 * style.bulk * (0.6 + 0.3 * width + 0.3 * height), 0.025, 0.14))
@@ -236,7 +238,9 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1 = desk_height - t
     if kind in ("left", "both"):
-        sides = (-1, 1) if kind == "both" else (-1 if choices.chance("side", 0.5) else 1,)
+        sides = (
+            (-1, 1) if kind == "both" and 0.96 * w - 2 * unit >= KNEES else (-1 if choices.chance("side", 0.5) else 1,)
+        )
         for s in sides:
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             foot = 0.1 if style.contrast > 0.5 else 0.02
@@ -287,13 +291,14 @@ def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, d = w * within(shape, style), d * within(shape, style)
     legs = "tapered" if style.legs in ("plinth", "bun", "trestle") else style.legs
     y1, low = table - t, table - t - 0.14
-    if choices.chance("kind", 0.5):
+    widest = 0.48 * w - KNEES / 2  # of the cupboards, which leave room for knees
+    if choices.chance("kind", 0.5) or widest < 0.15:
         parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
         parts += case((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45))
         columns = choices.whole("columns", 1, 4)
         parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, columns, "drawer", style, d * 0.86)
     else:
-        unit = w * choices.between("share", 0.26, 0.36)
+        unit = min(w * choices.between("share", 0.26, 0.36), widest)
         for s in (-1, 1):
             x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
             parts += case((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45))
