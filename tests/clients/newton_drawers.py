@@ -2,7 +2,7 @@
 
 python newton_drawers.py ROOM.usda FLAT.usdc
 
-Contacts as in `newton_settle.py`, stops of wood: by its defaults what opens goes 8 cm beyond them and springs back.
+Contacts as in `newton_settle.py`, stiffer stops: by its defaults a drawer goes 8 cm beyond them and springs back.
 What opens begins each time as it settled; told is the furthest that it was.
 """
 

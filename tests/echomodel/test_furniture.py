@@ -1,13 +1,17 @@
 """Parametric furniture: closed meshes of the right size for every category, distances that agree with the mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from echomodel.data.furniture import MATERIALS, Choices, Style, furniture, mesh_of, sample_size, solids, tsdf_of
+from echomodel.data.furniture.backs import back_rest
 from echomodel.data.furniture.lathe import Lathe
 from echomodel.data.furniture.solids import Ball, Block, Shell, Tube, Turned, rotation
 from echomodel.data.tsdf import mesh_from_tsdf, tsdf_from_mesh
+from echomodel.metrics.pieces import loose_solids
 from echomodel.sizes import size_score, size_statistics
 from echomodel.vocabulary import UnknownWord, vocabulary
 
@@ -118,3 +122,52 @@ def test_no_shade_of_a_floor_lamp_is_a_long_oval(size):
         shades = [part for part in parts if part.role == "shade" and isinstance(part, Lathe)]
         assert all(1 / 1.7 < part.squash < 1.7 for part in shades)
         assert mesh_of(parts, np.array(size)).is_watertight
+
+
+def drawn(number, **told):
+    """A style and open choices, the style's fields as told."""
+    rng = np.random.default_rng(number)
+    return replace(Style.draw(rng), **told), Choices.draw(rng)
+
+
+def bounds(parts):
+    """(n, 2, 3) float, least and greatest corners of some solids."""
+    return np.array([[vertices.min(0), vertices.max(0)] for vertices in (part.mesh(2)[0] for part in parts)])
+
+
+@pytest.mark.parametrize("category", ["desk", "dressing_table"])
+def test_where_people_sit_is_room_for_knees_and_support_on_both_sides(category):
+    for number in range(60):
+        width = 0.8 + 0.01 * number
+        parts = solids(category, *drawn(number), np.array([width, 0.76, 0.5]))
+        low = bounds([part for part in parts if part.role != "core"])
+        low = low[low[:, 0, 1] < 0.12]
+        assert low[:, 0, 0].min() < -0.3 * width, number
+        assert low[:, 1, 0].max() > 0.3 * width, number
+        left, right = low[low[:, 0, 0] < -0.2 * width, 1, 0].max(), low[low[:, 1, 0] > 0.2 * width, 0, 0].min()
+        assert right - left > 0.4, number
+
+
+@pytest.mark.parametrize("category", ["dresser", "cabinet"])
+def test_legs_stand_under_the_body_that_a_lid_overhangs(category):
+    for number in range(30):
+        style, choices = drawn(number, family="rustic", legs="straight")
+        parts = solids(category, style, choices, np.array([0.45, 0.7, 0.4]))
+        legs, sides = ([part for part in parts if part.role == role] for role in ("leg", "side"))
+        assert np.abs(bounds(legs)[:, :, 0]).max() <= np.abs(bounds(sides)[:, :, 0]).max() + 1e-6, number
+
+
+def test_trestles_and_bows_hold_together():
+    for number in range(20):
+        table = solids("dining_table", *drawn(number, legs="trestle", round_tops=0.0), np.array([1.8, 0.75, 1.4]))
+        chair = solids("chinese_chair", *drawn(number), np.array([0.6, 0.9, 0.5]))
+        assert not loose_solids(table), number
+        assert not loose_solids(chair), number
+
+
+def test_no_stile_shows_before_the_board_of_a_back():
+    for number in range(20):
+        style, _ = drawn(number, bulk=1.5, softness=0.2)
+        board, *stiles = back_rest(style, "panel", 0.4, 0.45, 0.9, -0.2, 0.03, 0.0)
+        front = bounds([board])[0, 1, 2]
+        assert all(bounds([stile])[0, 1, 2] < front + 1e-6 for stile in stiles), number

@@ -252,7 +252,7 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 for x in (x0 + 0.04, x1 - 0.04)
                 for z in (-d * 0.42, d * 0.42)
             ]
-        if kind == "left":
+        if len(sides) == 1:
             x = -sides[0] * w * 0.47
             parts += [
                 box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025), role="leg")
