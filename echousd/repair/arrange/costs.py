@@ -250,8 +250,9 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
     weight = _weight(setting, state, i, other)
     missed = np.zeros((count, len(told)))
     missed[:, sides] = aside
-    if (~sides).any():
-        missed[:, ~sides] = _missed(setting, state, i, poses, told[~sides])
+    asked = ~sides & (weight > 0)
+    if asked.any():
+        missed[:, asked] = _missed(setting, state, i, poses, told[asked])
     return ((BROKEN * (missed > SLACK) + FAR * missed) * weight).sum(1)
 
 
