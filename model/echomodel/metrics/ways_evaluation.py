@@ -97,7 +97,7 @@ def evaluate_way(
             counts["box_error"] = max(counts["box_error"], float(np.abs(mesh.extents - size).max()))
         apart = style_distances(judge.styles(pieces, graph.category, sizes))
         spread.append(float(apart[~torch.eye(len(apart), dtype=torch.bool)].mean()))
-    result: dict = {"pieces": counts, "sets": set_scores(clouds(meshes), clouds(fresh))["mean"]}
+    result: dict = {"pieces": counts, "sets": set_scores(clouds(meshes), clouds(fresh)).get("mean", {})}
     result["style"] = judged_styles(way, judge, settings, generator)
     result["diversity"] = float(np.mean(spread))
     return result, meshes
