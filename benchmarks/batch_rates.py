@@ -6,11 +6,13 @@
 Wanted: per room at least 2.5 times the single calls on boxes and 1.5 times with shapes (two workers, two cores), at
 least 1.7 times from one worker to two, and at most 1.5 times the network's own time with shapes. CPU seconds a room are
 printed beside: a busy machine changes those least. `--memory`: what one worker holds while it makes the rooms.
+`--paper`: one and two workers on a clock of their own, which only the CPU seconds of every task move.
 """
 
 from __future__ import annotations
 
 import argparse
+import heapq
 import resource
 import tempfile
 import time
@@ -22,7 +24,7 @@ from typing import Any
 from echomodel.echo import EchoModel
 from echousd.batches import work
 from echousd.batches.batch import weights_hash
-from echousd.batches.executor import LocalWorkers, Task
+from echousd.batches.executor import LocalWorkers, Outcome, Task, attempt
 from echousd.batches.journal import Journal, shard_folder
 from echousd.batches.options import BatchRequest, request_of
 from echousd.batches.plan import make_plan, save_plan
@@ -101,6 +103,52 @@ def memory(request: BatchRequest, folder: Path) -> None:
     pool.close()
 
 
+class Paper:
+    """Workers that are idle but for the run: a task ends when its CPU seconds are over, on their own clock.
+
+    Arguments:
+        seen: key of a task and how often it was asked for -> what it gave and its CPU seconds, filled by the first run.
+    """
+
+    megabytes = 0.0
+
+    def __init__(self, workers: int, seen: dict[tuple[str, int], tuple[tuple[str, Any], float]]) -> None:
+        self.workers, self._seen = workers, seen
+        self.now, self._times, self._busy = 0.0, dict[str, int](), list[tuple[float, int, Task, tuple[str, Any]]]()
+
+    def free(self, *, network: bool = False) -> int:
+        return self.workers - len(self._busy)
+
+    def submit(self, task: Task) -> None:
+        self._times[task.key] = self._times.get(task.key, 0) + 1
+        key = (task.key, self._times[task.key])
+        if key not in self._seen:
+            began = time.process_time()
+            found = attempt(task.call, task.given)
+            self._seen[key] = found, time.process_time() - began
+        found, seconds = self._seen[key]
+        heapq.heappush(self._busy, (self.now + seconds, sum(self._times.values()), task, found))
+
+    def outcomes(self, seconds: float) -> list[Outcome]:
+        self.now, _, task, (fate, value) = heapq.heappop(self._busy)
+        return [Outcome(task, fate, value) if fate == "done" else Outcome(task, fate, error=value)]
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+def on_paper(request: BatchRequest, folder: Path) -> None:
+    """Print how long one and two workers would take."""
+    plan, alone = make_plan(request, weights_hash("")), 0.0
+    seen: dict[tuple[str, int], tuple[tuple[str, Any], float]] = {}
+    work.room(work.Job("warm", str(folder / "warm"), 0, plan.options[0], draw=("bedroom", 9, 0)))
+    for workers in (1, 2):
+        pool, journal = Paper(workers, seen), Journal(shard_folder(folder / str(workers), (0, 1)))
+        Run(plan, plan.packs(), frozenset(), folder, journal, RunOptions()).execute(pool)
+        alone = alone or pool.now
+        print(f"{workers} workers  {pool.now:6.1f} s on paper: {alone / pool.now:.2f} times one", flush=True)
+
+
 def together(request: BatchRequest, folder: Path, workers: int) -> tuple[float, float]:
     """Wall seconds a room with warm workers, and CPU seconds a room without their start."""
     plan = make_plan(request, weights_hash(""))
@@ -136,6 +184,7 @@ def main() -> None:
     parser.add_argument("--shapes", default="boxes")
     parser.add_argument("--preview", action="store_true")
     parser.add_argument("--memory", action="store_true")
+    parser.add_argument("--paper", action="store_true")
     parser.add_argument("--drafts", type=int, default=None)
     options = parser.parse_args()
     raw = {"shapes": options.shapes, "preview": options.preview, "drafts": options.drafts}
@@ -143,6 +192,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch:
         if options.memory:
             memory(request, Path(scratch) / "memory")
+            return
+        if options.paper:
+            on_paper(request, Path(scratch) / "paper")
             return
         single = one_by_one(request, Path(scratch) / "single")
         print(f"single     {single[0]:6.2f} s a room, CPU {single[1]:6.2f} s", flush=True)
