@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echousd.repair.arrange.costs import least, price, soon_told
-from echousd.repair.arrange.groups import paid_by, slide_groups
+from echousd.repair.arrange.groups import make_way, paid_by, slide_groups
 from echousd.repair.arrange.overlaps import depths
 from echousd.repair.arrange.places import expect_followers, places
 from echousd.repair.arrange.seating import seat_evenly
@@ -123,10 +123,12 @@ def _built(
             if int(i) not in attended:
                 own[i], _ = _put(setting, state, int(i))
     state.regrets = {}  # what others paid in earlier rounds is no part of what this one costs
+    state.placed[setting.hanging] = False
     slide_groups(setting, state, own)
     seat_evenly(setting, state, own)
+    make_way(setting, state, own)
     for i in order:  # lamps follow what they light
-        if setting.kinds[i].support == "ceiling":
+        if setting.hanging[i]:
             own[i], _ = _put(setting, state, int(i))
     for i in order:
         paid[i] = paid_by(setting, state, int(i), own)

@@ -257,10 +257,10 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
 
 
 def _weight(setting: Setting, state: State, i: int, other: np.ndarray) -> np.ndarray:
-    """(r,) float: how much relations of box i count, by what is at their other ends; what attends it will follow it."""
+    """(r,) float: how much relations of box i count, by what is at their other ends; what attends it, and lamps, follow."""
     anchor = setting.anchor[other]
     guess = np.where((anchor >= 0) & state.placed[anchor], GUESSED, UNPLACED)
-    return np.where(state.placed[other], 1.0, np.where(anchor == i, 0.0, guess))
+    return np.where(state.placed[other], 1.0, np.where((anchor == i) | setting.hanging[other], 0.0, guess))
 
 
 def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:

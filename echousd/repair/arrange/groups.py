@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
@@ -9,6 +11,8 @@ from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.setting import Poses, Setting, State
 
 SLIDES = np.array([-1.6, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6])  # metres
+SHOVES = np.array([-1.4, -0.9, -0.5, 0.5, 0.9, 1.4])  # metres that it makes way for another group
+CRAMPED = 2.0  # that a group pays together, from which on others make way for it
 GAIN = 0.05  # that a slide must save
 AT_WALL = 0.15  # metres: what stands so near a wall slides along it
 
@@ -29,26 +33,67 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
     """Slide every group as one to where its members pay least together; `state` is changed.
 
     Arguments:
-        state: all boxes placed. own: (n,) float, as `paid_by`.
+        state: all boxes placed but lamps. own: (n,) float, as `paid_by`.
     """
-    for root in np.unique(setting.group).tolist():
-        members = np.flatnonzero(setting.group == root)
-        if len(members) < 2 or setting.fixed[members].any():
+    for members in _groups(setting):
+        if setting.fixed[members].any():
             continue
-        before = sum(paid_by(setting, state, int(i), own) for i in members)
+        before = _bill(setting, state, members, own)
         if before < GAIN:
             continue
-        for way in _ways(setting, state, root):
+        for way in _ways(setting, state, int(setting.group[members[0]])):
             for shift in (_best_slide(setting, state, members, own, way), _mirror_slide(setting, state, members, way)):
                 if not shift.any():
                     continue
                 kept = state.position[members].copy()
                 state.position[members] += shift
-                after = sum(paid_by(setting, state, int(i), own) for i in members)
+                after = _bill(setting, state, members, own)
                 if after < before - GAIN:
                     before = after
                 else:
                     state.position[members] = kept
+
+
+def make_way(setting: Setting, state: State, own: np.ndarray) -> None:
+    """Where a group is cramped, slide another one away and it after that, if both pay less then; `state` is changed.
+
+    Arguments:
+        state: all boxes placed but lamps. own: (n,) float, as `paid_by`.
+    """
+    groups = [members for members in _groups(setting) if not setting.fixed[members].any()]
+    for members in groups:
+        cramped = _bill(setting, state, members, own)
+        if cramped < CRAMPED:
+            continue
+        for others in groups:
+            if others is members:
+                continue
+            before = cramped + _bill(setting, state, others, own)
+            kept = state.position.copy()
+            best, found = before - GAIN, kept
+            for way, step in product(_ways(setting, state, int(setting.group[others[0]])), SHOVES):
+                state.position[others] += step * way
+                aside = _bill(setting, state, others, own)
+                if aside < best:
+                    for own_way in _ways(setting, state, int(setting.group[members[0]])):
+                        state.position[members] += _best_slide(setting, state, members, own, own_way)
+                    after = _bill(setting, state, others, own) + _bill(setting, state, members, own)
+                    if after < best:
+                        best, found = after, state.position.copy()
+                state.position[:] = kept
+            state.position[:] = found
+            cramped = _bill(setting, state, members, own)
+
+
+def _groups(setting: Setting) -> list[np.ndarray]:
+    """Numbers of the boxes of every group of two or more, but for lamps of the ceiling."""
+    standing = np.flatnonzero(~setting.hanging)
+    found = [standing[setting.group[standing] == root] for root in np.unique(setting.group[standing]).tolist()]
+    return [members for members in found if len(members) > 1]
+
+
+def _bill(setting: Setting, state: State, members: np.ndarray, own: np.ndarray) -> float:
+    return sum(paid_by(setting, state, int(i), own) for i in members)
 
 
 def _ways(setting: Setting, state: State, root: int) -> list[np.ndarray]:

@@ -128,6 +128,11 @@ class Setting:
         return np.array([kind.role == "seat" for kind in self.kinds], bool)
 
     @cached_property
+    def hanging(self) -> np.ndarray:
+        """(n,) bool, lamps of the ceiling that go where what they light goes."""
+        return np.array([kind.support == "ceiling" for kind in self.kinds], bool) & ~self.fixed
+
+    @cached_property
     def sitting(self) -> np.ndarray:
         """(n,) float: how many sit on each piece that is a seat."""
         return np.maximum(np.round(self.size[:, 0] / PLACE), 1.0)
