@@ -1,4 +1,4 @@
-"""Does what is locked leave the doors of a room free?"""
+"""Do openings fit walls whose height nobody stated, and does what is locked leave the doors free?"""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from echomodel.openings import swing_area
 from echomodel.roomboxes import footprints
 from echousd.graph.consistency import GraphError
+from echousd.graph.floors import HEIGHT
 
 if TYPE_CHECKING:
     from echousd.graph.scene import SceneGraph
@@ -18,10 +19,19 @@ QUARTERS = (0.0, np.pi / 2)  # headings that a locked object may get which state
 
 
 def check_doors(graph: SceneGraph) -> None:
-    """Raise `GraphError` for a door that opens into a locked object whose size and position are stated.
+    """Raise `GraphError` for an opening that is higher than the walls of a room that states no height, and for a door
+    that opens into a locked object whose size and position are stated.
 
     Of one that states no yaw it must be in the way however that is turned, by quarter turns.
     """
+    for number, opening in enumerate(graph.room.openings):
+        top = opening.sill + opening.height
+        if graph.room.height is None and top > HEIGHT:
+            raise GraphError(
+                f"{opening.kind} {opening.name!r}: its top is at {top:.2f} m, allowed: up to {HEIGHT:.2f} m, "
+                "the height of rooms that state none",
+                ("room", "openings", number),
+            )
     corners = graph.room.corners
     fixed = [n for n in graph.nodes if n.locked and n.size and n.position]
     if corners is None or not fixed:

@@ -137,14 +137,16 @@ def _corners(value: Any) -> tuple[Point, ...]:
     if len(entries) > MAX_CORNERS:
         raise ValueError(f"{len(entries)} corners, allowed: {MAX_CORNERS}")
     corners = tuple((x, z) for x, z in (_corner(corner) for corner in entries))
-    if len(corners) < 3 or abs(polygon_area(corners)) < 1e-6:
-        raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
     from shapely import Polygon, is_valid_reason
 
-    reason = is_valid_reason(Polygon(corners))
+    reason = is_valid_reason(Polygon(corners)) if len(corners) > 3 else "Valid Geometry"
+    flat = len(corners) < 3 or abs(polygon_area(corners)) < 1e-6
+    if flat and not reason.startswith("Self-intersection"):
+        raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
     if reason != "Valid Geometry":
+        said = re.sub(r"-?\d+(\.\d+)?", lambda number: f"{float(number[0]):.2f}", reason)
         raise ValueError(
-            f"{reason.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
+            f"{said.replace('[', ' at (').replace(']', ')')}, allowed: an outline that does not cross itself"
         )
     return corners
 

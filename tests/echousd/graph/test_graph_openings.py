@@ -95,6 +95,14 @@ def test_a_door_into_what_is_locked() -> None:
     check_doors(graph.replaced(room=room.replaced(openings=(opening_from_words("south 0.1 swing=out", "door", ROOM),))))
 
 
+def test_openings_fit_the_usual_height_where_none_is_stated():
+    tall = opening_from_words("south 0.1 height=3.2", "door", ROOM)
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 3.0), openings=(tall,)), (Node("bed", "double_bed"),))
+    with pytest.raises(GraphError, match=r"^door 'door': its top is at 3.20 m, allowed: up to 2.80 m, the height of"):
+        check_doors(graph)
+    check_doors(graph.replaced(room=graph.room.replaced(height=3.4)))
+
+
 def test_differences() -> None:
     before = SceneGraph.from_yaml(TEXT)
     door, window, other = before.room.openings

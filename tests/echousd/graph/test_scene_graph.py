@@ -133,6 +133,7 @@ def test_faults_of_a_node(fields, text):
         ({"height": -2}, "room: height: found -2, allowed: a positive number, metres"),
         ({"floor_polygon": [(0, 0), (1, 1)]}, "floor_polygon: 2 corners that enclose no area, allowed: at least three"),
         ({"floor_polygon": [(0, 0), (1, 1), (2, 2)]}, "floor_polygon: 3 corners that enclose no area"),
+        ({"floor_polygon": [(0, 0), (4, 3), (4, 0), (0, 3)]}, "floor_polygon: Self-intersection at (2.00 1.50)"),
         ({"floor_polygon": [(0, 0), (2, 0), (0, 1), (3, 1)]}, "Self-intersection at ("),
         ({"floor_polygon": [(0, 0), (2,), (0, 1)]}, "found (2,), allowed: corners [x, z], metres"),
         (
