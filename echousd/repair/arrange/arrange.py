@@ -53,8 +53,8 @@ def arrange(setting: Setting, *, rounds: int | None = None) -> Arranged:
     rank = np.array([_rank(setting, i) for i in range(len(setting.size))])
     regrets: dict[int, list[tuple[float, float, float, float]]] = {}
     best: Arranged | None = None
-    for _ in range(rounds):
-        found = _built(setting, np.argsort(rank, kind="stable"), regrets)
+    for number in range(rounds):
+        found = _built(setting, np.argsort(rank, kind="stable"), regrets, shoved=number == 0)
         if best is None or found.total < best.total - 1e-9:
             best = found
         bad = found.paid > BAD
@@ -108,7 +108,11 @@ def _rank(setting: Setting, i: int) -> float:
 
 
 def _built(
-    setting: Setting, order: np.ndarray, regrets: dict[int, list[tuple[float, float, float, float]]]
+    setting: Setting,
+    order: np.ndarray,
+    regrets: dict[int, list[tuple[float, float, float, float]]],
+    *,
+    shoved: bool,
 ) -> Arranged:
     n = len(setting.size)
     state = State(setting.draft.copy(), setting.heading.copy(), np.zeros(n, bool), regrets)
@@ -126,7 +130,8 @@ def _built(
     state.placed[setting.hanging] = False
     slide_groups(setting, state, own)
     seat_evenly(setting, state, own)
-    make_way(setting, state, own)
+    if shoved:  # in other rounds another order does
+        make_way(setting, state, own)
     for i in order:  # lamps follow what they light
         if setting.hanging[i]:
             own[i], _ = _put(setting, state, int(i))

@@ -11,7 +11,8 @@ from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.setting import Poses, Setting, State
 
 SLIDES = np.array([-1.6, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6])  # metres
-SHOVES = np.array([-1.4, -0.9, -0.5, 0.5, 0.9, 1.4])  # metres that it makes way for another group
+SHOVES = (-1.2, -0.6, 0.6, 1.2)  # metres that it makes way for another group
+HOPE = 0.3  # share of what that one pays that it may cost to make way at most
 CRAMPED = 2.0  # that a group pays together, from which on others make way for it
 GAIN = 0.05  # that a slide must save
 AT_WALL = 0.15  # metres: what stands so near a wall slides along it
@@ -55,34 +56,37 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
 
 
 def make_way(setting: Setting, state: State, own: np.ndarray) -> None:
-    """Where a group is cramped, slide another one away and it after that, if both pay less then; `state` is changed.
+    """Slide the group next to the most cramped one away and this one after, if both pay less then; `state` is changed.
 
     Arguments:
         state: all boxes placed but lamps. own: (n,) float, as `paid_by`.
     """
     groups = [members for members in _groups(setting) if not setting.fixed[members].any()]
-    for members in groups:
-        cramped = _bill(setting, state, members, own)
-        if cramped < CRAMPED:
-            continue
-        for others in groups:
-            if others is members:
-                continue
-            before = cramped + _bill(setting, state, others, own)
-            kept = state.position.copy()
-            best, found = before - GAIN, kept
-            for way, step in product(_ways(setting, state, int(setting.group[others[0]])), SHOVES):
-                state.position[others] += step * way
-                aside = _bill(setting, state, others, own)
-                if aside < best:
-                    for own_way in _ways(setting, state, int(setting.group[members[0]])):
-                        state.position[members] += _best_slide(setting, state, members, own, own_way)
-                    after = _bill(setting, state, others, own) + _bill(setting, state, members, own)
-                    if after < best:
-                        best, found = after, state.position.copy()
-                state.position[:] = kept
-            state.position[:] = found
-            cramped = _bill(setting, state, members, own)
+    if len(groups) < 2:
+        return
+    bills = [_bill(setting, state, members, own) for members in groups]
+    members, cramped = groups[int(np.argmax(bills))], max(bills)
+    if cramped < CRAMPED:
+        return
+    others = min((group for group in groups if group is not members), key=lambda one: _between(state, members, one))
+    there = _bill(setting, state, others, own)
+    kept = state.position.copy()
+    best, found = cramped + there - GAIN, kept
+    for way, step in product(_ways(setting, state, int(setting.group[others[0]])), SHOVES):
+        state.position[others] += step * way
+        if _bill(setting, state, others, own) < there + HOPE * cramped:
+            for own_way in _ways(setting, state, int(setting.group[members[0]])):
+                state.position[members] += _best_slide(setting, state, members, own, own_way)
+            after = _bill(setting, state, others, own) + _bill(setting, state, members, own)
+            if after < best:
+                best, found = after, state.position.copy()
+        state.position[:] = kept
+    state.position[:] = found
+
+
+def _between(state: State, members: np.ndarray, others: np.ndarray) -> float:
+    """Metres between the middles of two groups."""
+    return float(np.linalg.norm(state.position[members].mean(0) - state.position[others].mean(0)))
 
 
 def _groups(setting: Setting) -> list[np.ndarray]:

@@ -15,6 +15,7 @@ from echousd.repair.geometry import depth_inside
 
 MISSING = 1.6  # for each place that those who attend a piece would not find
 UNTOLD = 5.0  # for each of these that cannot stand on the side that is stated
+GOOD = 0.11  # price of a place up to which it is none for want of a better one
 BESIDE = 0.8  # share of its half extent that a place lies off the piece's middle, to be on a side of it
 ELBOW = 0.3  # metres behind a chair, to pull it out
 VIEW = 1.1  # per metre that a screen is beside the line of sight
@@ -31,9 +32,11 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
     out = np.zeros(len(poses))
     for slots, asked, members in _waiting(setting, state, i):
         if (members[0], i) not in setting.spots:
-            best = slots if asked.any() else [slot for slot in slots if slot[3] <= 0.11]
-            setting.spots[members[0], i] = np.array(_distinct(best, 0.3)).reshape(-1, 2)
-        local = setting.spots[members[0], i]
+            best = [slot for slot in slots if slot[3] <= GOOD]
+            good = len(_distinct(best, 0.3))
+            rest = slots if asked.any() else ()
+            setting.spots[members[0], i] = np.array(_distinct([*best, *rest], 0.3)).reshape(-1, 2), good
+        local, good = setting.spots[members[0], i]
         if not len(local):  # all of its places are far-fetched
             continue
         c, s = np.cos(poses.yaw)[:, None], np.sin(poses.yaw)[:, None]
@@ -44,8 +47,9 @@ def missing(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
         free = _free(setting, state, i, points, reach)
         told = (offset * asked > BESIDE * _half(setting, i, poses)[:, None]) | (asked == 0)
         kept = free & told.all(-1)
-        lost = np.maximum(min(len(members), len(local)) - kept.sum(1), 0)
-        out += (UNTOLD if asked.any() else MISSING) * lost
+        out += MISSING * np.maximum(min(len(members), good) - kept[:, :good].sum(1), 0)
+        if asked.any():
+            out += (UNTOLD - MISSING) * np.maximum(min(len(members), len(local)) - kept.sum(1), 0)
     return out
 
 

@@ -118,8 +118,8 @@ class Setting:
         return {}
 
     @cached_property
-    def spots(self) -> dict[tuple[int, int], np.ndarray]:
-        """(S, 2) the distinct places among them, kept when they are asked for again (`outlook.missing`)."""
+    def spots(self) -> dict[tuple[int, int], tuple[np.ndarray, int]]:
+        """(S, 2) the distinct places among them, the good ones first, and how many these are (`outlook.missing`)."""
         return {}
 
     @cached_property
