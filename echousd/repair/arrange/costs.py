@@ -257,7 +257,7 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
 
 
 def _weight(setting: Setting, state: State, i: int, other: np.ndarray) -> np.ndarray:
-    """(r,) float: how much relations of box i count, by what is at their other ends; what attends it, and lamps, follow."""
+    """(r,) float: how much relations of box i count, by their other ends; what attends it, and lamps, will follow."""
     anchor = setting.anchor[other]
     guess = np.where((anchor >= 0) & state.placed[anchor], GUESSED, UNPLACED)
     return np.where(state.placed[other], 1.0, np.where((anchor == i) | setting.hanging[other], 0.0, guess))
