@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from echousd.rendering import render
     from echousd.room import Room, RoomOptions, generate
     from echousd.room.edit import edit
-    from echousd.stage import read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
+    from echousd.stage import read_dressing, read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
     from echousd.texturing import export_job as export_texture_job
     from echousd.texturing import import_look
 
@@ -33,6 +33,7 @@ _HOME = {
     "Relation": "echousd.graph",
     "RoomSpec": "echousd.graph",
     "SceneGraph": "echousd.graph",
+    "read_dressing": "echousd.stage",
     "read_graph": "echousd.stage",
     "read_rooms": "echousd.stage",
     "relations_from_boxes": "echousd.stage",
@@ -69,6 +70,7 @@ __all__ = [
     "generate_many",
     "import_look",
     "load_model",
+    "read_dressing",
     "read_graph",
     "read_rooms",
     "relations_from_boxes",

@@ -33,6 +33,7 @@ class BatchOptions(BaseModel):
         palette: harmony of the room, "" = the seed chooses.
         merge: what of a piece is one mesh, `parts`, `bodies` or `closed`, see `RoomOptions`.
         materialx: materials have a MaterialX network as well. crate, instances, thumbnails: see `RoomOptions`.
+        dress_graph: small things are nodes of the graph on the stage, too, see `RoomOptions`.
         openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
         self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
     """
@@ -66,6 +67,7 @@ class BatchOptions(BaseModel):
     crate: bool = False
     instances: bool = False
     thumbnails: bool = False
+    dress_graph: bool = False
     openings: Literal["kept", "drawn"] = "kept"
     preview: bool = True
     relations: Annotated[float, Field(ge=0, le=20)] = 1.5

@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom
 
 from echousd.checks.findings import Finding, Rule, applied, is_guide, prims
 from echousd.stage import encoding as usd
+from echousd.stage.dressing import read_small
 from echousd.stage.encoding import StageError
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph
 
@@ -27,11 +28,11 @@ def edge_targets(stage: Usd.Stage) -> Iterator[Finding]:
     owned = set()
     for room in rooms:
         try:
-            names = node_names(room)
+            names = node_names(room, small=True)
         except StageError as error:
             yield Finding(room.graph.GetPath(), str(error))
             continue
-        for prim in room.relations:
+        for prim in (*room.relations, *room.small_relations):
             owned.add(prim.GetPath())
             try:
                 relation_of(prim, names)
@@ -55,6 +56,11 @@ def consistent_graph(stage: Usd.Stage) -> Iterator[Finding]:
                 room_graph(room)
             except StageError as error:
                 yield Finding(room.graph.GetPath(), _without_place(str(error), room.graph))
+        for prim in room.small:
+            try:
+                read_small(prim)
+            except StageError as error:
+                yield Finding(prim.GetPath(), _without_place(str(error), prim))
         for hint in told:
             message = str(hint.message)
             yield Finding(room.graph.GetPath(), message.split(": ", 1)[-1], warning=True)

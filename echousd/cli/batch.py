@@ -76,6 +76,9 @@ def run(
     preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
     dress: Annotated[str | None, typer.Option(help="Small things: none, some or full; default none.")] = None,
+    dress_graph: Annotated[
+        bool | None, typer.Option("--dress-graph", help="Small things are nodes of the graph, too.", show_default=False)
+    ] = None,
     walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
     more: Annotated[
         list[str] | None,
@@ -114,7 +117,7 @@ def run(
         "preview": preview,
         "walls": walls,
     }
-    told |= {"drafts": drafts, "dress": dress, "self_contained": self_contained}
+    told |= {"drafts": drafts, "dress": dress, "dress_graph": dress_graph, "self_contained": self_contained}
     told = {key: value for key, value in told.items() if value is not None}
     raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **told}
     request = request_of(raw, files[0] if files else "batch")

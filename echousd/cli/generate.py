@@ -87,6 +87,9 @@ def generate(
     ] = True,
     ceiling: Annotated[bool, typer.Option("--ceiling", help="Add a ceiling.")] = False,
     dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "some",
+    dress_graph: Annotated[
+        bool, typer.Option("--dress-graph", help="Small things are nodes of the graph, too, in their own layer.")
+    ] = False,
     atlas: Annotated[bool, typer.Option("--atlas", help="Unwrap without overlaps (extra: texture).")] = False,
     merge: Annotated[
         bool, typer.Option("--merge", help="One mesh for what moves together, not one for legs, top, back ...")
@@ -159,7 +162,7 @@ def generate(
         meshes = "closed" if closed else "bodies" if merge else "parts"
         options = RoomOptions(
             up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes, materialx=materialx, crate=crated,
-            instances=instances, thumbnails=thumbnails,
+            instances=instances, thumbnails=thumbnails, dress_graph=dress_graph,
         )  # fmt: skip
         wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
         spent = {"imports": time.perf_counter() - started}

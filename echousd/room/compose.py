@@ -37,6 +37,7 @@ from echousd.room.thumbnails import thumbnails
 from echousd.room.volume import room_points, room_volume
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
+from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.turning import turn_up
@@ -89,8 +90,9 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
         looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
         parts = {name: asset.slots for name, asset in small.items()}
         layers["dressing"] = dressing_layer(
-            dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"), instances=room.options.instances
-        )
+            dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"), instances=room.options.instances,
+            taken=[relation_name(*relation.triple) for relation in room.graph.relations],
+        )  # fmt: skip
     if shelf is not None:
         shelf.put(files)
         files = {path: content for path, content in files.items() if not shelf.holds(path)}

@@ -22,7 +22,7 @@ from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
 from echousd.room.layouts import Draws, best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
 from echousd.room.looks import palette_of_room
-from echousd.room.manifest import FACES, check_seed
+from echousd.room.manifest import FACES, FLAGS, check_seed
 from echousd.room.merging import merged
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
@@ -171,7 +171,7 @@ def edit(
             manifest.get("dress", "none"),
             manifest.get("palette", ""),
             manifest.get("merge", "parts"),
-            *(manifest.get(word, False) for word in ("materialx", "crate", "instances", "thumbnails")),
+            *(manifest.get(word, False) for word in FLAGS),
         ),
         timings=timer.seconds,
         edited=Path(root),

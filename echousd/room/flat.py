@@ -10,12 +10,12 @@ from pxr import Sdf, Usd
 
 from echousd.flattening import flat_layer
 from echousd.packing import Package, Reach, images_beside
-from echousd.room.dressing.layer import DRESSING
 from echousd.room.lights import LIGHTS
 from echousd.room.materials import LOOKS
-from echousd.room.paths import OBJECTS
+from echousd.room.paths import DRESSING, OBJECTS
 from echousd.room.room import RoomData
 from echousd.room.save import save_layers
+from echousd.stage import encoding as usd
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.layouts import VARIANTS, layout_names, showing_layout
@@ -59,7 +59,7 @@ def _with_layouts(layouts: Mapping[str, Sdf.Layer]) -> Sdf.Layer:
     for name, found in layouts.items():
         Sdf.VariantSpec(variants, name)
         variant = Sdf.Path(ROOM).AppendVariantSelection(VARIANTS, name)
-        for path in (*_places(found), *filter(found.GetPrimAtPath, (DRESSING,))):
+        for path in (*_places(found), *filter(found.GetPrimAtPath, (DRESSING,)), *_small_relations(found)):
             inside = Sdf.Path(path).ReplacePrefix(ROOM, variant)
             Sdf.CreatePrimInLayer(layer, inside.GetPrimPath())
             Sdf.CopySpec(found, path, layer, inside)
@@ -68,9 +68,18 @@ def _with_layouts(layouts: Mapping[str, Sdf.Layer]) -> Sdf.Layer:
                 Sdf.CopySpec(found, look.path, layer, look.path)
     for path in _places(layer):
         layer.GetPrimAtPath(path.GetPrimPath()).RemoveProperty(layer.GetPropertyAtPath(path))
+    for path in _small_relations(layer):
+        del layer.GetPrimAtPath(path.GetParentPath()).nameChildren[path.name]
     if layer.GetPrimAtPath(DRESSING):
         del room.nameChildren[Sdf.Path(DRESSING).name]
     return layer
+
+
+def _small_relations(layer: Sdf.Layer) -> list[Sdf.Path]:
+    """Paths of the relations of small things that are nodes."""
+    told = layer.GetPrimAtPath(f"{ROOM}/{usd.GRAPH_NAME}").nameChildren
+    ends = {one.path: one.relationships[usd.SUBJECT].targetPathList for one in told if usd.SUBJECT in one.relationships}
+    return [path for path, found in ends.items() if any(end.HasPrefix(DRESSING) for end in found.explicitItems)]
 
 
 def _places(layer: Sdf.Layer) -> list[Sdf.Path]:

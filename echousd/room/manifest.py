@@ -19,6 +19,13 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=255)
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
 
 
+FLAGS = (
+    "materialx",
+    "crate",
+    "instances",
+    "thumbnails",
+    "dress_graph",
+)  # named only where set; in `RoomOptions`' order
 FACES = 5000  # budget of each mesh where nobody says another
 
 
@@ -58,6 +65,7 @@ class Manifest(BaseModel):
     crate: bool = False
     instances: bool = False
     thumbnails: bool = False
+    dress_graph: bool = False
     faces: Annotated[int, Field(ge=1)] = FACES
     meshes: dict[str, dict[str, Any]] = {}
     history: list[Step] = []

@@ -34,7 +34,9 @@ class RoomOptions:
         up_axis: `Y`, or `Z`: assets, shell, places, lights and cameras are written so (`echousd.turning`).
         walls: add walls around the floor, with doors and windows in their openings.
         ceiling: add a ceiling.
-        dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`.
+        dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`. What stands is a
+            body with collider and mass; what hangs is static, a collider without mass; rugs, throws and cables, which
+            lie flat below or on what stands, have neither, as a collider there would lift it.
         atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
         merge: `parts`, a mesh for every part (legs, top, drawers), `bodies`, one for all that moves together,
             or `closed`, likewise, as a single closed surface without insides (`echousd.room.merging`).
@@ -44,6 +46,8 @@ class RoomOptions:
         instances: objects that share an asset are instances of it, bound through its class: less memory, no overrides
             below one of them alone.
         thumbnails: a picture of every asset, `.thumbs/256x256/<name>.usda.png` in its folder (extra `render`).
+        dress_graph: small things are nodes of the graph on the stage, too, in the layer of the dressing
+            (`echousd.read_dressing`); readers of the graph pass over them.
     """
 
     up_axis: str = "Y"
@@ -57,12 +61,15 @@ class RoomOptions:
     crate: bool = False
     instances: bool = False
     thumbnails: bool = False
+    dress_graph: bool = False
 
     def __post_init__(self) -> None:
         if self.up_axis not in ("Y", "Z"):
             raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
         if self.dress not in DRESS:
             raise ValueError(f"dress is {self.dress!r}, allowed: {', '.join(DRESS)}")
+        if self.dress_graph and self.dress == "none":
+            raise ValueError("dress_graph writes small things into the graph, but dress is 'none', allowed: some, full")
         if self.merge not in MERGES:
             raise ValueError(f"merge is {self.merge!r}, allowed: {', '.join(MERGES)}")
         if self.palette and self.palette not in PALETTES:

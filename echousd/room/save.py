@@ -22,7 +22,7 @@ from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.history import remembered, undone
 from echousd.room.lock import locked
-from echousd.room.manifest import FACES, MANIFEST_KEY
+from echousd.room.manifest import FACES, FLAGS, MANIFEST_KEY
 from echousd.room.paths import layer_file
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
@@ -197,7 +197,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         **({"palette": room.options.palette} if room.options.palette else {}),
         **({"faces": room.provenance.faces} if room.provenance.faces != FACES else {}),
         **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
-        **{word: True for word in ("materialx", "crate", "instances", "thumbnails") if getattr(room.options, word)},
+        **{word: True for word in FLAGS if getattr(room.options, word)},
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

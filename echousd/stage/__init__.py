@@ -1,6 +1,7 @@
 """Scene graphs on USD stages: written in bulk, read through any composition, changed in place."""
 
 from echousd.stage.boxes import relations_from_boxes
+from echousd.stage.dressing import read_dressing
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer
 from echousd.stage.foreign import foreign_graph, foreign_rooms
@@ -15,6 +16,7 @@ __all__ = [
     "foreign_rooms",
     "graph_layer",
     "open_stage",
+    "read_dressing",
     "read_graph",
     "read_rooms",
     "relations_from_boxes",

@@ -10,6 +10,7 @@ from pxr import Gf, Sdf, Vt
 if TYPE_CHECKING:
     from echomodel.openings import Opening
     from echousd.graph import Node, RoomSpec
+    from echousd.graph.small import SmallNode
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"
@@ -64,6 +65,7 @@ BETWEEN = "echo:between"
 LOCKED = "echo:locked"
 SOURCE = "echo:source"
 ASSET = "echo:asset"
+DRESSING = "dressing"  # the source of small things, which are no furniture
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
@@ -139,6 +141,16 @@ def node_values(node: Node) -> dict[str, Any]:
         values[ASSET] = node.asset
     for key, value in node.attributes.items():
         values[FREE + key] = value
+    return values
+
+
+def small_values(node: SmallNode) -> dict[str, Any]:
+    """The authored properties of a small thing that is a node, in USD's types."""
+    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SOURCE: DRESSING}
+    for name, given in ((SIZE, node.size), (POSITION, node.position)):
+        if given is not None:
+            values[name] = Gf.Vec3d(*given)
+    values |= {name: given for name, given in ((YAW, node.yaw), (PLACE, node.place)) if given is not None}
     return values
 
 

@@ -22,13 +22,18 @@ from echousd.stage.files import opened, source
 
 @dataclass
 class RoomPrims:
-    """The prims of one room: its own, its scene graph's, and those of its nodes, relations and openings in order."""
+    """The prims of one room: its own, its scene graph's, and those of its nodes, relations and openings in order.
+
+    Small things that are nodes, and relations that one is an end of, stand apart: no graph of furniture has them.
+    """
 
     room: Usd.Prim
     graph: Usd.Prim
     nodes: list[Usd.Prim] = field(default_factory=list)
     relations: list[Usd.Prim] = field(default_factory=list)
     openings: list[Usd.Prim] = field(default_factory=list)
+    small: list[Usd.Prim] = field(default_factory=list)
+    small_relations: list[Usd.Prim] = field(default_factory=list)
 
 
 def read_rooms(stage: Usd.Stage | str | os.PathLike[str]) -> dict[str, SceneGraph]:
@@ -57,6 +62,7 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     nodes: list[Usd.Prim] = []
     relations: list[Usd.Prim] = []
     openings: list[Usd.Prim] = []
+    small: list[Usd.Prim] = []
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
         type_name = prim.GetTypeName()
         if type_name == usd.RELATION_TYPE:
@@ -66,12 +72,17 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
         elif type_name == usd.GRAPH_TYPE:
             graphs.append(prim)
         elif usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
-            nodes.append(prim)
+            (small if values.given(prim.GetAttribute(usd.SOURCE)) == usd.DRESSING else nodes).append(prim)
     rooms = {prims.room.GetPath(): prims for prims in (_room_of(graph) for graph in graphs)}
     if len(rooms) < len(graphs):
         raise StageError(f"{source(stage)}: two EchoSceneGraph prims describe the same room, allowed: one per room")
     by_graph = {prims.graph.GetPath(): prims for prims in rooms.values()}
-    members = ((rooms, nodes, "nodes"), (by_graph, relations, "relations"), (by_graph, openings, "openings"))
+    members = (
+        (rooms, nodes, "nodes"),
+        (rooms, small, "small"),
+        (by_graph, relations, "relations"),
+        (by_graph, openings, "openings"),
+    )
     for owners, found, member in members:
         known: dict[Sdf.Path, RoomPrims | None] = {}  # by parent, as siblings are many
         for prim in found:
@@ -81,7 +92,18 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
             owner = known[parent]
             if owner:
                 getattr(owner, member).append(prim)
+    for prims in rooms.values():
+        _set_apart(prims)
     return list(rooms.values())
+
+
+def _set_apart(prims: RoomPrims) -> None:
+    """Take the relations of small things from those of the furniture."""
+    small = {prim.GetPath() for prim in prims.small}
+    if small:
+        ends = [{*values.targets(one, usd.SUBJECT), *values.targets(one, usd.OBJECT)} for one in prims.relations]
+        prims.small_relations = [one for one, both in zip(prims.relations, ends, strict=True) if both & small]
+        prims.relations = [one for one, both in zip(prims.relations, ends, strict=True) if not both & small]
 
 
 def _room_of(graph: Usd.Prim) -> RoomPrims:
@@ -161,11 +183,14 @@ def _strength(prim: Usd.Prim) -> int:
     return min((layers.index(layer) for layer in own if layer in layers), default=len(layers))
 
 
-def node_names(prims: RoomPrims) -> dict[Sdf.Path, str]:
-    """Path to node name (the prim's own name); raises StageError where two prims of one room share a name."""
+def node_names(prims: RoomPrims, *, small: bool = False) -> dict[Sdf.Path, str]:
+    """Path to node name (the prim's own name), with `small` of small things too.
+
+    Raises StageError where two prims of one room share a name.
+    """
     names: dict[Sdf.Path, str] = {}
     seen: dict[str, Sdf.Path] = {}
-    for prim in prims.nodes:
+    for prim in (*prims.nodes, *(prims.small if small else ())):
         path, name = prim.GetPath(), prim.GetName()
         if name in seen:
             raise StageError(

@@ -9,9 +9,11 @@ import numpy as np
 
 from echomodel.data.dressing import KINDS
 from echomodel.data.dressing import thing as solids_of
+from echousd.graph.small import DressingGraph
 from echousd.naming import free_name
 from echousd.room.colliders import standing_hull
 from echousd.room.dressing import bareness, corners, floors, hangings, tabletops, upholstery, walls
+from echousd.room.dressing.nodes import graph_of
 from echousd.room.dressing.setting import Setting, Thing, standing
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import mass_of, part_of, within_budget
@@ -53,12 +55,14 @@ class Dressing:
         assets: name of a thing -> name of its asset; one name is one asset in all layouts.
         geometry: name of an asset -> its geometry.
         bare: names of the windows that have curtains in no layout.
+        graphs: the things of every layout as nodes, none without `dress_graph`.
     """
 
     layouts: tuple[Mapping[str, Thing], ...]
     assets: Mapping[str, str]
     geometry: Mapping[str, Geometry]
     bare: frozenset[str] = frozenset()
+    graphs: tuple[DressingGraph, ...] = ()
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -77,6 +81,7 @@ class Dressing:
 def dress(room: RoomData) -> Dressing:
     """Small things for every layout of a room as `room.options.dress` asks for; the same room gives the same."""
     layouts: list[dict[str, Thing]] = []
+    graphs: list[DressingGraph] = []
     assets: dict[str, str] = {}
     geometry: dict[str, Geometry] = {}
     known: dict[tuple, str] = {}
@@ -99,7 +104,9 @@ def dress(room: RoomData) -> Dressing:
                     name = free_name(word, taken | set(named) | set(kinds))
                 named[name], assets[name] = found, known[key]
             layouts.append(named)
-    return Dressing(tuple(layouts), assets, geometry, frozenset(bare))
+            if room.options.dress_graph:
+                graphs.append(graph_of(setting, named))
+    return Dressing(tuple(layouts), assets, geometry, frozenset(bare), tuple(graphs))
 
 
 def placed(room: RoomData, layout: int = 0) -> list[Thing]:

@@ -11,11 +11,10 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade
 
 from echousd.room import assets
 from echousd.room.dressing.dress import Dressing
+from echousd.room.dressing.nodes import write_nodes
 from echousd.room.dressing.setting import Thing
 from echousd.room.materials import LOOKS
-from echousd.room.paths import class_path
-
-DRESSING = "/Room/Dressing"
+from echousd.room.paths import DRESSING, class_path
 
 
 def dressing_layer(
@@ -25,6 +24,7 @@ def dressing_layer(
     data: Mapping[str, Any],
     *,
     instances: bool = False,
+    taken: Collection[str] = (),
 ) -> Sdf.Layer:
     """The layer; several layouts are variants of `layout`, as in the layer of the layout.
 
@@ -34,6 +34,7 @@ def dressing_layer(
         looks: material slot -> name of its material in the room.
         data: customLayerData.
         instances: things of one asset are instances of it.
+        taken: names of the prims of the furniture's relations.
     """
     stage = assets.new_stage("Room", ".usda", data)
     room = stage.OverridePrim("/Room")
@@ -58,7 +59,13 @@ def dressing_layer(
         references |= {f"{above}/{name}": dressing.assets[name] for name in things}
     if several:  # the layer of the layout says which one is seen
         room.GetVariantSets().GetVariantSet("layout").ClearVariantSelection()
-    return assets.without_stage(stage, lambda layer: _refer(layer, references))
+
+    def finish(layer: Sdf.Layer) -> None:
+        _refer(layer, references)
+        for number, graph in enumerate(dressing.graphs):
+            write_nodes(layer, graph, Sdf.Path(f"/Room{{layout=layout_{number}}}" if several else "/Room"), taken)
+
+    return assets.without_stage(stage, finish)
 
 
 def _write(
