@@ -78,6 +78,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     slots = _slots(small)
     table, bindings = room_looks(room, made, built, slots, harmony)
     files |= materials.texture_files(table, harmony)
+    files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),
         "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell")),
@@ -101,8 +102,10 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
             shelf.redirect(layer)
         path = layer_file(name, crate=room.options.crate)
         files[path] = _bytes(room, layer, path)
-    files |= lights.image_files(room)
-    files[f"{room.name}.usda"] = _bytes(room, root_layer(room, dressing.hung), ".usda")
+    root = root_layer(room, dressing.hung)
+    if shelf is not None:
+        shelf.redirect(root, above=".")
+    files[f"{room.name}.usda"] = _bytes(room, root, ".usda")
     return files
 
 

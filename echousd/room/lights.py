@@ -26,7 +26,7 @@ LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # 
 # Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
 # seen through the windows alone.
 SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
-SKY = "layers/sky.jpg"  # stays with the room where a store has the images
+SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
 # Kelvin. White is 6504 to a renderer, which adapts to nothing as eyes do: lamps of 2,900 K would turn a room orange.
 DAYLIGHT, BULBS = 6500.0, 4700.0

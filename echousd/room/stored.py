@@ -65,11 +65,12 @@ class Shelf:
             names = {_name_in(unit, path): path for path in inside}
             key = self.keys[unit] = self.store.put({name: inside[path] for name, path in names.items()})
             for name, path in names.items():
-                self._paths[f"../{path}"] = f"../{self.at}/{key[:2]}/{key}/{name}"
+                self._paths[path] = f"{self.at}/{key[:2]}/{key}/{name}"
 
-    def redirect(self, layer: Sdf.Layer) -> None:
-        """Have a layer in the room's `layers/` name the store's files in place of the room's."""
-        UsdUtils.ModifyAssetPaths(layer, lambda path: self._paths.get(path, path))
+    def redirect(self, layer: Sdf.Layer, above: str = "..") -> None:
+        """Have a layer name the store's files in place of the room's; `above`: the room from the layer's folder."""
+        to = {f"{above}/{path}": f"{above}/{stored}" for path, stored in self._paths.items()}
+        UsdUtils.ModifyAssetPaths(layer, lambda path: to.get(path, path))
 
     def holds(self, path: str) -> bool:
         """Whether a file of the room (relative path) lies in the store."""

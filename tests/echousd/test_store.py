@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pxr import Usd
+from pxr import Usd, UsdLux
 
 from echousd.checks import check
 from echousd.exporting import export
@@ -132,6 +132,8 @@ def test_a_room_with_a_store_is_the_same_room(shared):
         for s in stages
     ]
     assert found[0] == found[1]
+    sky = UsdLux.DomeLight(stages[0].GetPrimAtPath("/Room/Lights/sky")).GetTextureFileAttr().Get().resolvedPath
+    assert Path(sky).is_relative_to((stored.parents[1] / "store").resolve())
     assert [error.rule for error in check(stored).errors] == [error.rule for error in check(alone).errors]
 
 

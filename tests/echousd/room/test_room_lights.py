@@ -54,7 +54,7 @@ def test_the_sun_falls_in_through_the_window(stage) -> None:
 
 def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path) -> None:
     dome = UsdLux.DomeLight(stage.GetPrimAtPath("/Room/Lights/sky"))
-    assert dome.GetTextureFileAttr().Get().resolvedPath.endswith("layers/sky.jpg")
+    assert dome.GetTextureFileAttr().Get().resolvedPath.endswith("textures/sky.jpg")
     with Image.open(dome.GetTextureFileAttr().Get().resolvedPath) as picture:
         up, down = (picture.getpixel((9, share * picture.height // 10)) for share in (1, 8))
     assert up[2] > up[0] > 120
@@ -65,7 +65,7 @@ def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path
     closed = Usd.Stage.Open(str(room.save(tmp_path / "closed", preview=False)))
     assert intensity(closed, "sun") > 2 * intensity(stage, "sun")  # through the window alone
     bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes").save(tmp_path / "bare", preview=False)
-    assert not (bare.parent / "layers/sky.jpg").exists()  # nobody looks past walls that are not there
+    assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
 
 
 def test_lamps_shine_where_they_are(stage) -> None:
