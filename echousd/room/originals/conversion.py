@@ -93,7 +93,9 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
         faces = outward(points, faces)
         uv = getattr(mesh.visual, "uv", None)
         whole = uv is not None and len(uv) == len(points) and bool(np.isfinite(uv).all())
-        yield _Part(points, faces, np.asarray(uv) if whole else None, getattr(mesh.visual, "material", None))
+        # beyond a million repeats no digits are left for a place in the image: an exporter's slip
+        near = np.where(np.abs(uv) < 1e6, uv, 0.0) if whole else None
+        yield _Part(points, faces, near, getattr(mesh.visual, "material", None))
 
 
 def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:

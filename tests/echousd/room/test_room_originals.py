@@ -7,7 +7,9 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echousd.assets.index import index
+from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
+from echousd.room.originals.conversion import CONVERTED, converted
 from echousd.room.originals.winding import outward
 from echousd.stage import open_stage
 
@@ -86,3 +88,14 @@ def test_payloads_within_payloads_and_inherited_classes_arrive(tmp_path):
     box = UsdGeom.BBoxCache(Usd.TimeCode.Default(), ["default"]).ComputeWorldBound(form).ComputeAlignedRange()
     size = room.boxes.size[room.names.index("wardrobe")].tolist()
     assert sorted(box.GetSize()) == pytest.approx(sorted(size), abs=2e-3)
+
+
+def test_texture_coordinates_that_are_an_exporters_slip_are_left_out(tmp_path):
+    (tmp_path / "slip.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.5\nvt 3.44e9 1\nvt 1 0\nf 1/1 2/2 3/3\n", encoding="utf-8"
+    )
+    (tmp_path / CONVERTED).write_bytes(converted(ModelFile(tmp_path / "slip.obj", tmp_path))[CONVERTED])
+    stage = open_stage(tmp_path / CONVERTED)
+    form = next(prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh))
+    held = np.array(UsdGeom.PrimvarsAPI(form).GetPrimvar("st").Get())
+    assert sorted(map(tuple, held.tolist())) == [(0.0, 1.0), (0.25, 0.5), (1.0, 0.0)]
