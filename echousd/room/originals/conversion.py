@@ -91,11 +91,11 @@ def _parts(scene: trimesh.Scene) -> Iterator[_Part]:
         points = np.asarray(mesh.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces)[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else np.asarray(mesh.faces)
         faces = outward(points, faces)
-        uv = getattr(mesh.visual, "uv", None)
-        whole = uv is not None and len(uv) == len(points) and bool(np.isfinite(uv).all())
-        # beyond a million repeats no digits are left for a place in the image: an exporter's slip
-        near = np.where(np.abs(uv) < 1e6, uv, 0.0) if whole else None
-        yield _Part(points, faces, near, getattr(mesh.visual, "material", None))
+        told = getattr(mesh.visual, "uv", None)
+        uv = None if told is None or len(told) != len(points) else np.asarray(told)
+        if uv is not None:  # beyond a million repeats no digits are left for a place in the image: an exporter's slip
+            uv = np.where(np.abs(uv) < 1e6, uv, 0.0) if np.isfinite(uv).all() else None
+        yield _Part(points, faces, uv, getattr(mesh.visual, "material", None))
 
 
 def _layer(parts: list[_Part], images: Images) -> Sdf.Layer:
