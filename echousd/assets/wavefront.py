@@ -60,8 +60,9 @@ def _coats(libraries: list[str], beside: Beside, painted: bool) -> Iterator[tupl
             continue
         for piece in re.split(r"^[ \t]*newmtl[ \t]+", content, flags=re.MULTILINE | re.IGNORECASE)[1:]:
             name, _, rest = piece.partition("\n")
-            said = dict(re.findall(r"^[ \t]*(Kd|map_Kd|d|Tr)[ \t]+(.+?)[ \t]*$", rest, re.MULTILINE))
-            coat = _image(said.get("map_Kd", ""), beside, painted)
+            lines = re.findall(r"^[ \t]*(Kd|map_Kd|d|Tr)[ \t]+(.+?)[ \t]*$", rest, re.MULTILINE | re.IGNORECASE)
+            said = {word.lower(): value for word, value in lines}
+            coat = _image(said.get("map_kd", ""), beside, painted)
             if coat is None:
                 coat = _plain(said)
             if painted and coat is not None:
@@ -80,8 +81,8 @@ def _image(name: str, beside: Beside, painted: bool) -> np.ndarray | None:
 
 def _plain(said: dict[str, str]) -> np.ndarray | None:
     try:
-        color = np.clip(np.array(said["Kd"].split()[:3], float), 0, 1)
-        opacity = float(said["d"].split()[-1]) if "d" in said else 1.0 - float(said.get("Tr", "0").split()[0])
+        color = np.clip(np.array(said["kd"].split()[:3], float), 0, 1)
+        opacity = float(said["d"].split()[-1]) if "d" in said else 1.0 - float(said.get("tr", "0").split()[0])
     except (KeyError, ValueError):
         return None
     if len(color) != 3 or not np.isfinite([*color, opacity]).all():

@@ -201,7 +201,7 @@ def _with_libraries(plan: Plan) -> Plan:
             from echousd.settle import require_engine
 
             require_engine()
-    found = {options.assets: weights_hash(options.assets) for options in plan.options if options.assets}
+    found = {path: weights_hash(path) for path in dict.fromkeys(options.assets for options in plan.options) if path}
     return replace(plan, head={**plan.head, "libraries": found}) if found else plan
 
 

@@ -13,10 +13,9 @@ from scipy.spatial import cKDTree
 from trimesh.triangles import closest_point
 
 from echousd.repair.geometry import axes, pair_indices, separation
-from echousd.repair.report import Collision
+from echousd.repair.report import TOUCH, Collision
 from echousd.stage.contents import RoomObject
 
-TOUCH = 0.01  # metres: boxes that overlap less than this only touch
 DEEP = 0.006  # metres: a point of one surface this far inside the other mesh is a collision
 SAMPLES = 600  # points per surface and pair
 

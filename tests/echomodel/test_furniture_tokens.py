@@ -120,3 +120,7 @@ def test_a_set_of_tokens_is_written_and_read(tmp_path):
     assert found.tokens.shape == (found.count.sum(), WIDTH)
     with pytest.raises(ValueError, match="no set of part tokens"):
         TokenSet.load(tmp_path / "other")
+    for content in (b"", (tmp_path / "tokens.npz").read_bytes()[:400]):
+        (tmp_path / "tokens.npz").write_bytes(content)
+        with pytest.raises(ValueError, match="no set of part tokens"):
+            TokenSet.load(tmp_path)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import torch
 
+from echomodel.boxes import Boxes
 from echomodel.data.rooms.generator import generate_rooms
 from echomodel.openings import Opening
 from echomodel.rules.living import RULES, faults, faults_of, missed, plan_of
@@ -241,22 +243,40 @@ def test_margins_have_finite_slopes(rule):
         assert all(bool(torch.isfinite(slope).all()) for slope in slopes if slope is not None)
 
 
+def packed_plan(plans):
+    from echomodel.floors import padded
+
+    scene = torch.cat([torch.full((len(plan),), number) for number, plan in enumerate(plans)])
+    return type(plans[0])(
+        tuple(kind for plan in plans for kind in plan.kinds),
+        *(torch.cat([getattr(plan, name) for plan in plans]) for name in ("size", "position", "yaw")),
+        scene, padded([plan.floor for plan in plans]), ((),) * len(plans),
+        torch.zeros((0, 3), dtype=torch.int64), torch.zeros(len(scene), dtype=torch.bool),
+    )  # fmt: skip
+
+
+def test_another_rooms_wardrobe_hides_no_screen():
+    floor = np.array([[-3, -3], [3, -3], [3, 3], [-3, 3]], float)
+    seen = Boxes(
+        torch.tensor([[2.0, 0.8, 0.9], [1.6, 0.5, 0.4]]),
+        torch.tensor([[0.0, 0.0, -1.5], [0.0, 0.0, 1.7]]),
+        torch.tensor([0.0, math.pi]),
+    )
+    between = Boxes(torch.tensor([[1.5, 2.2, 0.6]]), torch.zeros(1, 3), torch.zeros(1))
+    plans = [plan_of(seen, ["sofa", "tv_stand"], floor), plan_of(between, ["wardrobe"], floor)]
+    said = {fault.rule for fault in faults_of(packed_plan(plans))}
+    assert said == {fault.rule for plan in plans for fault in faults_of(plan)}
+    assert "view_free" not in said
+
+
 def test_several_rooms_at_once_are_judged_as_one_by_one():
     rooms = generate_rooms(6, 11)
     plans = [plan_of(room, room.categories, room.floor_polygon) for room in rooms]
-    start, packed, alone = 0, [], []
-    for number, plan in enumerate(plans):
+    start, alone = 0, []
+    for plan in plans:
         alone += [(f.object + start, f.rule) for f in faults_of(plan)]
-        packed.append(torch.full((len(plan),), number))
         start += len(plan)
-    from echomodel.floors import padded
-
-    together = type(plans[0])(
-        tuple(kind for plan in plans for kind in plan.kinds),
-        *(torch.cat([getattr(plan, name) for plan in plans]) for name in ("size", "position", "yaw")),
-        torch.cat(packed), padded([plan.floor for plan in plans]), ((),) * len(plans),
-        torch.zeros((0, 3), dtype=torch.int64), torch.zeros(start, dtype=torch.bool),
-    )  # fmt: skip
+    together = packed_plan(plans)
     assert sorted((f.object, f.rule) for f in faults_of(together)) == sorted(alone)
     assert float(missed(together)) == pytest.approx(sum(float(missed(plan)) for plan in plans))
 

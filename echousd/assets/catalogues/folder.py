@@ -30,8 +30,10 @@ class PlainFolder:
         files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
         files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
         parts = parts_of_others(files)
-        stems = {(file.parent, file.stem) for file in files}
-        files = [file for file in files if not stands_in(file.stem, {stem for at, stem in stems if at == file.parent})]
+        beside: dict[Path, set[str]] = {}
+        for file in files:
+            beside.setdefault(file.parent, set()).add(file.stem)
+        files = [file for file in files if not stands_in(file.stem, beside[file.parent])]
         return [self._entry(file, folder) for file in files if file not in parts]
 
     def _entry(self, file: Path, top: Path) -> Entry:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,11 +35,11 @@ class TokenSet:
 
     @classmethod
     def load(cls, folder: Path) -> TokenSet:
-        """The set that `build_tokens` wrote; raises ValueError for a folder without one or of other words."""
+        """The set that `build_tokens` wrote; raises ValueError for a folder without one."""
         try:
             with np.load(folder / NAME, allow_pickle=False) as held:
                 found = cls(**{name: held[name] for name in ("tokens", "count", "category", "size", "style")})
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise ValueError(f"{folder / NAME}: no set of part tokens ({error})") from None
         if found.tokens.shape != (found.count.sum(), WIDTH):
             raise ValueError(

@@ -101,9 +101,12 @@ def test_the_unit_of_a_model_that_tells_none_is_the_likely_one(tmp_path, scale, 
 def test_textures_that_are_not_there_are_told(tmp_path):
     folder = tmp_path / "models"
     write_obj(folder, "chair", seat(), texture="missing/oak.png")
+    write_obj(folder, "stool", seat(), texture="missing/ash.png")
+    (folder / "stool.mtl").write_text((folder / "stool.mtl").read_text().lower())  # some programs write it so
     write_usd(folder / "desk.usda", chest(), texture="./missing/oak.png")
     _, found = records(tmp_path, folder)
     assert found["chair.obj"].missing == ("missing/oak.png",)
+    assert found["stool.obj"].missing == ("missing/ash.png",)
     assert found["desk.usda"].missing == ("oak.png",)
     assert found["chair.obj"].usable
     assert found["desk.usda"].usable

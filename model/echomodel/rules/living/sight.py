@@ -96,8 +96,7 @@ def _lying_or_sitting_back(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
 def _clear(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
     """(P,) and (P,): metres between the line from screen i to viewer j and the next thing that is high, and which."""
     high = plan.standing & ~plan.stands("before") & (plan.position[:, 1] + plan.size[:, 1] > HIGH).detach()
-    others = high.nonzero()[:, 0]
-    pair, block = torch.cartesian_prod(torch.arange(len(i)), others).reshape(-1, 2).T
+    pair, block = (high[None] & (plan.scene[i][:, None] == plan.scene[None])).nonzero(as_tuple=True)
     keep = (block != i[pair]) & (block != j[pair]) & (plan.gap(i[pair], block) > 1e-3)  # the last: it stands on that
     pair, block = pair[keep], block[keep]
     share = torch.linspace(0.1, 0.9, STEPS, dtype=plan.size.dtype)[:, None, None]
