@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echousd.srgb import from_linear, to_linear
 from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
 
 MOST = 3  # colours of a model
@@ -68,8 +69,7 @@ def pixels(image: object, tint: Sequence[float] | np.ndarray = (1.0, 1.0, 1.0)) 
     image.draft("RGB", (4 * TEXELS, 4 * TEXELS))
     small = image.convert("RGBA").resize((TEXELS, TEXELS), Image.Resampling.BOX)
     found = np.asarray(small, float).reshape(-1, 4) / 255
-    rgb = np.where(found[:, :3] <= 0.04045, found[:, :3] / 12.92, ((found[:, :3] + 0.055) / 1.055) ** 2.4)
-    return np.column_stack([np.clip(rgb * np.asarray(tint, float)[:3], 0, 1), found[:, 3]])
+    return np.column_stack([np.clip(to_linear(found[:, :3]) * np.asarray(tint, float)[:3], 0, 1), found[:, 3]])
 
 
 def oklab(linear: np.ndarray) -> np.ndarray:
@@ -83,8 +83,7 @@ def swatches(colors: Sequence[float]) -> list[tuple[float, tuple[int, int, int]]
     for share, *lab in np.array(colors, float).reshape(-1, 4):
         cones = (np.array(lab) @ np.linalg.inv(AXES)) ** 3
         rgb = np.clip(cones @ np.linalg.inv(CONES), 0, 1)
-        srgb = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * rgb ** (1 / 2.4) - 0.055)
-        red, green, blue = (round(255 * float(value)) for value in srgb)
+        red, green, blue = (round(255 * float(value)) for value in from_linear(rgb))
         found.append((float(share), (red, green, blue)))
     return found
 

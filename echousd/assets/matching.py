@@ -10,6 +10,7 @@ import numpy as np
 
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import oklab
+from echousd.srgb import of_hexadecimal
 
 GREY = 0.045  # chroma up to which a colour is a grey, which goes with everything
 TONES = 0.05  # distance within which a colour is one of the room's
@@ -41,8 +42,7 @@ def told_colors(text: str) -> tuple[tuple[float, float, float], ...]:
 
 
 def _of(hexadecimal: str) -> tuple[float, float, float]:
-    srgb = np.array([int(hexadecimal[i : i + 2], 16) for i in (0, 2, 4)]) / 255
-    light, a, b = oklab(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)[None])[0].tolist()
+    light, a, b = oklab(of_hexadecimal(hexadecimal)[None])[0].tolist()
     return light, a, b
 
 

@@ -15,6 +15,7 @@ from echousd.assets.measured import Measured
 from echousd.assets.model_file import STAGES, ModelFile
 from echousd.assets.stages import measured_stage
 from echousd.assets.wavefront import measured_obj
+from echousd.srgb import to_linear
 
 
 def measure(model: ModelFile, *, painted: bool = False) -> Measured:
@@ -103,5 +104,4 @@ def _cover(part: trimesh.Trimesh) -> np.ndarray | None:
         except Exception:  # decoders fail on damaged images in every way there is
             return None
     shown: Any = part.visual
-    color = np.asarray(shown.main_color, float) / 255
-    return flat(np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4), 1.0)
+    return flat(to_linear(np.asarray(shown.main_color, float) / 255))

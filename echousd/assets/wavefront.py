@@ -10,6 +10,7 @@ import numpy as np
 from echousd.assets.colors import Coat, flat, texels
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import Beside, ModelFile
+from echousd.srgb import to_linear
 
 FACE = re.compile(r"^f[ \t]+(.+?)[ \t]*$", re.MULTILINE)
 VERTEX = re.compile(r"^v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
@@ -87,4 +88,4 @@ def _plain(said: dict[str, str]) -> np.ndarray | None:
         return None
     if len(color) != 3 or not np.isfinite([*color, opacity]).all():
         return None
-    return flat(np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4), opacity)
+    return flat(to_linear(color), opacity)

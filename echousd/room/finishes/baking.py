@@ -10,15 +10,14 @@ import numpy as np
 from echousd.room.finishes.harmonies import HARMONIES, Color, linear
 from echousd.room.finishes.patterns import SIZE, relief
 from echousd.room.finishes.pictures import painting, sky
+from echousd.srgb import from_linear
 
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
 
 
 def hexadecimal(color: Color) -> str:
     """Linear RGB as sRGB hex."""
-    value = np.clip(np.asarray(color, float), 0, 1)
-    srgb = np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055)
-    return "".join(f"{int(v * 255 + 0.5):02x}" for v in srgb)
+    return "".join(f"{int(v * 255 + 0.5):02x}" for v in from_linear(np.clip(np.asarray(color, float), 0, 1)))
 
 
 @cache
@@ -61,7 +60,7 @@ def sky_image() -> bytes:
 
 
 def _jpeg(value: np.ndarray) -> bytes:
-    return _encoded(np.where(value <= 0.0031308, 12.92 * value, 1.055 * value ** (1 / 2.4) - 0.055), QUALITY)
+    return _encoded(from_linear(value), QUALITY)
 
 
 def _encoded(value: np.ndarray, quality: int) -> bytes:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from echousd.srgb import of_hexadecimal
+
 Color = tuple[float, float, float]
 
 
@@ -48,9 +50,7 @@ HARMONIES: Mapping[str, Harmony] = {
 
 def linear(hexadecimal: str) -> Color:
     """`b98f5f` (sRGB) -> linear RGB."""
-    value = np.array([int(hexadecimal[i : i + 2], 16) for i in (0, 2, 4)]) / 255
-    value = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    red, green, blue = (round(float(v), 5) for v in value)
+    red, green, blue = (round(float(v), 5) for v in of_hexadecimal(hexadecimal))
     return red, green, blue
 
 

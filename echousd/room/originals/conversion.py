@@ -20,6 +20,7 @@ from echousd.room.assets import new_stage
 from echousd.room.originals.original import CONVERTED
 from echousd.room.originals.winding import outward
 from echousd.room.surface import box_projection, creased_normals
+from echousd.srgb import to_linear
 from echousd.stage.files import layer_bytes
 
 ROOT = "/model"
@@ -199,7 +200,8 @@ def _connect(
 
 def _simple(material: Any) -> dict[str, Any]:
     """The look of a Phong material of an OBJ."""
-    color = linear(np.asarray(material.diffuse, float)[:3] / 255) if material.diffuse is not None else np.full(3, 0.6)
+    shown = material.diffuse
+    color = np.full(3, 0.6) if shown is None else to_linear(np.asarray(shown, float)[:3] / 255)
     kwargs = getattr(material, "kwargs", {}) or {}
     shine = material.glossiness
     rough = float(np.clip((2.0 / (float(shine) + 2.0)) ** 0.25, 0.15, 1.0)) if isinstance(shine, float | int) else 0.7
@@ -253,8 +255,3 @@ def _number(value: Any, otherwise: float) -> float:
     except (TypeError, ValueError, IndexError):
         return otherwise
     return min(max(number, 0.0), 1.0) if np.isfinite(number) else otherwise
-
-
-def linear(srgb: np.ndarray) -> np.ndarray:
-    """Linear colours of those that a screen shows."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
