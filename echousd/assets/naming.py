@@ -11,13 +11,13 @@ import numpy as np
 from echomodel.data.meshes import class_by_name
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import normalised, vocabulary
-from echousd.assets.abroad import english, from_abroad
+from echousd.assets.abroad import english, from_abroad, plain
 
 LABELLED, CALLED, MEANT, SHELVED = 0.97, 0.9, 0.75, 0.55  # confidence in a category by where its word stands
 UNITS = (1.0, 0.01, 0.001, 0.0254)  # metres of units that models come in, the likeliest first
 GENERAL = {"table": "table", "sofa": "sofa", "stool": "stool", "double_bed": "bed"}  # what sizes make more particular
 OFFICE = {"chair": "office_chair", "dining_table": "desk"}  # what a general word means on the shelf of offices
-FITTED = re.compile(r"kitchen|bath ?room|wash ?basin|\bsink\b|\btoilet|ku(e)?chen|cuisine|cocina|cucina|keuken|cozinha")
+FITTED = re.compile(r"kitchen|bath ?room|wash ?basin|\bsink\b|\btoilet|ku(e)?che|cuisine|cocina|cucina|keuken|cozinha")
 SLACK = 1.6  # how far beyond the sizes that 90 % of real ones have a size is still believed
 
 
@@ -31,19 +31,19 @@ def category_of(
         dims: (3) metres, where they are known.
     """
     for label in labels:
-        plain = re.sub(r"\.[nv]\.\d+$", "", label)  # of WordNet
-        found = known_word(plain) or _within(plain)
+        bare = re.sub(r"\.[nv]\.\d+$", "", label)  # of WordNet
+        found = known_word(bare) or _within(bare)
         if found:
             return _refined(found, dims, group), LABELLED * _likeliness(found, dims)
     size = np.ones(3) if dims is None else dims
     for text, confidence in ((name, CALLED), (group, SHELVED)):
-        plain = re.sub(r"[_\-]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z0-9])", " ", text))
-        found = known_word(plain) or _abroad(plain, group, size)
-        found = found or _within(plain, 2) or class_by_name(plain, group, size) or _within(plain)
+        bare = re.sub(r"[_\-]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z0-9])", " ", text))
+        found = known_word(bare) or _abroad(bare, group, size)
+        found = found or _within(bare, 2) or class_by_name(bare, group, size) or _within(bare)
         if found and fitted(found, text, group):
             return "", 0.0
         if found:
-            surely = confidence if known_word(plain) or _within(plain) else min(confidence, MEANT)
+            surely = confidence if known_word(bare) or _within(bare) else min(confidence, MEANT)
             return _refined(found, dims, group), surely * _likeliness(found, dims)
     return "", 0.0
 
@@ -56,7 +56,7 @@ def _abroad(text: str, group: str, size: Sequence[float] | np.ndarray) -> str:
 
 def fitted(category: str, *texts: str) -> bool:
     """Whether a piece of storage is a unit of a kitchen or bathroom by its name or shelf, which stands in no other."""
-    return vocabulary().category(category).role == "storage" and any(FITTED.search(text.lower()) for text in texts)
+    return vocabulary().category(category).role == "storage" and any(FITTED.search(plain(text)) for text in texts)
 
 
 @cache

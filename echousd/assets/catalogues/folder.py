@@ -11,6 +11,7 @@ from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
 
 STAND_IN = re.compile(r"[_\-. ](collision|collider|convex|physics|lod_?[1-9])\d*$", re.IGNORECASE)
+SHOWN = re.compile(r"([_\-. ](visual|render|mesh|lod_?0))?", re.IGNORECASE)  # what follows the name of the other one
 GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
 
 
@@ -48,9 +49,8 @@ class PlainFolder:
 def stands_in(stem: str, others: Set[str]) -> bool:
     """Whether a file is what stands in for another one beside it: its collision mesh, or a lower level of detail."""
     found = STAND_IN.search(stem)
-    return found is not None and any(
-        other != stem and other.startswith(stem[: found.start()]) and not STAND_IN.search(other) for other in others
-    )
+    name = stem[: found.start()] if found else stem
+    return found is not None and any(other.startswith(name) and SHOWN.fullmatch(other, len(name)) for other in others)
 
 
 def parts_of_others(files: list[Path]) -> set[Path]:

@@ -69,6 +69,16 @@ def test_units_of_a_kitchen_are_no_cabinets_but_its_chairs_are_chairs():
     assert fitted("cabinet", "Drawers cabinet", "Kitchen")
 
 
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [("Schrank", "Küche"), ("Küchenschrank", ""), ("cabinet_sink_white", ""), ("cabinet", "bath_room"),
+     ("washBasin_cabinet", ""), ("Cabinet", "02_Cozinha")],
+)  # fmt: skip
+def test_units_of_a_kitchen_in_any_spelling(name, group):
+    assert fitted("cabinet", name, group)
+    assert category_of((), name, group) == ("", 0.0)
+
+
 def test_confidence_falls_with_the_place_of_the_word_and_with_sizes_that_no_such_thing_has():
     label, name = category_of(("wardrobe",), "x")[1], category_of((), "wardrobe")[1]
     assert label > name > category_of((), "thing", "wardrobe")[1] > 0.5

@@ -7,6 +7,7 @@ import pytest
 from small_models import chest, seat, write_glb, write_obj
 
 from echousd.assets.catalogues import catalogue_of
+from echousd.assets.catalogues.folder import stands_in
 from echousd.assets.describe import described
 
 
@@ -102,3 +103,19 @@ def test_broken_tables_are_told(tmp_path):
     (tmp_path / "annotations.json").write_text("{")
     with pytest.raises(ValueError, match=r"annotations.json: cannot be read as JSON"):
         catalogue_of(tmp_path).entries(tmp_path, print)
+
+
+@pytest.mark.parametrize(
+    ("stem", "others", "expected"),
+    [
+        ("table_collision", ("table",), True),
+        ("table_lod1", ("table_lod0", "table_lod2"), True),
+        ("table.LOD_2", ("table",), True),
+        ("table_lod1", ("table_lamp",), False),
+        ("table_lod1", ("tables",), False),
+        ("table_lod1", ("table_lod2",), False),
+        ("chair_collision", ("chair_visual",), True),
+    ],
+)
+def test_a_file_stands_in_for_one_of_the_same_name_alone(stem, others, expected):
+    assert stands_in(stem, {stem, *others}) == expected
