@@ -116,7 +116,7 @@ def test_words_that_say_nothing_are_the_first():
 def test_a_set_of_tokens_is_written_and_read(tmp_path):
     build_tokens(tmp_path, 2, 3, 1)
     found = TokenSet.load(tmp_path)
-    assert found.style.tolist() == [0, 0, 0, 1, 1, 1]
+    assert (found.style.tolist(), found.first_held) == ([0, 0, 0, 1, 1, 1], 1)
     assert found.tokens.shape == (found.count.sum(), WIDTH)
     with pytest.raises(ValueError, match="no set of part tokens"):
         TokenSet.load(tmp_path / "other")

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+import torch
 
-from echomodel.metrics.parts_evaluation import usual_size
+from echomodel.data.furniture import Choices, Style
+from echomodel.data.furniture.description import described
+from echomodel.metrics.parts_evaluation import PartsEvaluation, style_scores, usual_size
 from echomodel.rules.living.sizes import size_range
 
 
@@ -15,3 +18,17 @@ def test_sizes_are_those_a_person_takes_for_one_of_the_kind(category):
     assert (sizes >= low).all()
     assert (sizes <= high).all()
     assert (sizes.std(0) > 0.02).all()
+
+
+def test_style_scores_tell_suites_of_one_style_from_others():
+    def by_suite(graph, sizes):
+        assert sizes.shape == (graph.num_nodes, 3)
+        assert int(graph.category.max()) < 7
+        style = graph.scene if len(graph.triplets) else torch.arange(graph.num_nodes)
+        drawn = [Style.draw(np.random.default_rng(int(number))) for number in style]
+        return torch.from_numpy(np.stack([described(one, Choices(np.zeros(18))) for one in drawn]))
+
+    scores = style_scores(by_suite, 7, PartsEvaluation(suites=5, seed=2))
+    assert scores["told"] == scores["ratio"] == 0
+    assert scores["untold"] > 0.1
+    assert scores["other"] > 0.1

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from echomodel.compact.echo import EchoLayer, level_features
 from echomodel.compact.pairs import Pairs
+from echomodel.compact.pieces import PieceDenoiser
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 
@@ -25,7 +26,7 @@ class FurnitureContext:
     pairs: Pairs
 
 
-class FurnitureDenoiser(nn.Module):
+class FurnitureDenoiser(PieceDenoiser):
     """Says the clean description of every object in a noisy one; each has its own level, 0 = known.
 
     Kinds are said as the probabilities of their words, so that the mean of what fits is a mixture and no third thing.
@@ -35,14 +36,8 @@ class FurnitureDenoiser(nn.Module):
     """
 
     def __init__(self, config: CompactConfig) -> None:
-        super().__init__()
         own, width = config.furniture, config.furniture.width
-        self.settings = own
-        self.values = sum(own.kinds) + own.numbers
-        self.category = nn.Embedding(config.categories, width)
-        self.room_type = nn.Embedding(config.room_types, width)
-        self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
-        self.latent = nn.Linear(config.latent.width, width)
+        super().__init__(config, own)
         self.own = nn.Linear(self.values, width)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * own.layers)
@@ -69,8 +64,7 @@ class FurnitureDenoiser(nn.Module):
             pairs: the merged relations of the graph.
             latent: (N, latent width), output of the graph manipulator.
         """
-        nodes = self.category(graph.category) + self.size(size.clamp_min(0.01).log()) + self.latent(latent)
-        return FurnitureContext(nodes + self.room_type(graph.room_type)[graph.scene], pairs)
+        return FurnitureContext(self.nodes(graph, size, latent), pairs)
 
     def forward(self, x: Tensor, level: Tensor, context: FurnitureContext) -> Tensor:
         return self.clean(self.scores(x, level, context))
@@ -80,17 +74,10 @@ class FurnitureDenoiser(nn.Module):
         h = context.nodes + self.own(x)
         if self.heard is not None:
             h = h + self.heard(self._voices(x, level, context.pairs))
-        modulations = self.modulation(self.level(level_features(level))).chunk(self.settings.layers, dim=1)
+        modulations = self.modulation(self.level(level_features(level))).chunk(len(self.layers), dim=1)
         for layer, modulation in zip(self.layers, modulations, strict=True):
             h = layer(h, context.pairs, modulation)
         return self.head(self.norm(h))
-
-    def clean(self, scores: Tensor) -> Tensor:
-        """The description that scores stand for: each word's probability on [-1, 1], numbers cut to it."""
-        kinds = self.settings.kinds
-        parts = list(scores.split([*kinds, self.settings.numbers], dim=1))
-        words = [2 * torch.softmax(part, dim=1) - 1 for part in parts[:-1]]
-        return torch.cat([*words, parts[-1].clamp(-1, 1)], dim=1)
 
     def _voices(self, x: Tensor, level: Tensor, pairs: Pairs) -> Tensor:
         """Means of the others' descriptions, weighted by what is told of the pair and by how clear they are.

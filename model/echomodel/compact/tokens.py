@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from echomodel.compact.echo import EchoLayer, level_features
 from echomodel.compact.pairs import Pairs
+from echomodel.compact.pieces import PieceDenoiser
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 
@@ -26,22 +27,18 @@ class TokenContext:
     mask: Tensor
 
 
-class TokenDenoiser(nn.Module):
+class TokenDenoiser(PieceDenoiser):
     """Says the clean tokens of every object in noisy ones; each object has its own level, 0 = known.
 
     Shapes:
         tokens (N, M, D), level (N,) in [0, 1], `TokenContext` -> (N, M, D), zeros where there is no token
     """
 
+    reach = 1.3
+
     def __init__(self, config: CompactConfig) -> None:
-        super().__init__()
         own, width = config.tokens, config.tokens.width
-        self.settings = own
-        self.values = sum(own.kinds) + own.numbers
-        self.category = nn.Embedding(config.categories, width)
-        self.room_type = nn.Embedding(config.room_types, width)
-        self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
-        self.latent = nn.Linear(config.latent.width, width)
+        super().__init__(config, own)
         self.counts = nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.SiLU(), nn.Linear(width, own.most))
         self.own = nn.Linear(self.values, width)
         self.place = nn.Embedding(own.most, width)
@@ -68,11 +65,6 @@ class TokenDenoiser(nn.Module):
         mask = torch.arange(int(count.max()), device=count.device) < count[:, None]
         return TokenContext(self.nodes(graph, size, latent), pairs, mask)
 
-    def nodes(self, graph: GraphBatch, size: Tensor, latent: Tensor) -> Tensor:
-        """(N, width): class, box, room and latent of every node; `counts` of it says how many tokens it has."""
-        nodes = self.category(graph.category) + self.size(size.clamp_min(0.01).log()) + self.latent(latent)
-        return nodes + self.room_type(graph.room_type)[graph.scene]
-
     def forward(self, x: Tensor, level: Tensor, context: TokenContext) -> Tensor:
         return self.clean(self.scores(x, level, context)) * context.mask[:, :, None]
 
@@ -92,12 +84,6 @@ class TokenDenoiser(nn.Module):
             h = block(h, node, piece, place, mask)
         out = x.new_zeros(*mask.shape, self.values, dtype=h.dtype)
         return out.index_put((piece, place), self.head(self.norm(h)))
-
-    def clean(self, scores: Tensor) -> Tensor:
-        """The tokens that scores stand for: each word's probability on [-1, 1], numbers cut near to it."""
-        *words, numbers = scores.split([*self.settings.kinds, self.settings.numbers], dim=-1)
-        said = [2 * torch.softmax(part, dim=-1) - 1 for part in words]
-        return torch.cat([*said, numbers.clamp(-1.3, 1.3)], dim=-1)
 
 
 class _Block(nn.Module):

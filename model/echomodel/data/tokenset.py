@@ -47,6 +47,12 @@ class TokenSet:
             )
         return found
 
+    @property
+    def first_held(self) -> int:
+        """The first style that is for validation, as all behind it are: at least one."""
+        styles = int(self.style.max()) + 1
+        return styles - max(1, round(HELD * styles))
+
 
 def build_tokens(folder: Path, styles: int, pieces: int, seed: int) -> None:
     """Write a set: so many styles, of each so many pieces of different classes, sizes by `sample_size`."""

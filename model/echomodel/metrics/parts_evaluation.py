@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +15,7 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.data.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.data.furniture.solids import Solid
 from echomodel.data.rooms import generate_rooms
 from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.graph import GraphBatch
@@ -83,10 +86,10 @@ def evaluate_parts(
     for number, name in enumerate(words):
         sizes = np.stack([usual_size(name, rng) for _ in range(settings.per_class)])
         graph = GraphBatch.pack([GraphBatch.single([number])] * settings.per_class)
-        found = _sampled(model, graph, sizes, generator, settings.steps)
+        found = sampled(model, graph, sizes, generator, settings.steps)
         meshes[name], fresh[name] = [], []
         for vector, size in zip(found.numpy(), sizes, strict=True):
-            meshes[name].append(_counted(counts, name, vector, size))
+            meshes[name].append(counted(counts, solids(name, *piece_of(vector), size), size))
             fresh[name].append(mesh_of(solids(name, Style.draw(rng), Choices.draw(rng), size), size))
         apart = style_distances(found)[~torch.eye(len(found), dtype=torch.bool)]
         spread.append(float(apart.mean()) if len(apart) else 0.0)
@@ -99,7 +102,8 @@ def evaluate_parts(
         result["shapes_sets"] = set_scores(ours, _references(shapes, ours, rng))
     if settings.rooms:
         result["rooms_pieces"], meshes[ROOMS] = room_pieces(model, settings, generator)
-    result["style"] = style_scores(model, settings, generator)
+    made = partial(sampled, model, generator=generator, steps=settings.steps)
+    result["style"] = style_scores(made, len(words), settings)
     result["diversity"] = {"style_distance": float(np.mean(spread)), "distinct": distinct}
     return result, meshes
 
@@ -116,13 +120,13 @@ def room_pieces(
         graph = GraphBatch.from_room(room, triplets=torch.from_numpy(relations))
         found = model.sample_furniture(graph, Boxes.from_room(room), generator=generator, steps=settings.steps)
         for number, vector, size in zip(graph.category.tolist(), found.float().cpu().numpy(), room.size, strict=True):
-            meshes.append(_counted(counts, words[number], vector, np.asarray(size, float)))
+            extent = np.asarray(size, float)
+            meshes.append(counted(counts, solids(words[number], *piece_of(vector), extent), extent))
     return counts, meshes
 
 
-def _counted(counts: dict[str, float], name: str, vector: np.ndarray, size: np.ndarray) -> trimesh.Trimesh:
+def counted(counts: dict[str, float], parts: list[Solid], size: np.ndarray) -> trimesh.Trimesh:
     """The mesh of one piece, taken into account."""
-    parts = solids(name, *piece_of(vector), size)
     mesh = mesh_of(parts, size)
     counts["pieces"] += 1
     counts["closed"] += bool(mesh.is_watertight and mesh.is_winding_consistent)
@@ -131,28 +135,30 @@ def _counted(counts: dict[str, float], name: str, vector: np.ndarray, size: np.n
     return mesh
 
 
-def style_scores(model: EchoModel, settings: PartsEvaluation, generator: torch.Generator) -> dict[str, float]:
+def style_scores(
+    styles: Callable[[GraphBatch, np.ndarray], Tensor], classes: int, settings: PartsEvaluation
+) -> dict[str, float]:
     """Mean style distance of pieces of different classes: told to be of one style, nothing told, of other suites.
 
     `ratio` is the first over the last.
+
+    Arguments:
+        styles: graph, and (N, 3) metres, -> (N, D) descriptions or styles. classes: the first of the vocabulary.
     """
-    classes = len(vocabulary().categories)
     rng = np.random.default_rng([settings.seed, 4])
-    same = vocabulary().predicate_id("same_style_as")
+    words, same = vocabulary().categories, vocabulary().predicate_id("same_style_as")
     every = [(i, same, j) for i in range(SUITE) for j in range(SUITE) if i != j]
     out: dict[str, float] = {}
     for name, triplets in (("told", every), ("untold", [])):
         suites = [rng.permutation(classes)[:SUITE].tolist() for _ in range(settings.suites)]
         graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in suites])
-        words = vocabulary().categories
         sizes = np.stack([usual_size(words[number].name, rng) for suite in suites for number in suite])
-        distance = style_distances(_sampled(model, graph, sizes, generator, settings.steps))
-        scene, category = graph.scene, graph.category
-        other_class = category[:, None] != category
-        within = (scene[:, None] == scene) & other_class
-        out[name] = float(distance[within].mean())
+        distance = style_distances(styles(graph, sizes))
+        other = graph.category[:, None] != graph.category
+        scene = graph.scene[:, None] == graph.scene
+        out[name] = float(distance[scene & other].mean())
         if name == "told":
-            out["other"] = float(distance[(scene[:, None] != scene) & other_class].mean())
+            out["other"] = float(distance[~scene & other].mean())
     return {**out, "ratio": out["told"] / max(out["other"], 1e-12)}
 
 
@@ -177,9 +183,10 @@ def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:
     return np.clip(sample_size(category, rng), *map(np.array, size_range(category)))
 
 
-def _sampled(
-    model: EchoModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator, steps: int | None
+def sampled(
+    model: EchoModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator, steps: int | None = None
 ) -> Tensor:
+    """(N, D) float32 descriptions of the furniture of a graph in boxes `sizes` (N, 3), metres."""
     count = graph.num_nodes
     boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))
     return model.sample_furniture(graph, boxes, generator=generator, steps=steps).float().cpu()

@@ -13,7 +13,7 @@ from echomodel.data.furniture.description import GROUPS, HOT, STYLE, described
 from echomodel.data.furniture.mirroring import tokens_of
 from echomodel.data.furniture.solids import Solid
 from echomodel.data.furniture.tokens import WIDTH
-from echomodel.data.tokenset import HELD, TokenSet
+from echomodel.data.tokenset import TokenSet
 
 BATCH = 128
 
@@ -57,7 +57,7 @@ def trained_judge(pieces: TokenSet, seed: int, steps: int = 1500) -> tuple[Style
     rest = Choices(np.zeros(18))
     told = np.stack([described(Style.draw(np.random.default_rng([seed, n])), rest)[:STYLE] for n in range(styles)])
     starts = np.cumsum(pieces.count) - pieces.count
-    held = pieces.style >= styles * (1 - HELD)
+    held = pieces.style >= pieces.first_held
     judge = StyleJudge(int(pieces.category.max()) + 1)
     optimizer = torch.optim.AdamW(judge.parameters(), 2e-3)
     rates = torch.optim.lr_scheduler.OneCycleLR(optimizer, 2e-3, total_steps=steps)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import trimesh
+from torch import Tensor
 
-from echomodel.boxes import Boxes
 from echomodel.compact.assembling import sample_tokens
 from echomodel.compact.furnishing import with_whole_styles
 from echomodel.compact.given import Sampling
@@ -21,8 +21,15 @@ from echomodel.data.furniture.snapping import snapped
 from echomodel.data.furniture.solids import Solid
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.metrics.parts_evaluation import SUITE, PartsEvaluation, clouds, style_distances, usual_size
-from echomodel.metrics.pieces import loose_solids
+from echomodel.metrics.parts_evaluation import (
+    PartsEvaluation,
+    clouds,
+    counted,
+    sampled,
+    style_distances,
+    style_scores,
+    usual_size,
+)
 from echomodel.metrics.shapes import set_scores
 from echomodel.metrics.style_judge import StyleJudge
 from echomodel.vocabulary import vocabulary
@@ -37,8 +44,7 @@ class Described:
     model: EchoModel
 
     def __call__(self, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> list[list[Solid]]:
-        boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(len(sizes), 3), torch.zeros(len(sizes)))
-        found = self.model.sample_furniture(graph, boxes, generator=generator).float().cpu().numpy()
+        found = sampled(self.model, graph, sizes, generator).numpy()
         return [solids(name, *piece_of(v), s) for name, v, s in zip(_names(graph), found, sizes, strict=True)]
 
 
@@ -78,50 +84,28 @@ def evaluate_way(
     """Scores of a way as `evaluate_parts` gives them, but for style, which the judge tells; and the meshes by class."""
     rng = np.random.default_rng([settings.seed, 2])
     generator = torch.Generator().manual_seed(settings.seed)
+
+    def styles(graph: GraphBatch, sizes: np.ndarray) -> Tensor:
+        return judge.styles(way(graph, sizes, generator), graph.category, sizes)
+
     meshes: dict[str, list[trimesh.Trimesh]] = {}
     fresh: dict[str, list[trimesh.Trimesh]] = {}
-    counts = {"pieces": 0, "closed": 0, "loose": 0, "solids": 0, "box_error": 0.0}
+    counts: dict[str, float] = {"pieces": 0, "closed": 0, "loose": 0, "solids": 0, "box_error": 0.0}
     spread = []
     for number, category in enumerate(vocabulary().categories[: way_words(judge)]):
         name = category.name
         sizes = np.stack([usual_size(name, rng) for _ in range(settings.per_class)])
         graph = GraphBatch.pack([GraphBatch.single([number])] * settings.per_class)
         pieces = way(graph, sizes, generator)
-        meshes[name] = [mesh_of(parts, size) for parts, size in zip(pieces, sizes, strict=True)]
+        meshes[name] = [counted(counts, parts, size) for parts, size in zip(pieces, sizes, strict=True)]
+        counts["solids"] += sum(len(parts) for parts in pieces)
         fresh[name] = [mesh_of(solids(name, Style.draw(rng), Choices.draw(rng), size), size) for size in sizes]
-        for parts, mesh, size in zip(pieces, meshes[name], sizes, strict=True):
-            counts["pieces"] += 1
-            counts["solids"] += len(parts)
-            counts["closed"] += bool(mesh.is_watertight and mesh.is_winding_consistent)
-            counts["loose"] += bool(loose_solids(parts))
-            counts["box_error"] = max(counts["box_error"], float(np.abs(mesh.extents - size).max()))
         apart = style_distances(judge.styles(pieces, graph.category, sizes))
         spread.append(float(apart[~torch.eye(len(apart), dtype=torch.bool)].mean()))
     result: dict = {"pieces": counts, "sets": set_scores(clouds(meshes), clouds(fresh)).get("mean", {})}
-    result["style"] = judged_styles(way, judge, settings, generator)
+    result["style"] = style_scores(styles, way_words(judge), settings)
     result["diversity"] = float(np.mean(spread))
     return result, meshes
-
-
-def judged_styles(
-    way: Way, judge: StyleJudge, settings: PartsEvaluation, generator: torch.Generator
-) -> dict[str, float]:
-    """Mean distance of judged styles of different classes: within told suites, untold ones, and across suites."""
-    rng = np.random.default_rng([settings.seed, 4])
-    words, same = vocabulary().categories[: way_words(judge)], vocabulary().predicate_id("same_style_as")
-    every = [(i, same, j) for i in range(SUITE) for j in range(SUITE) if i != j]
-    out: dict[str, float] = {}
-    for name, triplets in (("told", every), ("untold", [])):
-        suites = [rng.permutation(len(words))[:SUITE].tolist() for _ in range(settings.suites)]
-        graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in suites])
-        sizes = np.stack([usual_size(words[number].name, rng) for suite in suites for number in suite])
-        distance = style_distances(judge.styles(way(graph, sizes, generator), graph.category, sizes))
-        other = graph.category[:, None] != graph.category
-        scene = graph.scene[:, None] == graph.scene
-        out[name] = float(distance[scene & other].mean())
-        if name == "told":
-            out["other"] = float(distance[~scene & other].mean())
-    return {**out, "ratio": out["told"] / max(out["other"], 1e-12)}
 
 
 def way_words(judge: StyleJudge) -> int:

@@ -13,7 +13,7 @@ from torch.nn.functional import cross_entropy
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
 from echomodel.data.furniture import tokens as words
-from echomodel.data.tokenset import HELD, TokenSet
+from echomodel.data.tokenset import TokenSet
 from echomodel.graph import GraphBatch
 from echomodel.objectives import add_noise, draw_levels
 from echomodel.randomness import normal
@@ -107,7 +107,7 @@ class TokensStage:
         self.starts = np.cumsum(pieces.count) - pieces.count
         last = int(pieces.style.max()) + 1
         self.first = np.searchsorted(pieces.style, np.arange(last + 1))
-        self.train = last - max(1, round(HELD * last))
+        self.train = pieces.first_held
 
     @classmethod
     def open(cls, start: Start) -> TokensStage:
