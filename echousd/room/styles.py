@@ -24,8 +24,8 @@ IN_SETS = ("at", "head", "company")  # how pieces stand that are bought as a set
 def style_groups(graph: SceneGraph) -> dict[str, str]:
     """Object name -> name of its style; objects that share a `style`, or that a relation unites, are one group.
 
-    Pieces that come in sets, the chairs of a table or the nightstands of a bed, are one group with those of their kind
-    that state a style, unless two styles are stated. A group without a name is called `set_<its first object>`.
+    Pieces that come in sets, the chairs of a table, the nightstands of a bed, two beds or desks, are one group with
+    those of their kind that state a style, unless two styles are stated. A group without a name is called `set_<its first object>`.
     Objects of no group have the style `room`, so that a room looks of one piece.
     """
     place = {node.name: number for number, node in enumerate(graph.nodes)}
@@ -71,7 +71,7 @@ def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
     styled: dict[str, set[int]] = {}
     for number, node in enumerate(graph.nodes):
         row = vocabulary().category(node.category)
-        if row.stands not in IN_SETS:
+        if row.stands not in IN_SETS and row.role != "bed" and not (row.role == "board" and row.access):
             continue
         if node.style or node.name in told:
             styled.setdefault(row.name, set()).add(group_of[number])

@@ -145,6 +145,12 @@ MORE = [
     (LIVING.moved("armchair", at=(0.9, -0.45), yaw=-2.4), ("armchair", "seat_room"), "one cannot sit down on"),
     (with_one(LIVING, "table", kind="dining_table", size=(1.4, 0.75, 0.8), at=(0.0, 0.8)), ("stand", "view_free"),
      "table stands between stand and who watches it"),
+    (Room({name: {**row, "at": (row["at"][0], min(row["at"][1] + 1.0, 1.7))} for name, row in SET.things.items()}),
+     ("table", "table_amid"), "one side of table have 0.15 m behind them to a wall, while those opposite"),
+    (with_one(Room({"bed": BEDROOM.things["bed"], "desk": {
+        "kind": "desk", "size": (1.2, 0.75, 0.6), "at": (0.0, 1.69), "yaw": np.pi}}),
+     "chair", kind="office_chair", size=(0.5, 0.9, 0.6), at=(0.0, 0.67)), ("chair", "chair_pulls_out"),
+     "chair can be pulled back by only 0.25 m before bed"),  # which would do at a table
 ]  # fmt: skip
 
 

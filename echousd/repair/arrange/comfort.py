@@ -12,6 +12,8 @@ UNEVEN = 1.0  # for chairs of a table whose middle lies half a table off its own
 ODD = 0.9  # half tables by which it may, of an odd number of seats
 PULLED, AT_WALL = 1.6, 1.3  # for a chair that cannot be pulled out before furniture, before a wall
 PULL, PULL_WALL = 0.4, 0.3  # metres behind a chair
+EASE, TIGHT = 0.7, 0.9  # metres behind a chair that one would like, and the price of none of them
+CLOSE, EDGE = 0.45, 0.5  # metres that a wall keeps from a table which chairs stand around, and the price of none
 STRIP, FLUSH, PASSED = 0.6, 0.06, 0.4  # for a bed so many metres off the wall beside it: of no use to anybody
 HIDDEN = 3.5  # for something high between a screen and its viewer
 HIGH = 0.65  # metres
@@ -37,6 +39,9 @@ def uncomfortable(
         out = out + _uneven(setting, state, i, poses) + _boxed_in(setting, state, i, poses, others)
     if setting.kinds[i].role == "bed":
         out = out + STRIP * _strips(setting, i, poses)
+    if setting.laid[i] and not (setting.kinds[i].access or setting.kinds[i].wall):
+        grown = setting.size[i] + np.array([2 * CLOSE, 0.0, 2 * CLOSE])
+        out = out + EDGE * (beyond(setting, grown, poses) / CLOSE).clip(0.0, 1.0)
     return out + _hiding(setting, state, i, poses)
 
 
@@ -88,7 +93,11 @@ def _boxed_in(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     size, space = behind(PULL)
     deep = depths(size, space, setting.size[solid], state.position[solid], state.yaw[solid])
     size, space = behind(PULL_WALL)
-    return PULLED * (deep > 0.02).any(1) + AT_WALL * (beyond(setting, size, space) > 0.02)
+    out = PULLED * (deep > 0.02).any(1) + AT_WALL * (beyond(setting, size, space) > 0.02)
+    size, space = behind(EASE)
+    deep = depths(size, space, setting.size[solid], state.position[solid], state.yaw[solid])
+    tight = np.maximum(deep.max(1, initial=0.0), beyond(setting, size, space))
+    return out + TIGHT * (tight / EASE).clip(0.0, 1.0)
 
 
 def _hiding(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:

@@ -29,6 +29,8 @@ ELBOWS, ELBOW = 1.5, 0.2  # for a seat or lamp so many metres before a seat of i
 TUCKED = 0.35  # metres of the space before a second sofa that the coffee table of the group may take
 TABLES = ("before", "foot", "near", "opposite", "at")  # stances of what may stand before a seat of its group
 FOOT = 0.4  # metres at the foot of a bed
+BEDSIDE, AROUND = 0.38, 0.3  # metres beside a bed, and beyond its foot on the way there
+PULLED = ((0.4, 1.2), (0.65, 0.6))  # metres behind a chair, and what it costs to take them
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
 GLARE = 0.2  # metres of a stand before a window
 SLACK = 0.01  # metres or ratio by which relations are to hold
@@ -188,11 +190,16 @@ def _zones_of(setting: Setting, state: State, j: int) -> list[tuple[float, ...]]
         rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
     if setting.laid[j] and not setting.kinds[j].access:
         rows += _seats(setting, state, j)
+    if setting.stances[j] == "at" and not setting.kinds[j].solid:
+        for depth, cost in PULLED:
+            away = setting.size[j, 2] / 2 + depth / 2 + 0.01
+            size = np.array([0.7 * setting.size[j, 0], 0.8, depth])
+            rows.append((*size, x - s * away, 0.02, z - c * away, state.yaw[j], cost, j))
     if setting.kinds[j].role == "bed":
         for side in (-1, 1):
-            lateral = side * (setting.size[j, 0] / 2 + 0.2)
-            size = np.array([0.38, 1.0, setting.size[j, 2] * 0.6])
-            forward = setting.size[j, 2] * 0.15
+            lateral = side * (setting.size[j, 0] / 2 + BEDSIDE / 2 + 0.01)
+            start, end = -0.15 * setting.size[j, 2], 0.5 * setting.size[j, 2] + AROUND
+            size, forward = np.array([BEDSIDE, 1.0, end - start]), (start + end) / 2
             at = (x + c * lateral + s * forward, 0.02, z - s * lateral + c * forward)
             rows.append((*size, *at, state.yaw[j], 0.5 * BLOCKED, j))
         forward = setting.size[j, 2] / 2 + FOOT / 2

@@ -90,8 +90,9 @@ def _between(state: State, members: np.ndarray, others: np.ndarray) -> float:
 
 
 def _groups(setting: Setting) -> list[np.ndarray]:
-    """Numbers of the boxes of every group of two or more, but for lamps of the ceiling."""
-    standing = np.flatnonzero(~setting.hanging)
+    """Numbers of the boxes of every group of two or more, but for lamps of the ceiling and what keeps to its wall."""
+    stays = np.array([stance == "near" for stance in setting.stances], bool)  # a sideboard does not go with its table
+    standing = np.flatnonzero(~setting.hanging & ~stays)
     found = [standing[setting.group[standing] == root] for root in np.unique(setting.group[standing]).tolist()]
     return [members for members in found if len(members) > 1]
 

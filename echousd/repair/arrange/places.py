@@ -62,6 +62,8 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     else:
         rows += in_the_open(setting, i, lonely)
         rows += along_walls(setting, i, lonely + 0.5)
+    twins = beside_twin(setting, state, i)
+    rows = [*twins, *((*row[:3], row[3] + LONELY * bool(twins)) for row in rows)]
     rows = [
         *rows,
         *as_drawn(
@@ -96,6 +98,22 @@ def as_stated(setting: Setting, state: State, i: int) -> list[Row]:
     for one in setting.stated:
         if one.subject == i and one.others and setting.standing(i):
             rows += along_walls(setting, i, 0.1) + in_the_open(setting, i, 0.2) + midway(setting, state, i, one.others)
+    return rows
+
+
+def beside_twin(setting: Setting, state: State, i: int) -> list[Row]:
+    """For a bed that is told to share a nightstand: beside the other one, which is placed, with room for it between."""
+    rows: list[Row] = []
+    for one in setting.stated:
+        if i not in one.others or len(one.others) != 2 or setting.stances[one.subject] != "head":
+            continue
+        other = next(k for k in one.others if k != i)
+        if setting.kinds[i].role != "bed" or setting.kinds[other].role != "bed" or not state.placed[other]:
+            continue
+        apart = (setting.size[i, 0] + setting.size[other, 0]) / 2 + setting.size[one.subject, 0] + 0.1
+        back = (setting.size[i, 2] - setting.size[other, 2]) / 2
+        slots = [(side * apart, back, 0.0, 0.0) for side in (-1.0, 1.0)]
+        rows += [out_of(state.position[other], float(state.yaw[other]), slot) for slot in slots]
     return rows
 
 

@@ -15,6 +15,7 @@ Slot = tuple[float, float, float, float]
 Slots = Callable[[Size, Size, Category, int], list[Slot]]
 HALF_PI = math.pi / 2
 TUCK = 0.12  # metres that a chair is pushed under its table
+NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
 REACH = 0.38  # metres between a sofa and its coffee table
 
 
@@ -137,12 +138,17 @@ def joined(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
 
 
 def beside(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
-    """Side tables and floor lamps: at the ends of a sofa or bed, or beside an armchair."""
+    """Side tables and floor lamps: at the ends of a sofa, beside an armchair, at the head of a bed."""
     out = []
+    if kind.role == "bed":  # before its middle one gets in
+        for lateral, forward, turn, more in head(own, anchor, kind, count):
+            out += [(lateral, forward, turn, more), (lateral + math.copysign(NIGHTSTAND, lateral), forward, turn, 0.3)]
     for side in (-1.0, 1.0):
         for gap, more in ((0.04, 0.0), (0.12, 0.1), (0.25, 0.3)):
             lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
             back = -anchor[2] / 2 + own[2] / 2
+            if kind.role == "bed":
+                more += 0.8
             out += [(lateral, 0.0, 0.0, more), (lateral, back, 0.0, more + 0.02), (lateral, back / 2, 0.0, more + 0.05)]
     return out
 
