@@ -154,6 +154,26 @@ def test_a_stool_comes_to_the_desk_that_has_no_other_seat():
     assert abs(away @ [np.cos(yaw), -np.sin(yaw)]) < 0.35
 
 
+def test_beds_that_share_a_nightstand_stand_beside_each_other():
+    from echomodel.rules.placements import Stated
+
+    words = ["single_bed", "single_bed", "nightstand"]
+    size = [(0.9, 0.9, 2.0), (0.9, 0.9, 2.0), (0.45, 0.5, 0.4)]
+    drawn, turned = [(-1.4, 0, -1.2), (1.3, 0, 1.4), (1.5, 0, -1.8)], [0.0, -np.pi / 2, 0.0]
+    (one, other, stand), yaw = arranged(words, size, drawn, turned, stated=(Stated("between", 2, (0, 1)),))
+    assert yaw[0] == pytest.approx(yaw[1], abs=0.02)
+    np.testing.assert_allclose(np.linalg.norm(one - other), 0.9 + 0.45 + 0.1, atol=0.05)
+    assert np.linalg.norm(stand - (one + other) / 2) == pytest.approx(0.8, abs=0.1)  # at their heads
+
+
+def test_chairs_are_not_squeezed_where_there_is_room_at_the_other_side():
+    words = ["dining_table", *["dining_chair"] * 4]
+    size = [(1.6, 0.75, 0.9), *[(0.5, 0.9, 0.5)] * 4]
+    drawn = [(-1.3, 0, 1.3), (-1.7, 0, 1.9), (-0.9, 0, 1.9), (-1.7, 0, 0.7), (-0.9, 0, 0.7)]
+    position, _ = arranged(words, size, drawn, [0.0, np.pi, np.pi, 0.0, 0.0])
+    assert 2.4 - np.abs(position[1:, [0, 2]]).max() - 0.25 > 0.4
+
+
 def test_a_pendant_follows_its_table_and_a_flush_lamp_hangs_in_the_middle():
     words = ["dining_table", "pendant_lamp", "double_bed", "ceiling_lamp"]
     size = [(1.6, 0.75, 0.9), (0.5, 0.8, 0.5), (1.8, 1.0, 2.1), (0.5, 0.15, 0.5)]
