@@ -25,8 +25,8 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     """Object name -> name of its style; objects that share a `style`, or that a relation unites, are one group.
 
     Pieces that come in sets, the chairs of a table, the nightstands of a bed, two beds or desks, are one group with
-    those of their kind that state a style, unless two styles are stated. A group without a name is called `set_<its first object>`.
-    Objects of no group have the style `room`, so that a room looks of one piece.
+    those of their kind that state a style, unless two styles are stated. A group without a name is called
+    `set_<its first object>`. Objects of no group have the style `room`, so that a room looks of one piece.
     """
     place = {node.name: number for number, node in enumerate(graph.nodes)}
     alike: list[tuple[int, int]] = []
