@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom, UsdPhysics
 
+from echomodel.triangles import area_normals
 from echousd.checks.findings import Finding, Rule, distinct_prims, prims
 from echousd.stage.encoding import StageError
 from echousd.stage.values import MeshArrays, array, mesh_arrays
@@ -152,7 +153,7 @@ def winding(stage: Usd.Stage) -> Iterator[Finding]:
         found = _normals(mesh)
         if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
             continue
-        cross = sign * np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        cross = sign * area_normals(triangles)
         agree = (cross * found[0][faces].sum(1)).sum(1)
         area = np.linalg.norm(cross, axis=1)
         if area.sum() > 0 and area[agree < 0].sum() > AGAINST * area.sum():

@@ -71,7 +71,8 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
         full |= _sun(stage, room)
     lamps = _lamps(stage, room)
     full |= lamps
-    lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / shapely.Polygon(room.floor).area
+    area = shapely.Polygon(room.floor).area
+    lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / area
     times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
     for name, shares in TIMES.items():
         times.AddVariant(name)
@@ -79,7 +80,7 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
         exposed, radiance = 1.0, share * min(20.0, 1.6 * room.height**2 * np.pi * NITS / flux)
         if name in LIT:
             exposed = min(1.0, BRIGHT / max(lumens, 1.0))
-            radiance = max(LIT[name] - lumens, FILL) * shapely.Polygon(room.floor).area / flux
+            radiance = max(LIT[name] - lumens, FILL) * area / flux
         with times.GetVariantEditContext():
             UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
             for path, (column, intensity) in full.items():

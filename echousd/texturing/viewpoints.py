@@ -9,8 +9,10 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
+from echomodel.triangles import area_normals
 from echousd.surfaces import Painted, Surfaces
 from echousd.texturing.atlas import Unwrapped, texel_faces
+from echousd.views import view_matrix
 
 HEIGHT = 1.4  # metres, of the point that cameras look through
 SPHERE = 0.5  # metres from it
@@ -67,12 +69,7 @@ def sphere_cameras(
             around = AZIMUTHS[0] + (AZIMUTHS[1] - AZIMUTHS[0]) * step / azimuths
             e, a = np.radians(up), np.radians(around)
             eye = at + distance * np.array([np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a)])
-            back = (eye - at) / np.linalg.norm(eye - at)
-            right = np.cross((0.0, 1.0, 0.0), back)
-            right /= np.linalg.norm(right)
-            matrix = np.eye(4)
-            matrix[:3] = np.stack([right, np.cross(back, right), back, eye], 1)
-            rows = tuple(tuple(round(float(v), 6) + 0.0 for v in row) for row in matrix)
+            rows = tuple(tuple(round(float(v), 6) + 0.0 for v in row) for row in view_matrix(eye, at))
             found.append(Camera(f"view_{len(found):03d}", rows, fov))  # type: ignore[arg-type]
     return found
 
@@ -120,5 +117,5 @@ def _samples(triangles: np.ndarray, st: np.ndarray) -> tuple[np.ndarray, np.ndar
     extent = max(float((high - low).max()), 1e-9)
     face, bary, _ = texel_faces((st - low) / extent, int(np.sqrt(3 * SAMPLES)))
     points = np.einsum("nc,ncx->nx", bary, triangles[face])
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])[face]
+    normals = area_normals(triangles)[face]
     return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

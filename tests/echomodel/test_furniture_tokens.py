@@ -93,6 +93,11 @@ def test_any_tokens_become_closed_solids_that_hang_together_in_their_box(seed):
         assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 
 
+def test_the_order_does_not_matter_for_solids_that_differ_in_x_alone():
+    pair = [box((x, 0.1, 0.1), (x + 0.2, 0.3, 0.2), role="leg") for x in (0.2012, 0.2032)]
+    np.testing.assert_array_equal(tokens_of(pair, SIZE), tokens_of(pair[::-1], SIZE))
+
+
 def test_snapping_closes_gaps_and_straightens():
     legs = [box((x, 0.01, z), (x + 0.05, 0.68, z + 0.05), role="leg") for x in (-0.6, 0.55) for z in (-0.3, 0.25)]
     board = box((-0.59, 0.7, -0.3), (0.6, 0.8, 0.3), role="top")

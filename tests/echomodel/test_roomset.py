@@ -99,7 +99,8 @@ def test_bad_folders_are_told(folder, tmp_path):
     with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, its objects are not those of its rooms"):
         RoomSet(shard.parent)
     for text, said in (
-        ("{", "not JSON"),
+        ("{", "cannot be read as JSON"),
+        ("[" * 60_000, "cannot be read as JSON"),
         ("[]", r"missing: rooms \(int\)"),
         ('{"rooms": "5"}', r"missing: rooms \(int\)"),
     ):

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from echomodel.data.dressing import usual_size
+from echomodel.triangles import area_normals
 from echousd.room.dressing.setting import APART, Setting, Standing, Thing, rectangle
 
 LEVEL = 0.006  # metres: what differs less in height is one level
@@ -102,7 +103,7 @@ def surfaces(host: Standing) -> list[Surface]:
     """The levels of an object, highest first."""
     mesh = host.geometry.mesh
     corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_normals(corners)
     double = np.linalg.norm(normal, axis=1)
     up = np.flatnonzero((normal[:, 1] > 0.97 * double) & (double > 1e-9))
     if not len(up):

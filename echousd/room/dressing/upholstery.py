@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from echomodel.data.dressing import usual_size
+from echomodel.triangles import area_normals
 from echousd.room.clearing.nofit import forbidden_moves
 from echousd.room.dressing.setting import Setting, Standing, Thing
 
@@ -116,7 +117,7 @@ class _Seat:
         """The seat of an object, None where nothing of it looks like one."""
         mesh = host.geometry.mesh
         corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal = area_normals(corners)
         double = np.linalg.norm(normal, axis=1)
         y = corners[..., 1].mean(1)
         top = 0.75 * float(host.size[1])

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from echomodel.files import write_json
+from echomodel.files import read_json, write_json
+
+LARGEST = 2**24  # bytes of a note
 
 
 def read_note(path: Path, **kinds: type) -> dict:
@@ -17,9 +18,9 @@ def read_note(path: Path, **kinds: type) -> dict:
     Raises ValueError, with the file's path, for anything else.
     """
     try:
-        found = json.loads(path.read_text("utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise ValueError(f"{path}: not JSON ({error})") from None
+        found = read_json(path, LARGEST)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
     wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
     if wrong or not isinstance(found, dict):
         told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"

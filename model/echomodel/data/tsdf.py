@@ -15,6 +15,8 @@ import trimesh
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from echomodel.triangles import area_normals
+
 RESOLUTION = 64
 FILLED = 60  # voxels that the object's box covers on each axis
 TRUNCATION = 4.0  # voxels
@@ -98,7 +100,7 @@ def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
 
 def _distance_to_triangles(triangles: np.ndarray, points: int) -> np.ndarray:
     """Unsigned distance of every voxel centre to the triangles, exact near the surface, `inf` beyond the truncation."""
-    edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    edges = area_normals(triangles)
     area = np.linalg.norm(edges, axis=1) / 2
     if area.sum() <= 0:
         raise ValueError("mesh has no area")

@@ -10,6 +10,7 @@ import trimesh
 
 from echomodel.data.furniture.solids import FINEST, Joint, Solid, Tube
 from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
+from echomodel.triangles import area_normals
 
 THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
 THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
@@ -78,7 +79,7 @@ def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None) -> trimesh.
 def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Texture coordinates (m, 3, 2) per corner: each triangle projected along the main axis of its normal, metres."""
     corners = np.asarray(vertices)[faces]
-    normal = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normal = np.abs(area_normals(corners))
     axis = normal.argmax(1)
     first, second = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
     rows = np.arange(len(faces))[:, None]

@@ -58,14 +58,24 @@ def solids_of(tokens: Array, size: Array) -> list[Solid]:
     return jointed([solid_of(token, size) for token in every], every, size)
 
 
+def copies(tokens: Array) -> tuple[Array, Array]:
+    """Number of the token behind every one of `unfolded`, and (T', 3) signs by which that one mirrors it."""
+    flag, every = _numbers(tokens, "mirror"), np.arange(len(tokens))
+    found = [every, every[np.isin(flag, (1, 3))], every[np.isin(flag, (2, 3))], every[flag == 3]]
+    signs = np.array([[1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1]])
+    return np.concatenate(found), np.repeat(signs, [len(some) for some in found], axis=0)
+
+
 def unfolded(tokens: Array) -> Array:
     """(T', WIDTH): all tokens and then their mirror copies, none with a mirror flag."""
-    flag, alone = _numbers(tokens, "mirror"), tokens.copy()
-    for token in alone:
+    owner, signs = copies(tokens)
+    out = tokens[owner]
+    for token in out:
         say(token, "mirror", "none")
-    x, z = np.isin(flag, (1, 3)), np.isin(flag, (2, 3))
-    across = mirrored(alone[x], 0)
-    return np.concatenate([alone, across, mirrored(alone[z], 2), mirrored(mirrored(alone[flag == 3], 0), 2)])
+    for axis in (0, 2):
+        there = signs[:, axis] < 0
+        out[there] = mirrored(out[there], axis)
+    return out
 
 
 def mirrored(tokens: Array, axis: int) -> Array:
@@ -166,7 +176,7 @@ def _order(tokens: Array) -> Array:
     size = -numbers[:, 9:12].sum(1).round(1)
     place = [numbers[:, i] for i in (1, 2, 0)]
     words = [_numbers(tokens, name) for name in ("role", "kind", "material")]
-    return np.lexsort([*[tokens[:, i] for i in range(WIDTH - 1, HOT, -1)], *place[::-1], size, *words[::-1]])
+    return np.lexsort([*[tokens[:, i] for i in range(WIDTH - 1, HOT - 1, -1)], *place[::-1], size, *words[::-1]])
 
 
 def _folded(tokens: Array) -> Array:

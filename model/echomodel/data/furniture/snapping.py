@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from echomodel.data.furniture.mirroring import solids_of
+from echomodel.data.furniture.mirroring import copies, solids_of
 from echomodel.data.furniture.solids import Array, Solid
 from echomodel.data.furniture.tokens import (
     CENTRE,
     EXTENT,
-    GROUPS,
     HOT,
     IDENTITY,
     STARTS,
     TURN,
     WORDS,
     reach_of,
+    root_of,
     say,
+    share_of,
     turn_of,
     word,
 )  # fmt: skip
@@ -38,36 +39,47 @@ def snapped(tokens: Array, size: Array) -> Array:
     size = np.asarray(size, float)
     out = np.stack([_straightened(token, size) for token in np.asarray(tokens, float)])
     for _ in range(ROUNDS):
-        loose = loose_tokens(out, size)
-        if not loose:
+        built = _Built.of(out, size)
+        if not built.loose:
             return out
-        out = _joined(out, size, loose)
-    while loose := loose_tokens(out, size):
-        out = _without(out, size, loose)
+        out = _joined(out, size, built)
+    while (built := _Built.of(out, size)).loose:
+        out = _without(out, built)
     return out
 
 
 def loose_tokens(tokens: Array, size: Array) -> set[int]:
     """Numbers of the tokens of which a copy touches nothing that hangs together with the bulkiest body."""
-    group, main = _bodies(solids_of(tokens, size))
-    owner, _ = owners(tokens)
-    return {int(owner[number]) for number in np.flatnonzero(group != main)}
+    return _Built.of(tokens, size).loose
 
 
-def owners(tokens: Array) -> tuple[Array, Array]:
-    """Number of the token behind every solid of `solids_of`, and (n, 3) signs by which that one mirrors it."""
-    flag = tokens[:, STARTS["mirror"] : STARTS["mirror"] + GROUPS[-1]].argmax(1)
-    every = np.arange(len(tokens))
-    copies = [every, every[np.isin(flag, (1, 3))], every[np.isin(flag, (2, 3))], every[flag == 3]]
-    signs = np.array([[1, 1, 1], [-1, 1, 1], [1, 1, -1], [-1, 1, -1]])
-    return np.concatenate(copies), np.repeat(signs, [len(some) for some in copies], axis=0)
+@dataclass(frozen=True, eq=False)
+class _Built:
+    """Solids of tokens, the tokens behind them and their signs (`copies`), and the bodies that hang together.
 
+    The main body is the bulkiest and not, as for `group_of`, that of most solids: a top and not a leg in the air.
+    """
 
-def _bodies(solids: Sequence[Solid]) -> tuple[Array, int]:
-    """As `group_of`, but the main body is the bulkiest: a top and not one of four legs in the air."""
-    group, _ = group_of(solids)
-    bulk = [np.prod(np.ptp(solid.mesh(0)[0], axis=0)) for solid in solids]
-    return group, int(np.bincount(group, bulk).argmax())
+    solids: list[Solid]
+    owner: Array
+    signs: Array
+    group: Array
+    main: int
+
+    @classmethod
+    def of(cls, tokens: Array, size: Array) -> _Built:
+        solids = solids_of(tokens, size)
+        group, _ = group_of(solids)
+        bulk = [np.prod(np.ptp(solid.mesh(0)[0], axis=0)) for solid in solids]
+        return cls(solids, *copies(tokens), group, int(np.bincount(group, bulk).argmax()))
+
+    @property
+    def loose(self) -> set[int]:
+        return {int(self.owner[number]) for number in np.flatnonzero(self.group != self.main)}
+
+    def points(self, group: int) -> Array:
+        """Points on the surfaces of a body."""
+        return np.concatenate([surface_of(self.solids[i]) for i in np.flatnonzero(self.group == group)])
 
 
 def _straightened(token: Array, size: Array) -> Array:
@@ -82,54 +94,50 @@ def _straightened(token: Array, size: Array) -> Array:
     straight = min(turn[0, 0], turn[1, 1], turn[2, 2]) > STRAIGHT or kind in FREE[:-1]
     turn = IDENTITY if straight else turn
     out[TURN] = turn[:, :2].T.ravel()
-    for axis, copies in ((0, ("none", "z")), (2, ("none", "x"))):
-        if abs(out[CENTRE][axis]) < NEAR * metre[axis] and flag in copies:
+    for axis, flags in ((0, ("none", "z")), (2, ("none", "x"))):
+        if abs(out[CENTRE][axis]) < NEAR * metre[axis] and flag in flags:
             out[CENTRE.start + axis] = 0.0
-    half = ((out[EXTENT].clip(-1, 1) + 1) / 2) ** 2 * reach_of(turn, size) * metre  # of local axes
+    half = share_of(out[EXTENT].clip(-1, 1)) * reach_of(turn, size) * metre  # of local axes
     if straight:
         low, high = out[CENTRE] - half, out[CENTRE] + half
         low = np.where(low < -1 + NEAR * metre, -1.0, low).clip(-1, 0.98)
         high = np.where(high > 1 - NEAR * metre, 1.0, high).clip(-0.98, 1)
         high = np.maximum(high, low + 1e-3 * metre)
         out[CENTRE] = (low + high) / 2
-        out[EXTENT] = 2 * np.sqrt((high - low) / 2) - 1
+        out[EXTENT] = root_of((high - low) / 2)
     else:
         out[CENTRE] = out[CENTRE].clip(-1, 1)
     return out
 
 
-def _joined(tokens: Array, size: Array, loose: set[int]) -> Array:
+def _joined(tokens: Array, size: Array, built: _Built) -> Array:
     """Tokens whose copies hang in the air lengthened, moved or left out, by how far away the rest is."""
-    solids, (owner, signs) = solids_of(tokens, size), owners(tokens)
-    group, main = _bodies(solids)
-    ground = np.concatenate([surface_of(solids[i]) for i in np.flatnonzero(group == main)])
+    ground = built.points(built.main)
     tree = cKDTree(ground)
     out, gone = tokens.copy(), []
-    for number in sorted(loose):
-        copy = int(np.flatnonzero((owner == number) & (group != main))[0])
+    for number in sorted(built.loose):
+        copy = int(np.flatnonzero((built.owner == number) & (built.group != built.main))[0])
         # all that hangs together with it moves alike: the way of the nearest of them
-        mates = np.flatnonzero(group == group[copy])
-        points = np.concatenate([surface_of(solids[i]) for i in mates])
+        points = built.points(built.group[copy])
         distance, to = tree.query(points)
         nearest = int(distance.argmin())
         if distance[nearest] > FAR:
             gone.append(number)
             continue
-        way = (ground[to[nearest]] - points[nearest]) * signs[copy]
+        way = (ground[to[nearest]] - points[nearest]) * built.signs[copy]
         way = way * (1 + OVERLAP / max(float(np.linalg.norm(way)), 1e-9))
-        if len(mates) > 1 or not _lengthened(out[number], way, size):
+        if (built.group == built.group[copy]).sum() > 1 or not _lengthened(out[number], way, size):
             out[number, CENTRE] += way * 2 / size
     return np.delete(out, gone, axis=0) if len(gone) < len(out) else out[:1]
 
 
-def _without(tokens: Array, size: Array, loose: set[int]) -> Array:
+def _without(tokens: Array, built: _Built) -> Array:
     """Fewer tokens: those loose ones that hold on their own lose their mirror copies, the others go; one stays."""
-    group, main = _bodies(solids_of(tokens, size))
     out = tokens.copy()
-    held = [number for number in loose if group[number] == main]
+    held = [number for number in built.loose if built.group[number] == built.main]
     for number in held:
         say(out[number], "mirror", "none")
-    gone = sorted(loose - set(held))
+    gone = sorted(built.loose - set(held))
     if len(gone) < len(out):
         return np.delete(out, gone, axis=0)
     say(out[0], "mirror", "none")
@@ -143,7 +151,7 @@ def _lengthened(token: Array, way: Array, size: Array) -> bool:
     axis = int(np.abs(local).argmax())
     if word(token, "kind") in FREE or abs(local[axis]) > CLOSE or abs(local[axis]) < 0.8 * np.linalg.norm(way):
         return False
-    half = ((token[EXTENT][axis] + 1) / 2) ** 2 + abs(local[axis]) / 2 / reach_of(turn, size)[axis]
-    token[EXTENT.start + axis] = 2 * np.sqrt(min(half, 1.0)) - 1
+    half = share_of(token[EXTENT][axis]) + abs(local[axis]) / 2 / reach_of(turn, size)[axis]
+    token[EXTENT.start + axis] = root_of(min(half, 1.0))
     token[CENTRE] += turn[:, axis] * local[axis] / size
     return True

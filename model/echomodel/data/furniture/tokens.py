@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from echomodel.data.furniture.assembly import MATERIALS
 from echomodel.data.furniture.lathe import Blade, Lathe, wall
 from echomodel.data.furniture.solids import IDENTITY, Array, Ball, Block, Shell, Solid, Tube, Turned
+from echomodel.triangles import cross
 
 RODS = {2: "rod", 3: "bent", 4: "double"}  # tubes by their points; others are curves, or rings where they close
 PROFILES = {(2, True): "shade", (5, False): "bottle", (8, False): "sack", (8, True): "bell"}
@@ -69,7 +70,7 @@ def token_of(solid: Solid, size: Array) -> Array:
     say(token, "mirror", "none")
     token[CENTRE] = centre / size * 2 - [0, 1, 0]
     token[TURN] = turn[:, :2].T.ravel()
-    token[EXTENT] = _root(np.asarray(extent) / reach_of(turn, size))
+    token[EXTENT] = root_of(np.asarray(extent) / reach_of(turn, size))
     token[SHAPE][: len(shape)] = shape
     return token
 
@@ -88,7 +89,7 @@ def turn_of(token: Array) -> Array:
         y = IDENTITY[int(np.abs(x).argmin())]
         y = y - x * (x @ y)
     y = y / np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)], axis=1)
+    return np.stack([x, y, cross(x, y)], axis=1)
 
 
 def solid_of(token: Array, size: Array) -> Solid:
@@ -97,7 +98,7 @@ def solid_of(token: Array, size: Array) -> Solid:
     kind, turn = word(token, "kind"), turn_of(token)
     look: dict[str, Any] = {"material": word(token, "material"), "role": word(token, "role")}
     centre = (token[CENTRE] + [0, 1, 0]) * size / 2
-    half = np.maximum(_square(token[EXTENT]) * reach_of(turn, size), 5e-4)
+    half = np.maximum(share_of(token[EXTENT]) * reach_of(turn, size), 5e-4)
     shape = token[SHAPE]
     unit = (shape.clip(-1, 1) + 1) / 2
     if kind == "block":
@@ -136,14 +137,14 @@ def _measured(solid: Solid) -> tuple[str, Array, Array, Array, Array]:
     """Kind, centre (3,), turn (3, 3), half extents (3,) in metres and numbers of the shape."""
     centre, turn = np.asarray(solid.centre, float), np.asarray(solid.turn, float)
     if isinstance(solid, Block):
-        return "block", centre, turn, solid.half, _root(np.array([min(1.0, solid.radius / solid.half.min())]))
+        return "block", centre, turn, solid.half, root_of(np.array([min(1.0, solid.radius / solid.half.min())]))
     if isinstance(solid, Ball):
         return "ball", centre, turn, solid.half, np.array([_bluntness(solid.power)])
     if isinstance(solid, Turned):
         low, high = np.array(solid.low), np.array(solid.high)
         most = np.maximum(np.maximum(low, high), 1e-6)
         half = np.array([most[0], solid.height / 2, most[1]])
-        rim = _root(np.array([min(1.0, solid.rounding / half.min())]))
+        rim = root_of(np.array([min(1.0, solid.rounding / half.min())]))
         shape = np.concatenate([2 * low / most - 1, 2 * high / most - 1, [_bluntness(solid.power)], rim])
         return "turned", centre + turn[:, 1] * solid.height / 2, turn, half, shape
     if isinstance(solid, Blade):
@@ -172,7 +173,7 @@ def _profiled(solid: Lathe, centre: Array, turn: Array) -> tuple[str, Array, Arr
     shape = np.stack([across, up], 1).ravel()
     if solid.hollow:
         thick = float(np.abs(solid.profile[0] - solid.profile[-1]).max())
-        shape = np.append(shape, _root(np.array([thick / widest])))
+        shape = np.append(shape, root_of(np.array([thick / widest])))
     return PROFILES[count, solid.hollow], centre + turn[:, 1] * (low + high) / 2, turn, half, shape
 
 
@@ -191,7 +192,7 @@ def _lathe(kind: str, centre: Array, turn: Array, half: Array, unit: Array, look
 def _tube(solid: Tube, centre: Array, turn: Array) -> tuple[str, Array, Array, Array, Array]:
     points = solid.points @ turn.T + centre
     closed = len(points) > 4 and np.linalg.norm(points[0] - points[-1]) < 0.02
-    thick = _root(np.array([min(1.0, solid.radius / THICKEST)]))
+    thick = root_of(np.array([min(1.0, solid.radius / THICKEST)]))
     if closed:
         return _ring(points, thick)
     kind = RODS.get(len(points), "curve")
@@ -212,7 +213,7 @@ def _ring(points: Array, thick: Array) -> tuple[str, Array, Array, Array, Array]
         x, z = points[0] - middle, points[quarter] - middle
     z = z - x * (x @ z) / max(x @ x, 1e-12)
     x, z = (axis / max(np.linalg.norm(axis), 1e-9) for axis in (x, z))
-    turn = np.stack([x, np.cross(z, x), z], axis=1)
+    turn = np.stack([x, cross(z, x), z], axis=1)
     local = np.abs((points - middle) @ turn).max(0)
     half = np.array([local[0], 1e-3, local[2]])
     straight = np.linalg.norm(points[quarter - 1] - points[quarter]) / 2 if len(points) == 17 else 0.0
@@ -255,11 +256,13 @@ def _resampled(points: Array, count: int) -> Array:
     return np.stack([np.interp(where, np.arange(len(points)), column) for column in points.T], axis=1)
 
 
-def _root(share: Array) -> Array:
+def root_of(share: Array) -> Array:
+    """How shares (...) are said: their square roots on [-1, 1]."""
     return 2 * np.sqrt(np.clip(share, 0, None)) - 1
 
 
-def _square(said: Array) -> Array:
+def share_of(said: Array) -> Array:
+    """What a number that was said as its square root stands for, 0 to 1 and a little more."""
     return ((said.clip(-1, 1.2) + 1) / 2) ** 2
 
 

@@ -9,6 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from echomodel.data.furniture.solids import Array, Solid
+from echomodel.triangles import area_normals
 
 TOUCH = 0.006  # metres between solids that still count as joined
 POINTS = 160  # on the surface of a solid
@@ -34,7 +35,7 @@ def surface_of(solid: Solid) -> Array:
     """Vertices of a solid and points spread evenly over its faces, metres."""
     vertices, faces = solid.mesh(2)
     corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = np.linalg.norm(area_normals(corners), axis=1)
     if area.sum() <= 0:
         return vertices
     share = (np.arange(POINTS) + 0.5) / POINTS
