@@ -97,13 +97,15 @@ def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Fu
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
     aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
-    near = [(things, BEFORE) for things in (furniture, hung) if things is not None and len(things.size)]
-    near.append((_walls(np.asarray(floor, float), height), WALLED))
+    things = [some for some in (furniture, hung) if some is not None and len(some.size)]
+    near = [*((some, BEFORE) for some in things), (_walls(np.asarray(floor, float), height), WALLED)]
     best, most = _level_view(middle + 0.1, aim, height), -np.inf
     for spot in _spots(np.asarray(floor, float), middle):
         if not room.contains(shapely.LineString([spot, middle])):
             continue
-        points, blocked = furniture.blocked(np.array([spot[0], EYES * height, spot[1]]))
+        eye = np.array([spot[0], EYES * height, spot[1]])
+        points, blocked = furniture.blocked(eye)
+        touched = sum(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things)
         fixed = (spot - middle) @ furniture.facing
         for pan in PANS:
             way = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ (aim - spot)
@@ -112,10 +114,9 @@ def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Fu
             if len(points):
                 merit -= (blocked | ~_framed_points(points, view)).mean(1).sum()
                 merit += SHOWN * np.isfinite(furniture.away(view, APERTURE / 2 / WIDE)).mean()
-            for things, reach in near:
-                merit -= FILLED * things.filled(view, APERTURE / 2 / WIDE, reach)
-            for things, reach in near[:-1]:
-                merit -= FILLED * float((things.nearness(view[:3, 3], reach) > TOUCHED).any())
+            for some, reach in near:
+                merit -= FILLED * some.filled(view, APERTURE / 2 / WIDE, reach)
+            merit -= FILLED * touched
             if merit > most:
                 best, most = view, merit
     return best

@@ -17,7 +17,7 @@ from echomodel.sizes import size_statistics
 from echomodel.vocabulary import Category, vocabulary
 from echousd.assets.colors import MOST, oklab
 from echousd.assets.licences import allowed
-from echousd.assets.matching import apart, told_colors
+from echousd.assets.matching import apart, main_colors, told_colors
 from echousd.assets.matching import costs as color_costs
 from echousd.assets.matching import table as color_table
 from echousd.assets.record import AssetRecord
@@ -223,6 +223,7 @@ def _best(
 ) -> AssetRecord | None:
     ranked: list[tuple[float, str, AssetRecord]] = []
     told = np.reshape(told_colors(one.told), (-1, 3))
+    worn = main_colors([other.colors for other in company])
     loud = True  # until there is one whose colours are not
     for category, cost in _shelves_for(one.category, wishes):
         if category != one.category and one.category in wishes.shelves and not loud:
@@ -241,7 +242,7 @@ def _best(
                 break
             record = shelf.records[number]
             total = float(costs[number]) + (AGAIN if record.id in used else 0.0) + UNLIKE * _unlike(record, company)
-            total += apart(record.colors, [other.colors for other in company])
+            total += apart(record.colors, worn)
             total += (nearness or {}).get(record.id, 0.0) + wishes.unlikeness.get(record.id, 0.0)
             ranked.append((total, record.id, record))
     if not ranked:

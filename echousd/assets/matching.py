@@ -80,10 +80,14 @@ def _away(lab: np.ndarray, tones: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(apart, axis=-1).min(-1))
 
 
-def apart(one: tuple[float, ...], company: Sequence[tuple[float, ...]]) -> float:
-    """Cost of the main colour of a model among those of others, the mean of the distances; 0 where one is unknown."""
-    known = [np.array(other[1:4]) for other in company if other]
-    if not one or not known:
+def main_colors(rows: Sequence[tuple[float, ...]]) -> np.ndarray:
+    """(k, 3) OKLab of the main colours of models (`AssetRecord.colors`) that have any."""
+    return np.array([row[1:4] for row in rows if row]).reshape(-1, 3)
+
+
+def apart(one: tuple[float, ...], company: np.ndarray) -> float:
+    """Cost of the main colour of a model among those of others (k, 3), the mean distance; 0 where one is unknown."""
+    if not one or not len(company):
         return 0.0
-    far = [np.linalg.norm((np.array(one[1:4]) - other) * (DARKER, 1.0, 1.0)) for other in known]
-    return TOGETHER * float(np.mean(far))
+    far = np.linalg.norm((np.array(one[1:4]) - company) * (DARKER, 1.0, 1.0), axis=1)
+    return TOGETHER * float(far.mean())

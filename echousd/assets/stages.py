@@ -10,14 +10,15 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 
+from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, texels
 from echousd.assets.measured import Measured
 from echousd.drawables import Paint, fans, paints_of
-from echousd.stage.contents import triangulated
+from echousd.stage.contents import triangles_of
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage
 from echousd.stage.foreign import object_box
-from echousd.stage.forms import Form, SkippedForms, forms, polygons
+from echousd.stage.forms import Form, Polygons, SkippedForms, forms, polygons
 from echousd.stage.labels import labels
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, texture_bytes
@@ -39,15 +40,17 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     points, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), int)], 0
     coats: list[Coat] = []
     known: dict[str, Paint] = {}
+    covers: dict[Paint, np.ndarray] = {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SkippedForms)
         for form in forms(root, cache, _visible):
-            vertices, triangles = triangulated(form.prim)
+            surface = polygons(form.prim)
+            triangles = triangles_of(surface)
             if len(triangles):
-                points.append(vertices @ form.world[:3, :3].T + form.world[:3, 3])
+                points.append(surface.points @ form.world[:3, :3].T + form.world[:3, 3])
                 faces.append(triangles + count)
-                count += len(vertices)
-                coats += _coats(form, known) if painted else ()
+                count += len(surface.points)
+                coats += _coats(form, surface, known, covers) if painted else ()
     prims = [root, *Usd.PrimRange(root, Usd.TraverseInstanceProxies())]
     layer = stage.GetRootLayer()
     data = dict(layer.customLayerData)
@@ -77,19 +80,20 @@ def measured_stage(path: Path, prim_path: str = "", *, painted: bool = False) ->
     )
 
 
-def _coats(form: Form, known: dict[str, Paint]) -> Iterator[Coat]:
-    """What covers a surface, by the areas of its materials."""
-    surface = polygons(form.prim)
+def _coats(form: Form, surface: Polygons, known: dict[str, Paint], covers: dict[Paint, np.ndarray]) -> Iterator[Coat]:
+    """What covers a surface, by the areas of its materials; both dictionaries hold what was read, and grow."""
     face, corner = fans(surface.counts)
-    a, b, c = np.moveaxis((surface.points @ form.world[:3, :3].T)[surface.indices[corner]], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    covers = np.zeros(len(face), int)
+    corners = (surface.points @ form.world[:3, :3].T)[surface.indices[corner]]
+    area = np.linalg.norm(area_normals(corners), axis=1)
+    worn = np.zeros(len(face), int)
     paints = list(paints_of(form.prim, surface.face[face], known))
     for number, (_, inside) in enumerate(paints):  # later ones win
-        covers[inside] = number
-    for (paint, _), share in zip(paints, np.bincount(covers, area, len(paints)), strict=True):
+        worn[inside] = number
+    for (paint, _), share in zip(paints, np.bincount(worn, area, len(paints)), strict=True):
         if share > 0 and paint != Paint():  # of no material that is known
-            yield float(share), _cover(paint)
+            if paint not in covers:
+                covers[paint] = _cover(paint)
+            yield float(share), covers[paint]
 
 
 def _cover(paint: Paint) -> np.ndarray:

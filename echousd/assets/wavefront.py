@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, texels
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import Beside, ModelFile
@@ -45,8 +46,7 @@ def measured_obj(model: ModelFile, text: str, *, painted: bool = False) -> Measu
     inside = len(faces) > 0 and faces.min() >= 0 and faces.max() < len(points)
     seen: list[Coat] = []
     if painted and coats and inside:
-        a, b, c = (points[faces[:, k]] for k in range(3))
-        area = np.bincount(np.concatenate(slots), np.linalg.norm(np.cross(b - a, c - a), axis=1), len(names))
+        area = np.bincount(np.concatenate(slots), np.linalg.norm(area_normals(points[faces]), axis=1), len(names))
         seen = [(float(area[k]), coats[name]) for k, name in enumerate(names) if name in coats and area[k] > 0]
     used = tuple(dict.fromkeys(names[1:]))
     return Measured(points, faces, materials=used, missing=tuple(dict.fromkeys(beside.missing)), coats=tuple(seen))
@@ -54,6 +54,7 @@ def measured_obj(model: ModelFile, text: str, *, painted: bool = False) -> Measu
 
 def _coats(libraries: list[str], beside: Beside, painted: bool) -> Iterator[tuple[str, np.ndarray]]:
     """(name, what covers a surface) of the materials of some MTL files; their images are looked for in any case."""
+    images: dict[str, np.ndarray | None] = {}
     for library in libraries:
         try:
             content = beside.get(library.strip()).decode("utf-8", "replace")
@@ -63,18 +64,17 @@ def _coats(libraries: list[str], beside: Beside, painted: bool) -> Iterator[tupl
             name, _, rest = piece.partition("\n")
             lines = re.findall(r"^[ \t]*(Kd|map_Kd|d|Tr)[ \t]+(.+?)[ \t]*$", rest, re.MULTILINE | re.IGNORECASE)
             said = {word.lower(): value for word, value in lines}
-            coat = _image(said.get("map_kd", ""), beside, painted)
-            if coat is None:
-                coat = _plain(said)
+            image = said.get("map_kd", "")
+            if image not in images:
+                images[image] = _image(image, beside, painted)
+            coat = _plain(said) if images[image] is None else images[image]
             if painted and coat is not None:
                 yield name.strip(), coat
 
 
 def _image(name: str, beside: Beside, painted: bool) -> np.ndarray | None:
-    if not name or name in beside.missing:
-        return None
     try:
-        content = beside.images[name] if name in beside.images else beside.get(name)
+        content = beside.get(name) if name else b""
     except ValueError:
         return None
     return texels(content) if painted else None

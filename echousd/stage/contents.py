@@ -9,7 +9,7 @@ from pxr import Tf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
 from echousd.stage.encoding import StageError
-from echousd.stage.forms import forms, polygons
+from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import matrix
@@ -156,13 +156,18 @@ def is_seen(prim: Usd.Prim) -> bool:
 def triangulated(prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray]:
     """Points (v, 3) float in the prim's own frame and unit, and triangles (f, 3) int."""
     surface = polygons(prim)
-    points, counts, indices = surface.points, surface.counts, surface.indices
-    if not len(points):
-        return np.zeros((0, 3)), np.zeros((0, 3), int)
+    return surface.points, triangles_of(surface)
+
+
+def triangles_of(surface: Polygons) -> np.ndarray:
+    """(f, 3) int points of the triangles of polygons, those of as many corners behind one another."""
+    counts, indices = surface.counts, surface.indices
+    if not len(surface.points):
+        return np.zeros((0, 3), int)
     starts = np.concatenate(([0], np.cumsum(counts)[:-1]))
     triangles = []
     for corners in np.unique(counts[counts >= 3]):
         first = starts[counts == corners]
         for k in range(1, corners - 1):
             triangles.append(np.stack((indices[first], indices[first + k], indices[first + k + 1]), 1))
-    return points, np.concatenate(triangles) if triangles else np.zeros((0, 3), int)
+    return np.concatenate(triangles) if triangles else np.zeros((0, 3), int)

@@ -152,6 +152,6 @@ def _lengthened(token: Array, way: Array, size: Array) -> bool:
     if word(token, "kind") in FREE or abs(local[axis]) > CLOSE or abs(local[axis]) < 0.8 * np.linalg.norm(way):
         return False
     half = share_of(token[EXTENT][axis]) + abs(local[axis]) / 2 / reach_of(turn, size)[axis]
-    token[EXTENT.start + axis] = root_of(min(half, 1.0))
+    token[EXTENT.start + axis] = root_of(np.minimum(half, 1.0))
     token[CENTRE] += turn[:, axis] * local[axis] / size
     return True
