@@ -25,7 +25,7 @@ def adopt(
     relate: Annotated[list[str] | None, typer.Option(help='Relation to keep: "lamp close by sofa".')] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
-        str | None, typer.Option(help="Of new objects: parts, sdf, library, boxes; default: parts.")
+        str | None, typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: parts.")
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
     stretch: Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)] = 1.15,

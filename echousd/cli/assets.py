@@ -12,7 +12,9 @@ import typer
 from echousd.cli.output import AsJson, say
 from echousd.cli.report import say_written
 
-assets_app = typer.Typer(help="Libraries of furniture: index them, look through them.", no_args_is_help=True)
+assets_app = typer.Typer(
+    help="Libraries of furniture: index them, look through them; a room's own as packages.", no_args_is_help=True
+)
 SHOWN = 20  # faults that are told; the table holds all
 
 

@@ -57,7 +57,7 @@ def run(
     until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.")] = "",
     memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", min=256)] = 4096,
     shapes: Annotated[
-        str | None, typer.Option(help="parts, sdf, library, boxes; default: the best of the model.")
+        str | None, typer.Option(help="parts, sdf, library, guided, boxes; default: the best of the model.")
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
     stretch: Annotated[

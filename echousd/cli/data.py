@@ -108,7 +108,9 @@ def report(
     section: Annotated[str | None, typer.Option(help="Only sections that begin so, such as pair.")] = None,
     json_out: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Rooms beside real ones, figure by figure, with a distance: of shares the difference, else over the real range.
+    """Compare rooms with real ones, figure by figure, the most distant first.
+
+    The distance of shares is their difference, that of lengths the difference over the real range.
 
     Example: echousd data report --count 2000 --worst 20
     """

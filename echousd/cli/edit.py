@@ -45,7 +45,8 @@ def edit(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
-        str | None, typer.Option(help="Of new objects: parts, sdf, library, boxes; default: as the room is made.")
+        str | None,
+        typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: as the room is made."),
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).")] = None,
     weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,

@@ -60,7 +60,7 @@ def generate(
         str | None,
         typer.Option(
             help="parts: built of parts, with doors and drawers; sdf: free shapes; library: models of --assets; "
-            "boxes. Default: parts."
+            "guided: those most like free shapes; boxes. Default: parts."
         ),
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
