@@ -151,6 +151,13 @@ MORE = [
         "kind": "desk", "size": (1.2, 0.75, 0.6), "at": (0.0, 1.69), "yaw": np.pi}}),
      "chair", kind="office_chair", size=(0.5, 0.9, 0.6), at=(0.0, 0.67)), ("chair", "chair_pulls_out"),
      "chair can be pulled back by only 0.25 m before bed"),  # which would do at a table
+    (with_one(LIVING, "low", kind="side_table", size=(0.4, 0.5, 0.4), at=(-1.4, -0.9)), ("low", "at_its_side"),
+     "low stands before sofa, not beside it"),
+    (with_one(LIVING, "table", kind="dining_table", size=(0.8, 0.75, 0.8), at=(-0.8, 0.25)), ("sofa", "sofa_ahead"),
+     "table, which is no part of its group, stands 0.93 m before sofa"),
+    (LIVING.moved("sofa", at=(0.0, -0.6)).moved("coffee", at=(0.0, 0.5)), ("sofa", "at_wall"),
+     "sofa stands 0.95 m off the wall behind it"),
+    (LIVING.moved("coffee", at=(0.8, -0.4)), ("coffee", "table_before_sofa"), "lies 0.80 m beside the middle of sofa"),
 ]  # fmt: skip
 
 
@@ -159,6 +166,25 @@ def test_crowded_rooms_are_seen(room, fault, said):
     found = room.found()
     assert fault in found
     assert said in found[fault]
+
+
+def test_a_sofa_stands_in_the_room_for_a_reason():
+    hall = np.array([(-4.0, -5.0), (4.0, -5.0), (4.0, 2.0), (-4.0, 2.0)])
+    assert ("sofa", "at_wall") not in LIVING.found(floor=hall)  # at its wall it would be 5 m from all else
+    desk = {"kind": "desk", "size": (1.2, 0.75, 0.6), "at": (0.0, -1.68)}
+    away = LIVING.moved("sofa", at=(0.0, -0.1)).moved("coffee", at=(0.0, 0.9))
+    assert ("sofa", "at_wall") in away.found()
+    assert ("sofa", "at_wall") not in Room({**away.things, "desk": desk}).found()
+
+
+def test_a_hall_that_is_furnished_at_one_end_is_seen():
+    hall = np.array([(-2.5, -2.0), (9.5, -2.0), (9.5, 5.0), (-2.5, 5.0)])
+    plant = {"kind": "plant", "size": (0.5, 1.2, 0.5)}
+    full = Room({**LIVING.things, **{f"plant_{n}": {**plant, "at": (-2.2 + 0.6 * n, 4.7)} for n in range(8)}})
+    found = full.found(floor=hall)
+    assert [rule for _, rule in found].count("floor_used") == 1
+    assert any("a circle of 7.0 m of the floor is bare" in said for said in found.values())
+    assert not any(rule == "floor_used" for _, rule in LIVING.found(floor=None))
 
 
 def test_desks_stand_in_a_row_and_what_belongs_together_touches():
@@ -290,7 +316,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
-    assert len(found) < 0.12 * sum(len(room) for room in rooms)
+    assert len(found) < 0.13 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():

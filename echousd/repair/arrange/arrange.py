@@ -16,6 +16,7 @@ from echousd.repair.arrange.overlaps import depths
 from echousd.repair.arrange.places import expect_followers, places
 from echousd.repair.arrange.seating import seat_evenly
 from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.arrange.spread import bareness
 
 ROUNDS = 4  # orders that are tried
 CROWD = 200  # boxes of all rounds together
@@ -30,16 +31,17 @@ FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "sc
 
 @dataclass(frozen=True, eq=False)
 class Arranged:
-    """Where the boxes stand: position (n, 3), yaw (n,), and what each one pays there (n,)."""
+    """Where the boxes stand: position (n, 3), yaw (n,), what each one pays there (n,), and what bare floor costs."""
 
     position: np.ndarray
     yaw: np.ndarray
     paid: np.ndarray
+    bare: float
 
     @property
     def total(self) -> float:
         """What all pay together."""
-        return float(self.paid.sum())
+        return float(self.paid.sum()) + self.bare
 
 
 def arrange(setting: Setting, *, rounds: int | None = None) -> Arranged:
@@ -137,7 +139,7 @@ def _built(
             own[i], _ = _put(setting, state, int(i))
     for i in order:
         paid[i] = paid_by(setting, state, int(i), own)
-    return Arranged(state.position, state.yaw, paid)
+    return Arranged(state.position, state.yaw, paid, bareness(setting, state))
 
 
 def _anchors_first(setting: Setting, order: np.ndarray) -> list[int]:

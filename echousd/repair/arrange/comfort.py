@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from echomodel.rules.sets import NEAR
+from echomodel.vocabulary import vocabulary
+from echousd.repair.arrange.outlook import to_wall
 from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.geometry import depth_inside
@@ -13,12 +16,16 @@ ODD = 0.9  # half tables by which it may, of an odd number of seats
 PULLED, AT_WALL = 1.6, 1.3  # for a chair that cannot be pulled out before furniture, before a wall
 PULL, PULL_WALL = 0.4, 0.3  # metres behind a chair
 EASE, TIGHT = 0.7, 0.9  # metres behind a chair that one would like, and the price of none of them
-CLOSE, EDGE = 0.45, 0.5  # metres that a wall keeps from a table which chairs stand around, and the price of none
 STRIP, FLUSH, PASSED = 0.6, 0.06, 0.4  # for a bed so many metres off the wall beside it: of no use to anybody
+HEMMED = 1.2  # for a side of a table right at a wall
+WALKED, ELBOWS = 1.05, 0.5  # metres from a table's side to the wall where people sit, and where nobody does
+CLOSE = 4.0  # per metre that something of the walls cannot be as close by a table as it is told to
+FACED = 3.0  # for a side table or lamp before its sofa or bed, not beside it
 HIDDEN = 3.5  # for something high between a screen and its viewer
 HIGH = 0.65  # metres
 BESIDE = 0.3  # metres beside the line of sight
 ON_SIGHT = np.linspace(0.15, 0.85, 7)[:, None]  # places on the line of sight
+ENDS = 4  # more chairs than that sit at the ends of a table, too
 SOLID = ("sofa", "board", "bed", "storage")
 
 
@@ -37,11 +44,12 @@ def uncomfortable(
         out = out + _uneven(setting, state, i, poses)
     if setting.stances[i] == "at":
         out = out + _uneven(setting, state, i, poses) + _boxed_in(setting, state, i, poses, others)
+    if setting.stances[i] == "beside":
+        out = out + FACED * _before(setting, state, i, poses)
+    if setting.laid[i] and not (setting.kinds[i].wall or setting.kinds[i].access):
+        out = out + HEMMED * _hemmed(setting, i, poses)
     if setting.kinds[i].role == "bed":
         out = out + STRIP * _strips(setting, i, poses)
-    if setting.laid[i] and not (setting.kinds[i].access or setting.kinds[i].wall):
-        grown = setting.size[i] + np.array([2 * CLOSE, 0.0, 2 * CLOSE])
-        out = out + EDGE * (beyond(setting, grown, poses) / CLOSE).clip(0.0, 1.0)
     return out + _hiding(setting, state, i, poses)
 
 
@@ -55,6 +63,38 @@ def _strips(setting: Setting, i: int, poses: Poses) -> np.ndarray:
             for away in (FLUSH, PASSED)
         )
         out += near & ~far
+    return out
+
+
+def _before(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
+    """(K,) bool: the middle of something that goes beside a sofa or bed lies ahead of its front."""
+    seat = int(setting.anchor[i])
+    if seat < 0 or not state.placed[seat] or setting.kinds[seat].role not in ("sofa", "bed"):
+        return np.zeros(len(poses), bool)
+    return _local(state.position[seat], float(state.yaw[seat]), poses.position)[:, 1] > setting.size[seat, 2] / 2
+
+
+def _hemmed(setting: Setting, i: int, poses: Poses) -> np.ndarray:
+    """(K,): how much of the way around a table the walls take, summed over its four sides; where furniture of the walls
+    is told to stand close by, metres by which it cannot instead of the side where it can."""
+    taken, ahead = [], []
+    width, depth = setting.size[i, [0, 2]] / 2
+    chairs = float(setting.sitting[(setting.anchor == i) & setting.seats].sum())
+    for axis, half, other in ((1, depth, width), (0, width, depth)):
+        sat_at = other >= half or chairs > ENDS
+        for sign in (-1.0, 1.0):
+            free = to_wall(setting, poses.position[:, [0, 2]], sign * poses.axes[:, axis]) - half
+            taken.append((1 - free / (WALKED if sat_at else ELBOWS)).clip(0.0, 1.0))
+            ahead.append(free)
+    out = np.sum(taken, 0)
+    close = vocabulary().predicate_id("close_by")
+    told, other, _ = setting.told[i]
+    for j in other[told[:, 1] == close].tolist():
+        if setting.kinds[j].wall and setting.kinds[j].role != "sofa":
+            side = np.argmin(ahead, 0)[None]
+            off = np.take_along_axis(np.stack(ahead), side, 0)[0] - setting.size[j, 2] - NEAR
+            out = out - np.take_along_axis(np.stack(taken), side, 0)[0] + CLOSE * off.clip(0.0, 2.0)
+            break
     return out
 
 

@@ -32,6 +32,8 @@ FOOT = 0.4  # metres at the foot of a bed
 BEDSIDE, AROUND = 0.38, 0.3  # metres beside a bed, and beyond its foot on the way there
 PULLED = ((0.4, 1.2), (0.65, 0.6))  # metres behind a chair, and what it costs to take them
 KNEES, LEGS = 0.55, 0.45  # metres before a sofa, before an armchair
+AHEAD, SPOILT = 1.25, 1.6  # metres before a sofa that other groups leave to its own, and for a piece in there
+TAKEN, BEFORE_SHELVES = 0.8, 0.8  # metres to stand before shelves and cupboards, and for a piece in there
 GLARE = 0.2  # metres of a stand before a window
 SLACK = 0.01  # metres or ratio by which relations are to hold
 
@@ -141,6 +143,8 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     front = own_front(setting, i)
     if front is None:
         return out
+    if setting.kinds[i].role == "sofa":
+        out = out + _spoilt(setting, state, i, poses, strangers)
     size, forward = front
     ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
     if setting.kinds[i].role in ("sofa", "seat"):
@@ -157,14 +161,29 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     return out + BLOCKED * (beyond(setting, size, ahead) > 0.05)
 
 
+def _spoilt(setting: Setting, state: State, i: int, poses: Poses, strangers: list[int]) -> np.ndarray:
+    """(K,): what other groups' pieces in the space that a sofa looks into cost it."""
+    size, forward = _ahead_of(setting, i, AHEAD)
+    ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
+    there = [j for j in strangers if setting.standing(j) and setting.stances[j] != "opposite"]
+    share = np.where(setting.movable[there], CROWDED / BLOCKED, 1.0)
+    deep = depths(size, ahead, setting.size[there], state.position[there], state.yaw[there])
+    return SPOILT * (deep > 0.03) @ share
+
+
+def _ahead_of(setting: Setting, i: int, depth: float) -> tuple[np.ndarray, float]:
+    """Size (3,) of the space of a depth before a box and how far before the box's centre its own centre is."""
+    size = np.array([0.9 * setting.size[i, 0], min(float(setting.size[i, 1]), 1.8), depth])
+    return size, float(setting.size[i, 2] / 2 + depth / 2 + 0.005)
+
+
 def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
     """Size (3,) of the space before a front and how far before the box's centre its own centre is; None = no front."""
     depth, role = 0.75 * setting.kinds[i].access, setting.kinds[i].role
     depth = KNEES if role == "sofa" else LEGS if setting.stances[i] == "company" else 0.0 if role == "seat" else depth
     if depth <= 0 or not setting.standing(i):
         return None
-    size = np.array([0.9 * setting.size[i, 0], min(float(setting.size[i, 1]), 1.8), depth])
-    return size, float(setting.size[i, 2] / 2 + depth / 2 + 0.005)
+    return _ahead_of(setting, i, depth)
 
 
 def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
@@ -188,6 +207,10 @@ def _zones_of(setting: Setting, state: State, j: int) -> list[tuple[float, ...]]
     if front is not None:
         size, forward = front
         rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], BLOCKED, j))
+        wide = {"sofa": (AHEAD, SPOILT), "storage": (TAKEN, BEFORE_SHELVES)}.get(setting.kinds[j].role)
+        if wide:
+            size, forward = _ahead_of(setting, j, wide[0])
+            rows.append((*size, x + s * forward, 0.02, z + c * forward, state.yaw[j], wide[1], j))
     if setting.laid[j] and not setting.kinds[j].access:
         rows += _seats(setting, state, j)
     if setting.stances[j] == "at" and not setting.kinds[j].solid:
@@ -264,10 +287,11 @@ def _relations(setting: Setting, state: State, i: int, poses: Poses, aside: np.n
 
 
 def _weight(setting: Setting, state: State, i: int, other: np.ndarray) -> np.ndarray:
-    """(r,) float: how much relations of box i count, by their other ends; what attends it, and lamps, will follow."""
+    """(r,) float: how much relations of box i count, by their other ends; what attends it and lamps follow."""
     anchor = setting.anchor[other]
     guess = np.where((anchor >= 0) & state.placed[anchor], GUESSED, UNPLACED)
-    return np.where(state.placed[other], 1.0, np.where((anchor == i) | setting.hanging[other], 0.0, guess))
+    follows = (anchor == i) | setting.hanging[other] | state.along[other]
+    return np.where(state.placed[other], 1.0, np.where(follows, 0.0, guess))
 
 
 def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:

@@ -9,8 +9,10 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.setting import Poses, Setting, State
+from echousd.repair.arrange.spread import bareness, bareness_of
 
-SLIDES = np.array([-1.6, -1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0, 1.6])  # metres
+FAR = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5])
+SLIDES = np.concatenate([-FAR[::-1], [0.0], FAR])  # metres
 SHOVES = (-1.2, -0.6, 0.6, 1.2)  # metres that it makes way for another group
 HOPE = 0.3  # share of what that one pays that it may cost to make way at most
 CRAMPED = 2.0  # that a group pays together, from which on others make way for it
@@ -39,7 +41,7 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
     for members in _groups(setting):
         if setting.fixed[members].any():
             continue
-        before = _bill(setting, state, members, own)
+        before = _bill(setting, state, members, own) + bareness(setting, state)
         if before < GAIN:
             continue
         for way in _ways(setting, state, int(setting.group[members[0]])):
@@ -48,7 +50,7 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
                     continue
                 kept = state.position[members].copy()
                 state.position[members] += shift
-                after = _bill(setting, state, members, own)
+                after = _bill(setting, state, members, own) + bareness(setting, state)
                 if after < before - GAIN:
                     before = after
                 else:
@@ -112,8 +114,8 @@ def _ways(setting: Setting, state: State, root: int) -> list[np.ndarray]:
 
 def _best_slide(setting: Setting, state: State, members: np.ndarray, own: np.ndarray, way: np.ndarray) -> np.ndarray:
     """(3,) float: the slide along a way that costs the members least among all others."""
-    state.placed[members] = False
-    total = np.zeros(len(SLIDES))
+    state.placed[members], state.along[members] = False, True
+    total = bareness_of(setting, state, members, SLIDES[:, None] * way)
     for i in members.tolist():
         poses = Poses(
             state.position[i] + SLIDES[:, None] * way,
@@ -121,7 +123,7 @@ def _best_slide(setting: Setting, state: State, members: np.ndarray, own: np.nda
             np.full(len(SLIDES), own[i]) + 0.0,
         )
         total += price(setting, state, i, poses)
-    state.placed[members] = True
+    state.placed[members], state.along[members] = True, False
     return SLIDES[int(total.argmin())] * way
 
 

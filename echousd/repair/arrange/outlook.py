@@ -21,7 +21,7 @@ ELBOW = 0.3  # metres behind a chair, to pull it out
 VIEW = 1.1  # per metre that a screen is beside the line of sight
 OFF_AXIS, ASIDE = 0.4, 1.5  # tangent of the angle from which on a screen is off its viewer's axis, and for that
 NEAR, FAR = 1.6, 4.3  # metres between a screen and its viewer
-RANGE, OUT_OF_RANGE = 4.9, 2.0  # metres from which on nobody watches, and for that
+RANGE, OUT_OF_RANGE = 5.1, 2.0  # metres from which on nobody watches, and for that
 SHIFTS = (0.0, -0.4, 0.4)  # metres beside the axis at which a place for a screen is looked for
 BLOCKED = 2.0  # for such a place that a door, furniture or a corner takes
 TURNED_AWAY, BACK = math.cos(math.radians(115.0)), 1.8  # for a seat that turns the back on its group's screen
@@ -150,7 +150,7 @@ def _no_place(setting: Setting, state: State, i: int, screen: int, poses: Poses)
     best = np.full(len(poses), np.inf)
     for lateral in SHIFTS:
         from_ = poses.position[:, [0, 2]] + lateral * side
-        forward = _to_wall(setting, from_, front) - depth / 2 - 0.02
+        forward = to_wall(setting, from_, front) - depth / 2 - 0.02
         at = from_ + forward[:, None] * front
         there = Poses(np.stack([at[:, 0], np.zeros(len(at)), at[:, 1]], -1), poses.yaw + math.pi, poses.price)
         size, doors, light = np.array([width, height, depth]), setting.doors, setting.windows
@@ -162,7 +162,7 @@ def _no_place(setting: Setting, state: State, i: int, screen: int, poses: Poses)
     return best
 
 
-def _to_wall(setting: Setting, start: np.ndarray, front: np.ndarray) -> np.ndarray:
+def to_wall(setting: Setting, start: np.ndarray, front: np.ndarray) -> np.ndarray:
     """(K,) float: metres from points (K, 2) along directions (K, 2) to the first wall."""
     out = np.full(len(start), 30.0)
     for corner, along, length, _ in setting.walls:

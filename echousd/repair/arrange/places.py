@@ -23,7 +23,7 @@ ENOUGH, SPARE = 2, 0.3  # armchairs in a group, and LONELY for a further one tha
 HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
 WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
-TOO_FAR, IN_THE_ROOM = 4.9, 0.5  # metres from which on a sofa may leave its wall for that, and what that costs
+TOO_FAR, IN_THE_ROOM = 5.5, 0.8  # metres from which on a sofa may leave its wall for that, and what that costs
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -39,7 +39,7 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     if anchor >= 0 and state.placed[anchor]:
         rows = at_anchor(setting, state, i, anchor)
     seated = setting.stances[i] == "at" and not kind.solid
-    lonely = LONELY * (1 + seated) if anchor >= 0 and rows else 0.0
+    lonely = LONELY * (1 + (seated or setting.stances[i] == "before")) if anchor >= 0 and rows else 0.0
     if _spare(setting, state, i):
         lonely = min(lonely, SPARE)
     if kind.support == "ceiling":

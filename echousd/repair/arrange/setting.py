@@ -113,6 +113,11 @@ class Setting:
         return {}
 
     @cached_property
+    def cells(self) -> dict[str, tuple[np.ndarray, np.ndarray, float]]:
+        """Points of the floor, kept when they are asked for again (`spread`)."""
+        return {}
+
+    @cached_property
     def slots(self) -> dict[tuple[int, int], list[tuple[float, float, float, float]]]:
         """Slots of a box at what it attends, kept when they are asked for again (`places.slots_at`)."""
         return {}
@@ -198,9 +203,9 @@ class Setting:
         if one == other == "board" and self.kinds[i].access and self.kinds[j].access:  # two desks stand in a row
             return 0.0, 0.0
         if (self.laid[i] or self.laid[j]) and one in MASSIVE and other in MASSIVE:
-            return 0.9, 1.6
+            return (0.9 if "before" in (self.stances[i], self.stances[j]) else 1.1), 1.8
         if {one, other} <= TOGETHER:
-            return 0.6, 1.4
+            return 0.7, 1.4
         if {one, other} == {"seat", "storage"}:
             return 0.5, 0.9
         return (0.3, 0.6) if {one, other} & {"light", "decor"} and {one, other} & TOGETHER else (0.0, 0.0)
@@ -283,6 +288,7 @@ class State:
     Arguments:
         position: (n, 3) float, yaw: (n,) float; placed: (n,) bool, others stand where they are expected.
         regrets: box -> poses that led to a bad end in earlier rounds: x, z, yaw and what that cost.
+        along: (n,) bool, boxes that move as one with the box that is priced, so that nothing changes between them.
         bills, zones: what was computed for states and poses before (`groups.paid_by`, `costs.fronts`).
     """
 
@@ -290,8 +296,12 @@ class State:
     yaw: np.ndarray
     placed: np.ndarray
     regrets: dict[int, list[tuple[float, float, float, float]]]
+    along: np.ndarray = field(init=False)
     bills: dict[tuple[object, ...], float] = field(default_factory=dict)
     zones: dict[tuple[object, ...], list[tuple[float, ...]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.along = np.zeros(len(self.yaw), bool)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     """Coffee tables: before the sofa, in reach, the long side along it."""
     inner = kind.name in vocabulary().cornered
     out = []
-    for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.4)):
+    for turn, more in ((0.0, 0.0), (math.pi, 0.02), (HALF_PI, 0.8)):
         depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])
         if width < depth * 0.95:
             more += 0.3
@@ -41,7 +41,7 @@ def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
             gap = gap - 0.25 if inner else gap
             for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
                 if abs(lateral) < anchor[0] / 2:
-                    out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.2 * abs(lateral)))
+                    out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.5 * abs(lateral)))
     return out
 
 

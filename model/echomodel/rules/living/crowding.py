@@ -22,7 +22,7 @@ ALONGSIDE = 0.7  # metres: chairs further from their table are not at it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
-LAMP = 0.35  # metres before a front that lamps and plants keep free
+LAMP, AT_BED = 0.6, 0.35  # metres before a front that lamps and plants keep free, before a nightstand's
 MET = 0.25  # share of a width from which on something is before it
 EDGE = 0.06  # the same for lamps and plants, which are narrow
 
@@ -145,10 +145,12 @@ def lamp_aside(plan: Plan) -> Found:
     half_width, half_depth = plan.reach(i, j)
     clear = forward - half_depth - plan.size[j, 2] / 2
     covered = torch.minimum(2 * half_width, plan.size[j, 0] / 2 + half_width - lateral.abs())
-    margin = torch.maximum(torch.maximum(clear - LAMP, EDGE * plan.size[j, 0] - covered), -forward)
+    free = torch.where(plan.stands("head")[j], AT_BED, LAMP).to(plan.size)
+    margin = torch.maximum(torch.maximum(clear - free, EDGE * plan.size[j, 0] - covered), -forward)
     least, about = worst(i, margin, j, len(plan), FAR)
     who = i.unique()
-    return found(who, least[who], other=about[who], measure=least[who] + LAMP)
+    least, about = least[who], about[who]
+    return found(who, least, other=about, measure=least + torch.where(plan.stands("head")[about], AT_BED, LAMP))
 
 
 def seat_room(plan: Plan) -> Found:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
-from echomodel.rules.living import access, company, crowding, groups, lamps, sight, sizes, walls
+from echomodel.rules.living import access, company, crowding, groups, lamps, sight, sizes, walls, zones
 from echomodel.rules.living.found import Found
 from echomodel.rules.living.plan import CLEAR_HEIGHT, Plan, plan_of
 from echomodel.rules.living.ways import Ways, ways
@@ -98,9 +98,13 @@ RULES = (
     Rule("sofas_in_circle", company.sofas_in_circle, ("{a} turns its back on the group of {b} ({x:.0f} degrees)",),
          "the same as for armchairs"),
     Rule("at_its_side", company.at_its_side, ("{a} stands before {b}, not beside it",),
-         "what the word means; 93 % of real armchairs leave their sofa's knees free"),
+         REAL + "97 % of side tables and lamps, 93 % of armchairs leave their sofa's knees free"),
     Rule("not_alone", company.not_alone, ("{a} stands alone in the room, {x:.2f} m from everything",),
          REAL + "side tables, lamps and plants stand at something"),
+    Rule("sofa_ahead", zones.sofa_ahead, ("{b}, which is no part of its group, stands {x:.2f} m before {a}",),
+         REAL + "97 % of sofas have a metre before them to other groups"),
+    Rule("floor_used", zones.floor_used, ("beside {a} a circle of {x:.1f} m of the floor is bare, others stand close",),
+         REAL + "98 % have no empty circle of 1.05 times the root of each piece's share of the floor"),
     Rule("view_free", sight.view_free, ("{b} stands between {a} and who watches it",), "a straight line"),
     Rule("scale", sizes.scale, ("{a} is {x:.2f} m wide", "{a} is {x:.2f} m high", "{a} is {x:.2f} m deep"),
          "a fifth over the 95th percentile of the class, half of the 5th", weight=0.3),

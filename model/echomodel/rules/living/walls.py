@@ -12,7 +12,8 @@ from echomodel.rules.living.plan import FAR, Plan
 
 CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind
-PASSAGE = 0.75  # metres: a sofa so far from the wall stands in the room on purpose, one walks behind it
+PASSAGE = 0.75  # metres: a sofa so far from the wall may stand in the room on purpose, one walks behind it
+DEEP = 6.0  # metres of the room along its axis from which on it does; or something of another group stands behind it
 
 
 def parallel(plan: Plan) -> Found:
@@ -40,5 +41,24 @@ def at_wall(plan: Plan) -> Found:
     there = (plan.walls[3] > 0).any(1)[plan.scene]
     who = (wall & plan.standing & ~beside & there).nonzero()[:, 0]
     gap = plan.back_gap[who]
-    free = plan.of("sofa")[who] & (gap >= PASSAGE)
+    free = plan.of("sofa")[who] & (gap >= PASSAGE) & (_deep(plan, who) | _backed(plan, who, gap.detach()))
     return found(who, torch.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=(gap < FAR).long())
+
+
+def _deep(plan: Plan, who: Tensor) -> Tensor:
+    """(P,) bool: the room is so long where boxes look that at the wall they would be far from all else."""
+    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
+    along = (plan.floor[plan.scene[who]] * front[:, None]).sum(-1).detach()
+    there = torch.isfinite(along)
+    least = torch.where(there, along, torch.inf).amin(1)
+    return torch.where(there, along, -torch.inf).amax(1) - least >= DEEP
+
+
+def _backed(plan: Plan, who: Tensor, gap: Tensor) -> Tensor:
+    """(P,) bool: something of another group stands between a box and the wall behind it."""
+    i, j = plan.pairs(plan.standing, plan.standing & plan.of("board", "storage", "bed", "seat", "sofa"))
+    lateral, forward = plan.local(j, i)
+    back = -forward.detach() - plan.size[i, 2] / 2
+    room = torch.full((len(plan),), -1.0, dtype=plan.size.dtype).index_put((who,), gap.to(plan.size))
+    behind = (back > 0) & (back < room[i]) & (lateral.abs() < plan.size[i, 0] / 2) & ~plan.kin(i, j)
+    return torch.isin(who, i[behind])
