@@ -19,6 +19,7 @@ HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
 LONELY = 2.5  # for a piece that does not stand at what it attends though that is there; chairs pay twice
+APART = 4.0  # the same for an armchair
 ENOUGH, SPARE = 2, 0.3  # armchairs in a group, and LONELY for a further one that nothing is told of
 HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the middle of the room
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
@@ -40,6 +41,8 @@ def places(setting: Setting, state: State, i: int) -> Poses:
         rows = at_anchor(setting, state, i, anchor)
     seated = setting.stances[i] == "at" and not kind.solid
     lonely = LONELY * (1 + (seated or setting.stances[i] == "before")) if anchor >= 0 and rows else 0.0
+    if setting.stances[i] == "company" and rows:
+        lonely = APART
     if _spare(setting, state, i):
         lonely = min(lonely, SPARE)
     if kind.support == "ceiling":

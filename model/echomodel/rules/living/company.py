@@ -7,7 +7,7 @@ import math
 import torch
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.found import Found, found, joined, worst
 from echomodel.rules.living.plan import FAR, Plan
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
@@ -22,6 +22,7 @@ COVERS = 0.12  # share of a sofa's width that side tables and lamps may stand be
 AHEAD = 0.1  # metres that their middles may lie before its front: 97 % of real ones lie less
 SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
+LEFT, OWN = 1.8, 0.6  # metres from its group from which on an armchair stands apart, and to what is its own: all real
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
 
@@ -101,7 +102,10 @@ def at_its_side(plan: Plan) -> Found:
 
 
 def not_alone(plan: Plan) -> Found:
-    """Plants, lamps and small tables stand at a wall or at something, an armchair without a group at a wall."""
+    """Plants, lamps and small tables stand at a wall or at something, an armchair without a group at a wall.
+
+    An armchair that stands apart from its group has something of its own: a lamp, a table, shelves, another one.
+    """
     loner = plan.which(lambda kind: kind.stands == "company") & (plan.anchor < 0)
     small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
     who = small.nonzero()[:, 0]
@@ -112,4 +116,12 @@ def not_alone(plan: Plan) -> Found:
     wall = signed_distance(plan.position[who][:, None, [0, 2]], floor)[:, 0] - half
     wall = torch.where(known(floor), wall, 0.0 * wall)
     away = torch.where(loner[who], wall - (EDGE - ALONE), torch.minimum(gap[who], wall))
-    return found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
+    lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
+    chairs, group = plan.attended("company")
+    apart = (plan.of("seat") & plan.standing)[chairs] & (plan.apart(chairs, group).detach() > LEFT)
+    mask = torch.zeros(len(plan), dtype=torch.bool).index_put((chairs[apart],), torch.tensor(True))
+    others = plan.of("light", "storage", "board") | plan.stands("beside", "company")
+    i, j = plan.pairs(mask, others & plan.standing)
+    gap, _ = worst(i, plan.apart(i, j), j, len(plan), FAR)
+    who = mask.nonzero()[:, 0]
+    return joined(lonely, found(who, OWN - gap[who], measure=gap[who].clamp(0.0, FAR)))

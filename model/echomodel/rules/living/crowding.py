@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.found import Found, found, joined, worst
 from echomodel.rules.living.plan import FAR, Plan
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
@@ -21,6 +21,7 @@ SQUEEZED, SPARE = 0.17, 0.6  # metres behind chairs of one side, and how much mo
 ALONGSIDE = 0.7  # metres: chairs further from their table are not at it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
+TOUCHED = 0.08  # metres between a coffee table and a second sofa or an ottoman: 95 % of real ottomans keep 0.12
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
 LAMP, AT_BED = 0.6, 0.35  # metres before a front that lamps and plants keep free, before a nightstand's
 MET = 0.25  # share of a width from which on something is before it
@@ -157,7 +158,14 @@ def seat_room(plan: Plan) -> Found:
     """One can sit down in a group, too: nothing but its table stands close before a sofa or armchair."""
     seats = ((plan.of("sofa") | plan.stands("company")) & plan.standing).nonzero()[:, 0]
     block = (plan.of("sofa", "light", "decor", "storage", "bed") | plan.stands("company", "beside")) & plan.standing
-    return _clear(plan, seats, block, ROOM, -FAR, kin=True)
+    found_one = _clear(plan, seats, block, ROOM, -FAR, kin=True)
+    tables = plan.stands("before") & plan.standing  # which a second sofa or an ottoman does not touch
+    i, j = plan.pairs((plan.stands("with") | (plan.stands("foot") & plan.of("seat"))) & plan.standing, tables)
+    least, about = worst(i, plan.apart(i, j) - TOUCHED, j, len(plan), FAR)
+    who = i.unique()
+    who = who[(least[who] < 0) & ~torch.isin(who, found_one.who[found_one.margin < 0])]
+    touched = found(who, least[who], other=about[who], measure=(least[who] + TOUCHED).clamp_min(0.0))
+    return joined(found_one, touched)
 
 
 def _clear(

@@ -46,3 +46,9 @@ def worst(who: Tensor, margin: Tensor, other: Tensor, count: int, nothing: float
     hit = margin.detach() <= least.detach()[who]
     about[who[hit]] = other[hit]
     return least, about
+
+
+def joined(first: Found, second: Found) -> Found:
+    """The rows of both."""
+    pairs = ((getattr(one, name) for one in (first, second)) for name in ("who", "other", "margin", "measure", "words"))
+    return Found(*(torch.cat(list(pair)) for pair in pairs))
