@@ -11,7 +11,7 @@ from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.spread import bareness, bareness_of
 
-FAR = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5])
+FAR = np.array([0.3, 0.45, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5])
 SLIDES = np.concatenate([-FAR[::-1], [0.0], FAR])  # metres
 SHOVES = (-1.2, -0.6, 0.6, 1.2)  # metres that it makes way for another group
 HOPE = 0.3  # share of what that one pays that it may cost to make way at most
