@@ -12,6 +12,7 @@ from pxr import Tf, Usd, UsdGeom, UsdShade
 
 from echousd.drawables import Drawable, fans, read_drawables
 from echousd.graph import SceneGraph
+from echousd.naming import free_name
 from echousd.stage.forms import SkippedForms, is_subdivision
 from echousd.stage.read import RoomPrims, node_names, room_graph, the_room
 from echousd.stage.values import mesh_arrays
@@ -120,7 +121,7 @@ def read_surfaces(stage: Usd.Stage, *, dressing: str = "none") -> Surfaces:
     graph = room_graph(prims)
     objects, names = [], set[str]()
     for path, drawables in found.items():
-        name = _free(Tf.MakeValidIdentifier(path.rpartition("/")[2]), names)
+        name = free_name(Tf.MakeValidIdentifier(path.rpartition("/")[2]), names)
         names.add(name)
         try:
             pieces = [_piece(stage, drawable) for drawable in drawables]
@@ -201,10 +202,3 @@ def _instances(prim: Usd.Prim) -> tuple[str, ...]:
             found.append(str(prim.GetPath()))
         prim = prim.GetParent()
     return tuple(reversed(found))
-
-
-def _free(name: str, taken: set[str]) -> str:
-    free, number = name, 2
-    while free in taken:
-        free, number = f"{name}_{number}", number + 1
-    return free

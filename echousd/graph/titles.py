@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Container, Mapping
 from typing import Any
 
-from echomodel.vocabulary import UnknownWord, normalised, vocabulary
+from echomodel.vocabulary import normalised, vocabulary
 from echousd.graph.fields import IDENTIFIER, MAX_NAME
 from echousd.naming import free_name
 
@@ -44,10 +44,10 @@ def identifier_of(title: str, category: str, taken: Container[str]) -> str:
 
 def _plain_category(category: Any) -> str:
     word = normalised(category) if isinstance(category, str) else ""
-    try:
-        return vocabulary().category(word).name
-    except UnknownWord:
-        return word if IDENTIFIER.fullmatch(word) else "object"
+    row = vocabulary().known_category(word)
+    if row is not None:
+        return row.name
+    return word if IDENTIFIER.fullmatch(word) else "object"
 
 
 def name_of(word: Any, names: Mapping[str, str]) -> Any:

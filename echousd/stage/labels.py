@@ -64,10 +64,8 @@ def spaced(name: str) -> str:
 
 def known_category(word: str) -> str | None:
     """The vocabulary's name for a label, None where it has none."""
-    try:
-        return vocabulary().category(word).name
-    except UnknownWord:
-        return None
+    row = vocabulary().known_category(word)
+    return None if row is None else row.name
 
 
 def is_structure(word: str) -> bool:

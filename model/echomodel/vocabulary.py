@@ -88,6 +88,11 @@ class Vocabulary:
         """The category called `word` (name or alias, any case, spaces or hyphens); raises `UnknownWord`."""
         return self.categories[self._find("category", word)]
 
+    def known_category(self, word: str) -> Category | None:
+        """As `category`, but None for a word that the vocabulary does not hold, without looking for one like it."""
+        found = self._known("category", word)
+        return None if found is None else self.categories[found]
+
     def predicate(self, word: str) -> Predicate:
         """The predicate called `word` (name, alias or SG-FRONT spelling); raises `UnknownWord`."""
         return self.predicates[self._find("predicate", word)]
@@ -171,13 +176,15 @@ class Vocabulary:
             _known("habits", "category", (*habit.categories, *habit.anchors), categories)
             _known("habits", "predicate", (*habit.predicates, *habit.sides, *habit.among), predicates)
 
-    def _find(self, kind: str, word: str) -> int:
+    def _known(self, kind: str, word: str) -> int | None:
         index = self._index[kind]
-        if word in index:  # the canonical spelling, as in most calls
-            return index[word]
-        key = normalised(word)
-        if key in index:
-            return index[key]
+        return index[word] if word in index else index.get(normalised(word))  # the canonical spelling in most calls
+
+    def _find(self, kind: str, word: str) -> int:
+        found = self._known(kind, word)
+        if found is not None:
+            return found
+        index, key = self._index[kind], normalised(word)
         if kind == "predicate":
             for predicate in self.predicates:
                 if key in predicate.swapped:

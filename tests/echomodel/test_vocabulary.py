@@ -184,3 +184,9 @@ def test_unknown_words_name_the_nearest(ask, word, text):
     with pytest.raises(UnknownWord) as error:
         ask(word)
     assert str(error.value) == text
+
+
+def test_a_category_that_may_be_unknown():
+    known = vocabulary().known_category
+    assert known("Night Stand") is vocabulary().category("nightstand")
+    assert known("nightstnad") is known("") is None

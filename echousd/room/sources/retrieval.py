@@ -63,33 +63,25 @@ def source_of(node: Node, shapes: str) -> str:
 
 def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
     """The graph with the files of assets as absolute paths; relative ones are in `folder`."""
-    if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
-        return graph
-    nodes = (
-        node.replaced(asset=_moved(node.asset, lambda file: (folder.absolute() / file).as_posix()))
-        if node.asset is not None and is_file(node.asset)
-        else node
-        for node in graph.nodes
-    )
-    return graph.replaced(nodes=tuple(nodes))
-
-
-def _moved(asset: str, change: Callable[[str], str]) -> str:
-    file, prim = split(asset)
-    return joined(change(file), prim)
+    return _moved(graph, lambda file: (folder.absolute() / file).as_posix())
 
 
 def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
     """The graph with the files of assets relative to a room's folder, as a saved room tells them."""
-    if not any(node.asset is not None and is_file(node.asset) for node in graph.nodes):
-        return graph
-    nodes = (
-        node.replaced(asset=_moved(node.asset, lambda file: relative(Path(file), folder.absolute() / "graph")))
-        if node.asset is not None and is_file(node.asset)
-        else node
-        for node in graph.nodes
-    )
-    return graph.replaced(nodes=tuple(nodes))
+    return _moved(graph, lambda file: relative(Path(file), folder.absolute() / "graph"))
+
+
+def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
+    """The graph with the files of its assets under other names, itself where there are none."""
+
+    def node_of(node: Node) -> Node:
+        if node.asset is None or not is_file(node.asset):
+            return node
+        file, prim = split(node.asset)
+        return node.replaced(asset=joined(change(file), prim))
+
+    nodes = tuple(map(node_of, graph.nodes))
+    return graph if nodes == graph.nodes else graph.replaced(nodes=nodes)
 
 
 def given_pieces(

@@ -11,7 +11,7 @@ import numpy as np
 from echomodel.files import whole_file
 from echomodel.openings import segment, swing_area
 from echomodel.roomboxes import RoomBoxes, footprints
-from echomodel.vocabulary import UnknownWord, vocabulary
+from echomodel.vocabulary import vocabulary
 
 CELL = 2.8  # inches
 HANGING = 0.8  # metres; what hangs higher is drawn lightly
@@ -74,7 +74,5 @@ def plot_rooms(
 
 
 def _coarse(word: str) -> str | None:
-    try:
-        return vocabulary().category(word).coarse
-    except UnknownWord:
-        return None
+    row = vocabulary().known_category(word)
+    return None if row is None else row.coarse

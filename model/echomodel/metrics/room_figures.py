@@ -13,25 +13,17 @@ import numpy as np
 
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
-from echomodel.vocabulary import UnknownWord, vocabulary
+from echomodel.vocabulary import vocabulary
 
 FIVE, THREE, QUARTERS = (5, 25, 50, 75, 95), (5, 50, 95), (25, 50, 75)
-
-
-def known_category(word: str) -> str | None:
-    """The vocabulary's name for a category of any source, None where it has none."""
-    try:
-        return vocabulary().category(word).name
-    except UnknownWord:
-        return None
 
 
 def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
     """The rooms in the vocabulary's words, without the objects that it does not hold."""
     out = []
     for room in rooms:
-        names = [known_category(word) for word in room.categories]
-        keep = [k for k, name in enumerate(names) if name is not None]
+        rows = [vocabulary().known_category(word) for word in room.categories]
+        keep = [k for k, row in enumerate(rows) if row is not None]
         styles = room.styles or (-1,) * len(room)
         models = room.models or ("",) * len(room)
         out.append(
@@ -40,7 +32,7 @@ def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
                 room_type=vocabulary().room_type(room.room_type).name,
                 floor_polygon=room.floor_polygon,
                 height=room.height,
-                categories=tuple(names[k] or "" for k in keep),
+                categories=tuple(row.name for row in rows if row is not None),
                 size=room.size[keep],
                 position=room.position[keep],
                 yaw=room.yaw[keep],

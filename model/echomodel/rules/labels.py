@@ -12,7 +12,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.geometry import pairs
 from echomodel.rules.margins import _Tensors, fronts
 from echomodel.rules.sets import RuleSet, rule_set
-from echomodel.vocabulary import UnknownWord, vocabulary
+from echomodel.vocabulary import vocabulary
 
 # A label must survive the rounding of its boxes to float32 and to a tenth of a millimetre.
 SLACK = 3e-4
@@ -146,8 +146,5 @@ def _likeness(
 
 def _word(word: str, *, coarse: bool) -> str:
     """The vocabulary's word for a category of any source; words it does not hold stand for themselves."""
-    try:
-        entry = vocabulary().category(word)
-    except UnknownWord:
-        return word
-    return entry.coarse if coarse else entry.name
+    row = vocabulary().known_category(word)
+    return word if row is None else row.coarse if coarse else row.name

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from echomodel.rules.geometry import BoxesLike, pairs
 from echomodel.rules.sets import RuleSet, rule_set
-from echomodel.vocabulary import UnknownWord, vocabulary
+from echomodel.vocabulary import vocabulary
 
 
 class _Tensors:
@@ -128,10 +128,8 @@ def node_centres(position: Tensor, scene: Tensor | None, center: Tensor | None) 
 
 
 def _has_front(word: str) -> bool:
-    try:
-        return vocabulary().category(word).front
-    except UnknownWord:
-        return False
+    row = vocabulary().known_category(word)
+    return row is not None and row.front
 
 
 def _among(predicate: Tensor, ids: frozenset[int]) -> Tensor:
