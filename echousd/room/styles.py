@@ -37,6 +37,7 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     for relation in graph.relations:
         if "style" in vocabulary().predicate(relation.predicate).unites:
             alike.append((place[relation.subject], place[relation.object]))
+    alike += _rows(graph)
     alike += _sets(graph, _joined(alike, len(place)))
     group_of = _joined(alike, len(place))
     members: dict[int, list[str]] = {}
@@ -61,6 +62,19 @@ def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:
     """Number of the group of each of `count` objects, given pairs that are alike."""
     links = coo_array((np.ones(len(alike)), np.array(alike, int).reshape(-1, 2).T), shape=(count, count))
     return connected_components(links, directed=False)[1].tolist() if count else []
+
+
+def _rows(graph: SceneGraph) -> list[tuple[int, int]]:
+    """Pairs of lamps without a style that are told to hang above the same piece, in a row."""
+    place = {node.name: number for number, node in enumerate(graph.nodes)}
+    first: dict[tuple[str, str], int] = {}
+    pairs = []
+    for relation in graph.relations:
+        lamp = graph.nodes[place[relation.subject]]
+        if relation.predicate == "above" and not lamp.style and vocabulary().category(lamp.category).role == "light":
+            number = place[relation.subject]
+            pairs.append((number, first.setdefault((lamp.category, relation.object), number)))
+    return pairs
 
 
 def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
@@ -96,7 +110,7 @@ def equal_sizes(
     """(n, 3) sizes in which objects of one category and one style group are exactly alike.
 
     Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and
-    those of a set whose size is given that size.
+    those of a set whose size is given that size. Lamps of the ceiling hang as low as the lowest of them.
 
     Chairs of a table and nightstands need not be alike before: they become as large as their middle one.
 
@@ -126,6 +140,8 @@ def equal_sizes(
             out[group] = size[group].min(0)  # fits wherever one of them does
         else:
             out[group] = size[group[int(size[group].prod(1).argmin())]]
+        if not given and vocabulary().category(categories[first]).support == "ceiling":
+            out[group, 1] = size[group, 1].max()  # the one that has to reach down furthest
     return out
 
 

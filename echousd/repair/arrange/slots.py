@@ -96,7 +96,7 @@ def at_front(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
         for lateral in (0.0, -0.12, 0.12, -0.3, 0.3):
             if abs(lateral) < anchor[0] / 2:
                 out.append((lateral, anchor[2] / 2 + own[2] / 2 - min(tucked, 0.6 * own[2]), math.pi,
-                            push + 0.8 * abs(lateral)))  # fmt: skip
+                            push + 2.0 * abs(lateral)))  # fmt: skip
     return out
 
 

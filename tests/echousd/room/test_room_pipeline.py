@@ -61,6 +61,16 @@ def test_sizes_of_what_is_told_alike_become_equal():
     np.testing.assert_allclose(equal_sizes(*args[:2], dict.fromkeys("abc", "room"), size, free), size)
     tall = np.array([[1.0, 0.4, 1], [0.4, 2, 1]])
     np.testing.assert_allclose(equal_sizes(["a", "b"], ["stool"] * 2, args[2], tall, free[:2]), [tall[0]] * 2)
+    long = np.array([[0.4, 0.8, 0.4], [0.42, 1.2, 0.4]])  # two pendants, of which one has to reach further down
+    np.testing.assert_allclose(equal_sizes(["a", "b"], ["pendant_lamp"] * 2, args[2], long, free[:2])[:, 1], 1.2)
+
+
+def test_lamps_in_a_row_and_twin_beds_are_of_one_style():
+    kinds = {"table": "table", **dict.fromkeys("abc", "pendant_lamp"), "l": "single_bed", "r": "single_bed"}
+    objects = "".join(f"{name}: {kind}, " for name, kind in kinds.items())
+    text = f"room: bedroom\nobjects: {{{objects}}}\nrelations: [a above table, b above table, c above l]"
+    found = style_groups(SceneGraph.from_yaml(text))
+    assert found == {"table": "room", "a": "set_a", "b": "set_a", "c": "room", "l": "set_l", "r": "set_l"}
 
 
 def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
