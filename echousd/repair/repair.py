@@ -11,9 +11,9 @@ import numpy as np
 
 from echomodel.openings import Opening
 from echomodel.rules.living import plan_of
-from echomodel.rules.living.sizes import fitting_loads, hung_lamps, laid_tables, usual_sizes
+from echomodel.rules.living.sizes import fitting_loads, hung_lamps, laid_tables, smaller_sizes, usual_sizes
 from echomodel.vocabulary import vocabulary
-from echousd.repair.arrange import arrange, setting_of
+from echousd.repair.arrange import BAD, arrange, setting_of
 from echousd.repair.overhead import lamps_along
 from echousd.repair.placements import stated_placements
 from echousd.repair.problem import Posed, pose, stacked
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
+WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
 UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
 DEFAULT_HEIGHT = 2.8
@@ -224,9 +225,18 @@ def repair_boxes(
         at = posed(np.where(rigid[:, None], size, usual), position, yaw)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         free = ~rigid & ~np.isin(np.arange(n), told)
-        laid = laid_tables(at.problem.categories, at.size, anchor, free)
-        at = replace(at, size=fitting_loads(at.problem.categories, laid, at.problem.carrier, free))
+
+        def suited(to: Posed, size: np.ndarray) -> Posed:
+            laid = laid_tables(to.problem.categories, size, anchor, free)
+            return replace(to, size=fitting_loads(to.problem.categories, laid, to.problem.carrier, free))
+
+        at = suited(at, at.size)
         chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
+        if chosen.paid.max(initial=0.0) > BAD:  # too full, perhaps
+            less = suited(at, smaller_sizes(at.problem.categories, at.size, free))
+            other = arrange(setting_of(less, turned, openings=openings, outline=floor_polygon))
+            if other.total < chosen.total - WORTH:
+                at, chosen = less, other
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw)
     found = solve(at, config)

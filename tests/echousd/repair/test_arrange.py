@@ -174,6 +174,23 @@ def test_chairs_are_not_squeezed_where_there_is_room_at_the_other_side():
     assert 2.4 - np.abs(position[1:, [0, 2]]).max() - 0.25 > 0.4
 
 
+def test_in_a_room_that_is_too_full_furniture_is_smaller():
+    words = ["double_bed", "nightstand", "nightstand", "wardrobe", "tv_stand", "armchair"]
+    size = [(2.0, 1, 2.3), (0.6, 0.5, 0.5), (0.6, 0.5, 0.5), (2.2, 2.2, 0.65), (2.4, 0.5, 0.5), (0.95, 0.9, 0.95)]
+    drawn = [(-0.3, 0, 0.2), (-1.4, 0, -1.2), (0.8, 0, -1.2), (1.3, 0, 1.2), (-1.0, 0, 1.4), (1.2, 0, -0.4)]
+    floor = np.array([(-1.8, -1.7), (1.8, -1.7), (1.8, 1.7), (-1.8, 1.7)])
+    none = np.zeros((0, 3), int)
+    done = repair_boxes(words, np.array(size, float), np.array(drawn, float), np.zeros(6), none, floor_polygon=floor)
+    assert (done.size[:, [0, 2]] <= np.array(size)[:, [0, 2]] + 0.01).all()
+    assert done.size[4, 0] < 2.2
+    assert not done.collisions
+    stated = repair_boxes(
+        words, np.array(size, float), np.array(drawn, float), np.zeros(6), none, floor_polygon=floor,
+        rigid=np.ones(6, bool),
+    )  # fmt: skip
+    np.testing.assert_allclose(stated.size, size)  # the graph comes first
+
+
 def test_a_pendant_follows_its_table_and_a_flush_lamp_hangs_in_the_middle():
     words = ["dining_table", "pendant_lamp", "double_bed", "ceiling_lamp"]
     size = [(1.6, 0.75, 0.9), (0.5, 0.8, 0.5), (1.8, 1.0, 2.1), (0.5, 0.15, 0.5)]

@@ -22,6 +22,7 @@ TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at
 LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
 PLACE, SPARE = 0.55, 0.8  # metres of a table's side for each chair there, and in all beside that, at most
 ALONE = 0.8  # metres, width of a lamp that hangs over nothing
+SHRUNK = 0.85  # of its width and depth: what a piece becomes at the least where the room is too full for it
 
 
 @cache
@@ -53,6 +54,23 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
         middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
         most = [middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends]
         out[number] = np.clip(size[number], *np.where(lenient[number], (low, high), most))
+    return out
+
+
+def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(n, 3) float: sizes of what a person would choose for a room that is too full: less wide and deep, yet usual.
+
+    Arguments:
+        categories: n words. size: (n, 3) float, metres. free: (n,) bool, sizes that may change.
+    """
+    out = size.copy()
+    for i in np.flatnonzero(free).tolist():
+        kind = kind_of(categories[i])
+        if kind.name and kind.support == "floor":
+            table = size_statistics(kind.name)
+            least = np.array([side[0] for side in kind.usual]) if kind.usual else np.sqrt(table.low * table.median)
+            out[i] = np.minimum(size[i], np.maximum(SHRUNK * size[i], least))
+    out[:, 1] = size[:, 1]
     return out
 
 
