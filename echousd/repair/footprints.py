@@ -18,6 +18,7 @@ PLAN = [0, 2]  # columns of x and z
 SIDES = np.array([-1.0, 1.0])
 HAIR = 1e-9  # metres by which the second footprint grows, so that of two edges that coincide only one counts
 TINY = 1e-6  # metres
+NO_SLOPES = np.zeros((0, 2, COLUMNS))  # in place of gradients that nobody asks for
 
 Values = tuple[np.ndarray, np.ndarray]
 
@@ -32,6 +33,7 @@ class Pairs:
         half: (p, 2, 2) float, metres, half of the side along each of them.
         columns: columns of the gradient that hold the logarithms of these two sides.
         fronts: (p,) bool, pairs in which both have a front; None = in none.
+        slopes: False where nobody asks for gradients; those that take time are `NO_SLOPES` then.
     """
 
     size: np.ndarray
@@ -40,6 +42,7 @@ class Pairs:
     half: np.ndarray
     columns: tuple[int, int]
     fronts: np.ndarray | None = None
+    slopes: bool = True
 
     def __len__(self) -> int:
         return len(self.size)
@@ -47,12 +50,13 @@ class Pairs:
     def take(self, rows: np.ndarray) -> Pairs:
         """The pairs of these numbers."""
         fronts = None if self.fronts is None else self.fronts[rows]
-        return Pairs(self.size[rows], self.position[rows], self.axis[rows], self.half[rows], self.columns, fronts)
+        of = (self.size, self.position, self.axis, self.half)
+        return Pairs(*(value[rows] for value in of), self.columns, fronts, self.slopes)
 
     def swapped(self) -> Pairs:
         """The same pairs, the second box first."""
         size, position, axis, half = (value[:, ::-1] for value in (self.size, self.position, self.axis, self.half))
-        return Pairs(size, position, axis, half, self.columns, self.fronts)
+        return Pairs(size, position, axis, half, self.columns, self.fronts, self.slopes)
 
     def flat(self) -> np.ndarray:
         """(p, 2) float: in x and z from the second box to the first, metres."""
@@ -64,7 +68,7 @@ class Pairs:
 
     def zeros(self) -> np.ndarray:
         """(p, 2, 6) float, a gradient to be filled."""
-        return np.zeros((len(self), 2, COLUMNS))
+        return np.zeros((len(self), 2, COLUMNS)) if self.slopes else NO_SLOPES
 
 
 def pairs_of(
@@ -169,6 +173,8 @@ def corner_distance(pair: Pairs) -> Values:
     away[:, PLAN] = apart[r, chosen[:, 0], chosen[:, 1]]
     away[:, 1] = rise[r, level[:, 0], level[:, 1]]
     distance = np.maximum(np.linalg.norm(away, axis=1), TINY)
+    if not pair.slopes:
+        return distance, NO_SLOPES
     away /= distance[:, None]
     gradient = pair.zeros()
     for end, sign in ((FIRST, 1.0), (SECOND, -1.0)):
@@ -190,6 +196,8 @@ def penetration(pair: Pairs) -> Values:
     cosine = np.abs(np.einsum("pad,pekd->paek", axis, pair.axis))
     reach = (cosine * pair.half[:, None]).sum((2, 3))
     best = (np.abs(along) - reach).argmax(1)
+    if not pair.slopes:
+        return (reach - np.abs(along))[r, best], NO_SLOPES
     push = np.where(along[r, best] < 0, 1.0, -1.0)[:, None] * axis[r, best]
     gradient = pair.zeros()
     gradient[:, FIRST, PLAN], gradient[:, SECOND, PLAN] = push, -push
@@ -203,6 +211,8 @@ def centre_inside(pair: Pairs) -> Values:
     local = np.einsum("pkd,pd->pk", pair.axis[:, SECOND], pair.flat())
     room = pair.half[:, SECOND] - np.abs(local)
     best = room.argmin(1)
+    if not pair.slopes:
+        return room[r, best], NO_SLOPES
     push = -np.sign(local[r, best])[:, None] * pair.axis[r, SECOND, best]
     gradient = pair.zeros()
     gradient[:, FIRST, PLAN], gradient[:, SECOND, PLAN] = push, -push
@@ -224,6 +234,8 @@ def mirror_distance(pair: Pairs, *, images: Sequence[int]) -> Values:
     best = np.square(away).sum(-1).argmin(1)
     away = away[r, best]
     distance = np.maximum(np.linalg.norm(away, axis=1), TINY)
+    if not pair.slopes:
+        return distance, NO_SLOPES
     away /= distance[:, None]
     gradient = pair.zeros()
     gradient[:, FIRST, PLAN], gradient[:, SECOND, PLAN] = signs[best] * away, -away

@@ -8,6 +8,7 @@ twelve times as long; any other predicate's gradient is torch's.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from echomodel.vocabulary import Predicate, vocabulary
 from echousd.repair.footprints import (
     FIRST,
+    PLAN,
     SECOND,
     Pairs,
     Values,
@@ -26,10 +28,12 @@ from echousd.repair.footprints import (
     pairs_of,
     penetration,
 )
-from echousd.repair.geometry import COLUMNS
+from echousd.repair.geometry import COLUMNS, axes
 
 if TYPE_CHECKING:
     from echomodel.rules.sets import RuleSet
+
+Family = Callable[[Pairs, Sequence[Predicate], bool], Values]
 
 
 def relation_margins(
@@ -78,6 +82,67 @@ def relation_margins(
     return value, gradient
 
 
+def margins_at(
+    i: int,
+    poses: tuple[np.ndarray, np.ndarray],
+    triplets: np.ndarray,
+    size: np.ndarray,
+    position: np.ndarray,
+    yaw: np.ndarray,
+    *,
+    rules: str,
+    centre: np.ndarray,
+    fronts: np.ndarray,
+) -> np.ndarray:
+    """(K, e) float: the margins of relations of box i with it at each of K poses and all others where they are.
+
+    Arguments:
+        poses: position (K, 3) and yaw (K,) of box i. triplets: (e, 3) int, box i at one end of each.
+        The others as `relation_margins`.
+    """
+    from echomodel.rules import sets
+
+    told = sets.rule_set(rules)
+    strict, count, row = told is sets.STRICT, len(poses[1]), np.arange(len(triplets))
+    mine = np.where(triplets[:, 0] == i, FIRST, SECOND)
+    other = triplets[row, np.where(mine == FIRST, 2, 0)]
+
+    def paired(own: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+        out = np.empty((count, len(row), 2, *theirs.shape[1:]))
+        out[:, row, mine], out[:, row, 1 - mine] = own[:, None], theirs
+        return out
+
+    sizes, turn = paired(size[i : i + 1], size[other]), paired(poses[1], yaw[other])
+    middle = np.array((centre[0], 0.0, centre[1]))
+    places = paired(poses[0] - middle, position[other] - middle)
+    axis = paired(axes(poses[1]), axes(yaw[other])) if told.oriented else axes(np.zeros(turn.size))
+    half = 0.5 * sizes[..., PLAN if told.oriented else PLAN[::-1]]
+    every = Pairs(
+        sizes.reshape(-1, 2, 3), places.reshape(-1, 2, 3), axis.reshape(-1, 2, 2, 2), half.reshape(-1, 2, 2),
+        (3, 5) if told.oriented else (5, 3), np.tile(fronts[i] & fronts[other], count),
+    )  # fmt: skip
+    value, words = np.zeros((count, len(row))), vocabulary().predicates
+    relations = [words[number] for number in triplets[:, 1].tolist()]
+    families: dict[Family | str, list[int]] = {}
+    for number, relation in enumerate(relations):
+        if _measured(told, relation):
+            looks = "looks" if strict and relation.name == "facing" else "torch"
+            families.setdefault(CLOSED.get(relation.name, looks), []).append(number)
+    for family, columns in families.items():
+        if not isinstance(family, str):
+            chosen = (len(row) * np.arange(count)[:, None] + columns).ravel()
+            pair = replace(every.take(chosen), slopes=family not in ALONE)
+            found, _ = family(pair, [relations[number] for number in columns] * count, strict)
+        else:
+            where = paired(poses[0], position[other])[:, columns].reshape(-1, 3)
+            boxes = sizes[:, columns].reshape(-1, 3), where, turn[:, columns].ravel()
+            ends = np.arange(0, 2 * count * len(columns), 2)
+            pairs = np.stack([ends, np.tile(triplets[columns, 1], count), ends + 1], 1)
+            found = _facing(*boxes, pairs) if family == "looks" else _automatic(boxes, pairs, rules, centre, False)[0]
+        value[:, columns] = found.reshape(count, -1)
+    return value
+
+
 def _measured(told: RuleSet, relation: Predicate) -> bool:
     rule = told.rules.get(relation.name)
     return rule is not None and rule.margin is not None
@@ -99,7 +164,8 @@ def _larger_of(one: Values, two: Values) -> Values:
 
 
 def _where(chosen: np.ndarray, one: Values, two: Values) -> Values:
-    return np.where(chosen, one[0], two[0]), np.where(chosen[:, None, None], one[1], two[1])
+    value = np.where(chosen, one[0], two[0])
+    return (value, np.where(chosen[:, None, None], one[1], two[1])) if len(one[1]) else (value, one[1])
 
 
 def _automatic(
@@ -194,16 +260,17 @@ def _standing_on(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> V
     from echomodel.rules.sets import TOUCH
 
     value, gradient = _rise(pair, to_top=strict)
-    level = TOUCH - np.abs(value), -np.sign(value)[:, None, None] * gradient
+    level = TOUCH - np.abs(value), -np.sign(value)[:, None, None] * gradient if pair.slopes else gradient
     return _smaller(level, centre_inside(pair)) if strict else level
 
 
 def _rise(pair: Pairs, *, to_top: bool) -> Values:
     """Height of the subject's bottom over the object's top, or over its bottom."""
     gradient = pair.zeros()
-    gradient[:, FIRST, 1], gradient[:, SECOND, 1] = 1.0, -1.0
-    if to_top:
-        gradient[:, SECOND, 4] = -pair.size[:, SECOND, 1]
+    if pair.slopes:
+        gradient[:, FIRST, 1], gradient[:, SECOND, 1] = 1.0, -1.0
+        if to_top:
+            gradient[:, SECOND, 4] = -pair.size[:, SECOND, 1]
     return pair.position[:, FIRST, 1] - (pair.top() if to_top else pair.position[..., 1])[:, SECOND], gradient
 
 
@@ -236,7 +303,7 @@ def _larger(
     return sign * ratio - needed, (sign / base)[:, None, None] * (weight[..., None] * gradient)
 
 
-CLOSED: dict[str, Callable[[Pairs, Sequence[Predicate], bool], Values]] = {
+CLOSED: dict[str, Family] = {
     **dict.fromkeys(("left", "right", "front", "behind"), _beside),
     "close_by": _close,
     "above": _above,
@@ -245,3 +312,4 @@ CLOSED: dict[str, Callable[[Pairs, Sequence[Predicate], bool], Values]] = {
     **dict.fromkeys(("taller_than", "shorter_than"), _tops),
     "symmetrical_to": _symmetrical,
 }
+ALONE = (_close, _above, _standing_on, _symmetrical)  # whose values can be had without their gradients

@@ -235,8 +235,12 @@ def finished_boxes(
     from echousd.repair import repair as repaired
     from echousd.repair.living import living_faults
 
+    judged: dict[int, tuple[int, ...]] = {}
+
     def wrong(one: RepairResult) -> tuple[int, ...]:
-        return len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
+        if id(one) not in judged:
+            judged[id(one)] = len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
+        return judged[id(one)]
 
     graph = _with_homeless_unlocked(graph)
     with timer.stage("repair"), one_thread():
@@ -247,7 +251,8 @@ def finished_boxes(
             fixed = with_sizes(graph, same)
             second = repaired(fixed, same, config=RepairConfig(arrange=False))
             if wrong(second) > wrong(found):
-                second = min(second, repaired(fixed, same), key=wrong)
+                third = repaired(fixed, same)  # both are held, as they are known by their ids
+                second = min(second, third, key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
     return rounded_boxes(graph, found.boxes), found.conflicts

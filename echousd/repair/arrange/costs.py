@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from echousd.repair.arrange.outlook import missing, unseen
 from echousd.repair.arrange.overlaps import beyond, depths
 from echousd.repair.arrange.setting import Poses, Setting, State, Zones
 from echousd.repair.placements import placement_margins_at
-from echousd.repair.relations import relation_margins
+from echousd.repair.relations import margins_at
 
 HIT, DEEP = 8.0, 30.0  # for running into something at all, and per metre
 BROKEN, FAR = 12.0, 6.0  # for a broken relation at all, and per metre or ratio that it is missed by
@@ -36,6 +37,7 @@ AHEAD, SPOILT = 1.25, 1.6  # metres before a sofa that other groups leave to its
 TAKEN, BEFORE_SHELVES = 0.8, 0.8  # metres to stand before shelves and cupboards, and for a piece in there
 GLARE = 0.2  # metres of a stand before a window
 SLACK = 0.01  # metres or ratio by which relations are to hold
+NO_ZONES = Zones(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, int))
 
 
 def least(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarray:
@@ -121,25 +123,25 @@ def price(
 
 
 def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.ndarray) -> np.ndarray:
-    doors = setting.doors
-    out = (np.maximum(depths(setting.size[i], poses, doors.size, doors.position, doors.yaw), 0) > 0.04) @ doors.price
-    if setting.stances[i] == "opposite":  # a screen
-        light = setting.windows
-        out += (depths(setting.size[i], poses, light.size, light.position, light.yaw) > GLARE) @ light.price
-    strangers = [j for j in others if not setting.at_home[i, j]]
-    zones = fronts(setting, state, strangers)
-    deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
-    out = out + (deep > 0.03) @ zones.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
-    home = [j for j in others if setting.at_home[i, j]]
+    at_home, near = setting.at_home[i].tolist(), others.tolist()
+    home = [j for j in near if at_home[j]]
     circle = [j for j in home if setting.stances[j] not in TABLES]
-    if setting.stances[i] not in TABLES:  # of its own group's seats it leaves the knees free
-        zones = fronts(setting, state, [j for j in circle if setting.kinds[j].role in ("sofa", "seat")])
-        deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
-        out = out + ELBOWS * (deep > ELBOW).sum(1)
-    elif setting.stances[i] == "before":  # and a table those of a second sofa
-        zones = fronts(setting, state, [j for j in circle if setting.stances[j] == "with"])
-        deep = depths(setting.size[i], poses, zones.size, zones.position, zones.yaw)
-        out = out + ELBOWS * (deep > TUCKED).sum(1)
+    # of its own group's seats it leaves the knees free, and a table those of a second sofa
+    kept_free: list[int] = []
+    if setting.stances[i] not in TABLES:
+        kept_free = [j for j in circle if setting.kinds[j].role in ("sofa", "seat")]
+    elif setting.stances[i] == "before":
+        kept_free = [j for j in circle if setting.stances[j] == "with"]
+    strangers = [j for j in near if not at_home[j]]
+    doors, strange = setting.doors, fronts(setting, state, strangers)
+    light = setting.windows if setting.stances[i] == "opposite" else NO_ZONES  # of a screen
+    own = fronts(setting, state, kept_free)
+    at_door, glare, before, knees = _depths_of(setting.size[i], poses, (doors, light, strange, own))
+    out = (np.maximum(at_door, 0) > 0.04) @ doors.price
+    out += (glare > GLARE) @ light.price
+    out = out + (before > 0.03) @ strange.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
+    if kept_free:
+        out = out + ELBOWS * (knees > (TUCKED if setting.stances[i] == "before" else ELBOW)).sum(1)
     front = own_front(setting, i)
     if front is None:
         return out
@@ -147,17 +149,16 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
         out = out + _spoilt(setting, state, i, poses, strangers)
     size, forward = front
     ahead = Poses(poses.position + forward * _front(poses.yaw), poses.yaw, poses.price)
-    if setting.kinds[i].role in ("sofa", "seat"):
-        deep = depths(size, ahead, setting.size[circle], state.position[circle], state.yaw[circle])
-        out = out + ELBOWS * (deep > ELBOW).sum(1)
-    if setting.stances[i] == "with":
-        low = [j for j in home if setting.stances[j] == "before"]
-        deep = depths(size, ahead, setting.size[low], state.position[low], state.yaw[low])
-        out = out + ELBOWS * (deep > TUCKED).sum(1)
-    solid = [j for j in others if setting.standing(j) and not setting.movable[j]]
-    solid = [j for j in solid if not setting.at_home[i, j]]
-    depth = depths(size, ahead, setting.size[solid], state.position[solid], state.yaw[solid])
-    out = out + BLOCKED * (depth > 0.03).sum(1)
+    seated = circle if setting.kinds[i].role in ("sofa", "seat") else []
+    low = [j for j in home if setting.stances[j] == "before"] if setting.stances[i] == "with" else []
+    solid = [j for j in strangers if setting.standing(j) and not setting.movable[j]]
+    every = [*seated, *low, *solid]
+    deep = depths(size, ahead, setting.size[every], state.position[every], state.yaw[every])
+    parts = deep[:, : len(seated)], deep[:, len(seated) : len(every) - len(solid)], deep[:, len(every) - len(solid) :]
+    for part, allowed in zip(parts, (ELBOW, TUCKED), strict=False):
+        if part.shape[1]:
+            out = out + ELBOWS * (part > allowed).sum(1)
+    out = out + BLOCKED * (parts[2] > 0.03).sum(1)
     return out + BLOCKED * (beyond(setting, size, ahead) > 0.05)
 
 
@@ -177,6 +178,13 @@ def _ahead_of(setting: Setting, i: int, depth: float) -> tuple[np.ndarray, float
     return size, float(setting.size[i, 2] / 2 + depth / 2 + 0.005)
 
 
+def _depths_of(size: np.ndarray, poses: Poses, zones: Sequence[Zones]) -> list[np.ndarray]:
+    """(K, z) float for each of some zones: how deep a box (3,) at each pose runs into them, metres."""
+    counts = [len(one.yaw) for one in zones]
+    joined = [np.concatenate([getattr(one, name) for one in zones]) for name in ("size", "position", "yaw")]
+    return np.split(depths(size, poses, *joined), np.cumsum(counts)[:-1], axis=1)
+
+
 def own_front(setting: Setting, i: int) -> tuple[np.ndarray, float] | None:
     """Size (3,) of the space before a front and how far before the box's centre its own centre is; None = no front."""
     depth, role = 0.75 * setting.kinds[i].access, setting.kinds[i].role
@@ -193,7 +201,7 @@ def fronts(setting: Setting, state: State, boxes: list[int]) -> Zones:
         waits = bool(setting.laid[j]) and bool((setting.seats & (setting.anchor == j) & ~state.placed).any())
         key = (j, waits, *state.position[j].tolist(), float(state.yaw[j]))
         if key not in state.zones:
-            state.zones[key] = _zones_of(setting, state, j)
+            state.zones[key] = [tuple(map(float, row)) for row in _zones_of(setting, state, j)]
         rows += state.zones[key]
     table = np.array(rows, float).reshape(-1, 9)
     return Zones(table[:, :3], table[:, 3:6], table[:, 6], table[:, 7], table[:, 8].astype(int))
@@ -313,15 +321,8 @@ def _misplaced(setting: Setting, state: State, i: int, poses: Poses) -> np.ndarr
 
 def _missed(setting: Setting, state: State, i: int, poses: Poses, told: np.ndarray) -> np.ndarray:
     """(K, r): by how much relations `told` (r, 3) are missed with box i at each pose, the others as they are so far."""
-    count, n = len(poses), len(setting.size)
-    every = np.concatenate([np.arange(n), np.full(count, i)])
-    position = np.concatenate([state.position, poses.position])
-    yaw = np.concatenate([state.yaw, poses.yaw])
-    rows = np.empty((count, *told.shape), told.dtype)
-    rows[:] = told
-    rows[:, (told == i) & [True, False, True]] = n + np.arange(count)[:, None]
-    margin, _ = relation_margins(
-        setting.size[every], position, yaw, rows.reshape(-1, 3), rules=setting.rules, centre=setting.centre,
-        fronts=setting.fronts[every], slopes=False,
+    margin = margins_at(
+        i, (poses.position, poses.yaw), told, setting.size, state.position, state.yaw, rules=setting.rules,
+        centre=setting.centre, fronts=setting.fronts,
     )  # fmt: skip
-    return np.maximum(SLACK - margin.reshape(count, -1), 0.0)
+    return np.maximum(SLACK - margin, 0.0)

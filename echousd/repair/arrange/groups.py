@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair.arrange.costs import price
+from echousd.repair.arrange.costs import least, price
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.spread import bareness, bareness_of
 
@@ -45,12 +45,14 @@ def slide_groups(setting: Setting, state: State, own: np.ndarray) -> None:
         if before < GAIN:
             continue
         for way in _ways(setting, state, int(setting.group[members[0]])):
-            for shift in (_best_slide(setting, state, members, own, way), _mirror_slide(setting, state, members, way)):
+            for slide in (_best_slide, _mirror_slide):
+                shift = slide(setting, state, members, own, way, before - GAIN)
                 if not shift.any():
                     continue
                 kept = state.position[members].copy()
                 state.position[members] += shift
-                after = _bill(setting, state, members, own) + bareness(setting, state)
+                after = _bill(setting, state, members, own, before - GAIN)
+                after += bareness(setting, state) if after < before - GAIN else 0.0
                 if after < before - GAIN:
                     before = after
                 else:
@@ -76,10 +78,11 @@ def make_way(setting: Setting, state: State, own: np.ndarray) -> None:
     best, found = cramped + there - GAIN, kept
     for way, step in product(_ways(setting, state, int(setting.group[others[0]])), SHOVES):
         state.position[others] += step * way
-        if _bill(setting, state, others, own) < there + HOPE * cramped:
+        if _bill(setting, state, others, own, there + HOPE * cramped) < there + HOPE * cramped:
             for own_way in _ways(setting, state, int(setting.group[members[0]])):
                 state.position[members] += _best_slide(setting, state, members, own, own_way)
-            after = _bill(setting, state, others, own) + _bill(setting, state, members, own)
+            after = _bill(setting, state, others, own, best)
+            after += _bill(setting, state, members, own, best - after) if after < best else 0.0
             if after < best:
                 best, found = after, state.position.copy()
         state.position[:] = kept
@@ -99,8 +102,14 @@ def _groups(setting: Setting) -> list[np.ndarray]:
     return [members for members in found if len(members) > 1]
 
 
-def _bill(setting: Setting, state: State, members: np.ndarray, own: np.ndarray) -> float:
-    return sum(paid_by(setting, state, int(i), own) for i in members)
+def _bill(setting: Setting, state: State, members: np.ndarray, own: np.ndarray, below: float = np.inf) -> float:
+    """What boxes pay together; infinite where that is certainly not below a bound, which some of them may tell."""
+    out = 0.0
+    for i in members.tolist():
+        out += paid_by(setting, state, i, own)
+        if out >= below:
+            return np.inf
+    return out
 
 
 def _ways(setting: Setting, state: State, root: int) -> list[np.ndarray]:
@@ -112,22 +121,33 @@ def _ways(setting: Setting, state: State, root: int) -> list[np.ndarray]:
     return [side, np.array([np.sin(yaw), 0.0, np.cos(yaw)])]
 
 
-def _best_slide(setting: Setting, state: State, members: np.ndarray, own: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """(3,) float: the slide along a way that costs the members least among all others."""
-    state.placed[members], state.along[members] = False, True
-    total = bareness_of(setting, state, members, SLIDES[:, None] * way)
-    for i in members.tolist():
-        poses = Poses(
+def _best_slide(
+    setting: Setting, state: State, members: np.ndarray, own: np.ndarray, way: np.ndarray, below: float = np.inf
+) -> np.ndarray:
+    """(3,) float: the slide along a way that costs the members least among all others; none where it cannot cost less
+    than `below`."""
+    slid = [
+        Poses(
             state.position[i] + SLIDES[:, None] * way,
             np.full(len(SLIDES), state.yaw[i]),
             np.full(len(SLIDES), own[i]) + 0.0,
         )
+        for i in members.tolist()
+    ]
+    floor = sum((least(setting, state, i, poses) for i, poses in zip(members.tolist(), slid, strict=True)), np.zeros(1))
+    if not (floor[SLIDES != 0] < below).any():
+        return np.zeros(3)
+    state.placed[members], state.along[members] = False, True
+    total = bareness_of(setting, state, members, SLIDES[:, None] * way)
+    for i, poses in zip(members.tolist(), slid, strict=True):
         total += price(setting, state, i, poses)
     state.placed[members], state.along[members] = True, False
     return SLIDES[int(total.argmin())] * way
 
 
-def _mirror_slide(setting: Setting, state: State, members: np.ndarray, way: np.ndarray) -> np.ndarray:
+def _mirror_slide(
+    setting: Setting, state: State, members: np.ndarray, own: np.ndarray, way: np.ndarray, below: float
+) -> np.ndarray:
     """(3,) float: the slide along a way that brings two members which mirror each other to the room's middle."""
     mirrors = vocabulary().predicate_id("symmetrical_to")
     told = setting.triplets[setting.triplets[:, 1] == mirrors][:, [0, 2]]

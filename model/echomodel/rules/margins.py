@@ -103,14 +103,15 @@ def _margins(
     out = boxes.size.new_zeros(len(triplets))
     headed = None if fronts is None else torch.as_tensor(fronts, device=boxes.size.device)
     placed = boxes.of_fixed_size() if rigid else boxes
-    sizes = {entry.id for entry in vocabulary().predicates if entry.measures == "size"}  # all others are of place
-    for predicate, rule in rules.margins.items():
-        chosen = (triplets[:, 1] == predicate).nonzero()[:, 0]
-        if len(chosen):
+    words, told = vocabulary().predicates, triplets[:, 1]
+    there = {words[number].name: words[number] for number in sorted(set(told.tolist())) if 0 <= number < len(words)}
+    for name, rule in rules.rules.items():  # in their order, so that gradients add up in one
+        if name in there and rule.margin is not None:
+            chosen = (told == there[name].id).nonzero()[:, 0]
             subject, object_ = triplets[chosen, 0], triplets[chosen, 2]
-            of = boxes if predicate in sizes else placed
+            of = boxes if there[name].measures == "size" else placed  # all others are of place
             pair = pairs(of, subject, object_, centre, oriented=rules.oriented, fronts=headed)
-            out = out.index_copy(0, chosen, rule(pair))
+            out = out.index_copy(0, chosen, rule.margin(pair))
     return out
 
 

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from echomodel.floors import known, signed_distance
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
-from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.found import Found, found, nobody, worst
 from echomodel.rules.living.plan import Plan
 
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
@@ -56,6 +56,8 @@ def bed_side_free(plan: Plan) -> Found:
     """At least one long side of a bed can be reached, below the nightstands."""
     beds = plan.of("bed") & plan.standing
     who = beds.nonzero()[:, 0]
+    if not len(who):
+        return nobody(plan.size)
     i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
@@ -98,8 +100,7 @@ def _before_openings(plan: Plan, *, window: bool) -> Found:
             who = ((plan.scene == scene) & (plan.standing | (~window & _hangs_low(plan)))).nonzero()[:, 0]
             rows.append((who, _clearance(plan, who, polygon, opening), number))
     if not rows:
-        none = torch.zeros(0, dtype=torch.int64)
-        return found(none, plan.size.new_zeros(0))
+        return nobody(plan.size)
     who = torch.cat([row[0] for row in rows])
     margin = torch.cat([row[1] for row in rows])
     about = torch.cat([torch.full_like(row[0], row[2]) for row in rows])

@@ -7,7 +7,7 @@ import math
 import torch
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, joined, worst
+from echomodel.rules.living.found import Found, found, joined, nobody, worst
 from echomodel.rules.living.plan import FAR, Plan
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
@@ -31,8 +31,11 @@ def chairs_even(plan: Plan) -> Found:
     """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
     i, j = plan.attended("at", "foot")
     tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
-    keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
+    i, j = i[tables[j]], j[tables[j]]
+    keep = plan.apart(i, j).detach() < AROUND
     i, j = i[keep], j[keep]
+    if not len(i):
+        return nobody(plan.size)
     places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
     count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, places)
     lateral, forward = plan.local(i, j)
@@ -50,8 +53,11 @@ def chairs_opposite(plan: Plan) -> Found:
     """Where both sides of a table have as many chairs, each has another one opposite."""
     i, j = plan.attended("at", "foot")
     tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
-    keep = tables[j] & (plan.apart(i, j).detach() < AROUND)
+    i, j = i[tables[j]], j[tables[j]]
+    keep = plan.apart(i, j).detach() < AROUND
     i, j = i[keep], j[keep]
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half = plan.size[j][:, [0, 2]].detach() / 2
     ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
@@ -71,6 +77,8 @@ def chairs_opposite(plan: Plan) -> Found:
 def sofas_in_circle(plan: Plan) -> Found:
     """A second sofa looks into the group of the first."""
     i, j = plan.attended("with")
+    if not len(i):
+        return nobody(plan.size)
     near = plan.apart(i, j).detach() < NEAR
     i, j = i[near], j[near]
     ahead = plan.size[j, 2] / 2 + BEFORE
@@ -88,6 +96,8 @@ def at_its_side(plan: Plan) -> Found:
     keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
     chairs = (plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa")).nonzero()[:, 0]
     i, j = torch.cat([i[keep], chairs]), torch.cat([j[keep], plan.group[chairs]])
+    if not len(i):
+        return nobody(plan.size)
     armchair = plan.stands("company")[i]
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)

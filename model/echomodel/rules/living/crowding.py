@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, joined, worst
+from echomodel.rules.living.found import Found, found, joined, nobody, worst
 from echomodel.rules.living.plan import FAR, Plan
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
@@ -63,6 +63,8 @@ def _gap_to(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
 def chair_pulls_out(plan: Plan) -> Found:
     """A chair can be moved back from its table or desk."""
     i, j = plan.attended("at")
+    if not len(i):
+        return nobody(plan.size)
     near = plan.apart(i, j).detach() < 0.5
     who = i[near & ~plan.which(lambda kind: kind.solid)[i]]
     block = plan.of("board", "bed", "storage", "sofa") & plan.standing
@@ -142,6 +144,8 @@ def lamp_aside(plan: Plan) -> Found:
     """Lamps and plants do not stand before shelves, cupboards and drawers."""
     fronts = plan.of("storage") & plan.standing & plan.which(lambda kind: kind.access > 0)
     i, j = plan.pairs(plan.of("light", "decor") & plan.standing, fronts)
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     clear = forward - half_depth - plan.size[j, 2] / 2
@@ -173,6 +177,8 @@ def _clear(
     behind: bool = False, kin: bool = False,
 ) -> Found:  # fmt: skip
     """How much more than is needed is free before (or behind) some boxes, to other groups' pieces (or their own)."""
+    if not len(who):
+        return nobody(plan.size)
     sign = -1.0 if behind else 1.0
     needed, needed_wall = (torch.zeros_like(plan.yaw) + value for value in (needed, needed_wall))
     mask = torch.zeros(len(plan), dtype=torch.bool)

@@ -39,6 +39,12 @@ def found(
     )
 
 
+def nobody(like: Tensor) -> Found:
+    """A `Found` of a rule that looks at no box of a plan, with numbers like these."""
+    none, nothing = torch.zeros(0, dtype=torch.int64), like.new_zeros(0)
+    return Found(none, none, nothing, nothing, none)
+
+
 def worst(who: Tensor, margin: Tensor, other: Tensor, count: int, nothing: float) -> tuple[Tensor, Tensor]:
     """Of the rows (P,) of each box the least margin (count,), `nothing` where it has none, and whom that is about."""
     least = margin.new_full((count,), nothing).scatter_reduce(0, who, margin, "amin")

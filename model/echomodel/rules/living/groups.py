@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.rules.living.found import Found, found
+from echomodel.rules.living.found import Found, found, nobody
 from echomodel.rules.living.plan import Plan, facing_angle
 from echomodel.vocabulary import vocabulary
 
@@ -28,6 +28,8 @@ TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as the
 def seat_faces(plan: Plan) -> Found:
     """A seat that stands at a table or desk looks at it."""
     i, j = plan.attended("at")
+    if not len(i):
+        return nobody(plan.size)
     looks = (plan.gap(i, j).detach() < NEAR) & ~plan.which(lambda kind: kind.solid)[i]  # stools have no front
     i, j = i[looks], j[looks]
     lateral, forward = plan.nearest_point(i, j)
@@ -41,6 +43,8 @@ def seat_faces(plan: Plan) -> Found:
 def seat_in_reach(plan: Plan) -> Found:
     """A seat whose work is at a table or desk stands at it."""
     i, j = plan.attended("at")
+    if not len(i):
+        return nobody(plan.size)
     bound = ~plan.which(lambda kind: kind.solid)[i]  # stools go anywhere
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
@@ -50,6 +54,8 @@ def seat_in_reach(plan: Plan) -> Found:
 def lounger_faces(plan: Plan) -> Found:
     """An armchair of a group is turned towards it."""
     i, j = plan.attended("company")
+    if not len(i):
+        return nobody(plan.size)
     near = plan.gap(i, j).detach() < COMPANY
     i, j = i[near], j[near]
     off = facing_angle(*plan.local(j, i))
@@ -59,6 +65,8 @@ def lounger_faces(plan: Plan) -> Found:
 def table_before_sofa(plan: Plan) -> Found:
     """A coffee table lies before its sofa, within its width and a hand's reach."""
     i, j = plan.attended("before")
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     _, half_depth = plan.reach(i, j)
     gap = forward - half_depth - plan.size[j, 2] / 2
@@ -73,6 +81,8 @@ def table_before_sofa(plan: Plan) -> Found:
 def nightstand_at_head(plan: Plan) -> Found:
     """Nightstands stand beside the bed at its head; of more than two the nearest two."""
     i, j = plan.attended("head")
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     beside = lateral.abs() - half_width - plan.size[j, 0] / 2
@@ -89,6 +99,8 @@ def nightstand_at_head(plan: Plan) -> Found:
 def nightstands_alike(plan: Plan) -> Found:
     """The nightstands at both sides of a bed are as far from it as each other."""
     i, j = plan.attended("head")
+    if not len(i):
+        return nobody(plan.size)
     lateral, forward = plan.local(i, j)
     half_width, half_depth = plan.reach(i, j)
     beside = lateral.abs() - half_width - plan.size[j, 0] / 2

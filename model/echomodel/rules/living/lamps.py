@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 
 from echomodel.floors import extents, known
-from echomodel.rules.living.found import Found, found
+from echomodel.rules.living.found import Found, found, nobody
 from echomodel.rules.living.plan import Plan
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
@@ -17,6 +17,8 @@ TOUCH = 0.04  # metres of air below a lamp on its table
 def pendant_over(plan: Plan) -> Found:
     """A pendant hangs over a table, bed or seat, over the middle of the room, or well away from all tables."""
     lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
+    if not bool(lamps.any()):
+        return nobody(plan.size)
     i, j = plan.pairs(lamps, (plan.of("board", "bed", "sofa") | plan.stands("head")) & plan.standing)
     tables = plan.which(lambda kind: kind.role == "board" and not (kind.belongs_to or kind.access))[j]
     gap = plan.gap(i, j)
@@ -36,6 +38,8 @@ def pendant_over(plan: Plan) -> Found:
 def lamp_on_surface(plan: Plan) -> Found:
     """A table lamp or television stands on something that can carry it."""
     small = plan.which(lambda kind: kind.support == "table" and not kind.hangs)
+    if not bool(small.any()):
+        return nobody(plan.size)
     carriers = plan.which(lambda kind: kind.carries)
     i, j = plan.pairs(small, carriers)
     who = small.nonzero()[:, 0]

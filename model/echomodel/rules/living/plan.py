@@ -52,11 +52,11 @@ class Plan:
 
     def of(self, *roles: str) -> Tensor:
         """(N,) bool, boxes with one of these roles."""
-        return self._mask([kind.role in roles for kind in self.kinds])
+        return self._kept(("of", *roles), lambda: [kind.role in roles for kind in self.kinds])
 
     def stands(self, *stances: str) -> Tensor:
         """(N,) bool, boxes that stand so to what they attend (`stance`)."""
-        return self._mask([stance in stances for stance in self.stance])
+        return self._kept(("stands", *stances), lambda: [stance in stances for stance in self.stance])
 
     @cached_property
     def stance(self) -> tuple[str, ...]:
@@ -104,6 +104,16 @@ class Plan:
     def movable(self) -> Tensor:
         """(N,) bool, seats that are moved aside to open or to reach something."""
         return self.which(lambda kind: kind.role == "seat" and not kind.access)
+
+    def _kept(self, asked: tuple[str, ...], values: Callable[[], list[bool]]) -> Tensor:
+        """A mask that is asked for again and again."""
+        if asked not in self._masks:
+            self._masks[asked] = self._mask(values())
+        return self._masks[asked]
+
+    @cached_property
+    def _masks(self) -> dict[tuple[str, ...], Tensor]:
+        return {}
 
     def _mask(self, values: Sequence[bool]) -> Tensor:
         return torch.tensor(values, dtype=torch.bool, device=self.size.device)

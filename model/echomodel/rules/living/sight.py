@@ -7,7 +7,7 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.rules.living.found import Found, found, worst
+from echomodel.rules.living.found import Found, found, nobody, worst
 from echomodel.rules.living.plan import FAR, Plan, facing_angle
 from echomodel.vocabulary import vocabulary
 
@@ -26,7 +26,9 @@ BACK = math.radians(125.0)  # 95 of 100 real armchairs of a group are turned les
 def screen_in_view(plan: Plan) -> Found:
     """A television lies ahead of the sofa, seat or bed that it is watched from, not too near and not too far."""
     who, viewer, margin, measure, _, _ = _watched(plan)
-    least, which = margin.min(1) if len(who) else (margin.sum(1), who)
+    if not len(who):
+        return nobody(plan.size)
+    least, which = margin.min(1)
     return found(who, least, other=viewer, measure=measure.gather(1, which[:, None])[:, 0], words=which)
 
 
@@ -39,6 +41,8 @@ def view_free(plan: Plan) -> Found:
 def screen_not_behind(plan: Plan) -> Found:
     """Who sits in the group that watches a screen does not turn the back on it."""
     screen, viewer, *_ = _watched(plan)
+    if not len(screen):
+        return nobody(plan.size)
     chairs = plan.stands("company", "with") & plan.standing & plan.of("seat", "sofa")
     at, i = ((plan.group[None] == plan.group[viewer][:, None]) & chairs[None]).nonzero(as_tuple=True)
     keep = i != viewer[at]
@@ -47,7 +51,19 @@ def screen_not_behind(plan: Plan) -> Found:
     return found(i, BACK - off, other=j, measure=torch.rad2deg(off))
 
 
-def _watched(plan: Plan) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]:
+Watched = tuple[Tensor, Tensor, Tensor, Tensor, Tensor, Tensor]
+
+
+def _watched(plan: Plan) -> Watched:
+    """What `_viewers` finds, which three rules ask for."""
+    kept = vars(plan)
+    if "watched" not in kept:
+        kept["watched"] = _viewers(plan)
+    found: Watched = kept["watched"]
+    return found
+
+
+def _viewers(plan: Plan) -> Watched:
     """Each screen with the viewer that sees it best, of those that the graph names where it names any.
 
     Returns:
