@@ -50,8 +50,8 @@ class Pairs:
     def take(self, rows: np.ndarray) -> Pairs:
         """The pairs of these numbers."""
         fronts = None if self.fronts is None else self.fronts[rows]
-        of = (self.size, self.position, self.axis, self.half)
-        return Pairs(*(value[rows] for value in of), self.columns, fronts, self.slopes)
+        size, position, axis, half = (value[rows] for value in (self.size, self.position, self.axis, self.half))
+        return Pairs(size, position, axis, half, self.columns, fronts, self.slopes)
 
     def swapped(self) -> Pairs:
         """The same pairs, the second box first."""
