@@ -51,8 +51,8 @@ def render(
 ) -> None:
     """Draw a room from above, from a corner, from inside, from all around, or through each of its cameras."""
     from echousd.pictures import gif, png
+    from echousd.rendering import VIEWS, render_cameras, render_turn
     from echousd.rendering import render as draw
-    from echousd.rendering import render_cameras, render_turn
     from echousd.room.found import room_at
     from echousd.stage.files import write_all
 
@@ -60,6 +60,8 @@ def render(
     room, rays = room_at(room), math.isqrt(samples)
     if rays**2 != samples:
         raise ValueError(f"--samples is {samples}, allowed: a square number, such as {rays**2} or {(rays + 1) ** 2}")
+    if view not in (*VIEWS, TURN):
+        raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
     if cameras:
         if view != "perspective":
             raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")

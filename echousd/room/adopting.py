@@ -81,5 +81,5 @@ def seen_in_theirs(room: RoomData) -> list[str]:
 def _node(text: str) -> Node:
     name, colon, category = text.partition(":")
     if not colon:
-        raise GraphError(f"found {text!r}, allowed: name:category, such as lamp:floor_lamp")
+        raise GraphError(f"add: found {text!r}, allowed: name:category, such as lamp:floor_lamp")
     return Node(name.strip(), category.strip())

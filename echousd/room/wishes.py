@@ -68,7 +68,7 @@ def wished(saved: SavedRoom, wishes: Wishes) -> SceneGraph:
     for text in wishes.move:
         name, place = _named(graph, text)
         graph = _placed(graph, saved, name)
-        numbers = _numbers(text, place, (2, 3), "name:x,z or name:x,y,z, metres")
+        numbers = _numbers("move", text, place, (2, 3), "name:x,z or name:x,y,z, metres")
         height = (graph.node(name).position or (0.0, 0.0, 0.0))[1] if len(numbers) == 2 else numbers[1]
         graph = graph.update_node(name, position=(numbers[0], height, numbers[-1]))
     for text in wishes.turn:
@@ -77,7 +77,7 @@ def wished(saved: SavedRoom, wishes: Wishes) -> SceneGraph:
         graph = graph.update_node(name, yaw=way if way[-1:].isalpha() else f"{way} deg")
     for text in wishes.resize:
         name, size = _named(graph, text)
-        numbers = _numbers(text, size, (3,), "name:x,y,z, metres")
+        numbers = _numbers("resize", text, size, (3,), "name:x,y,z, metres")
         graph = _placed(graph, saved, name).update_node(name, size=numbers)
     for text in wishes.restyle:
         name, style = _named(graph, text)
@@ -149,11 +149,11 @@ def _parts(text: str) -> tuple[str, str]:
     return name.strip(), rest.strip() if colon else name.strip()
 
 
-def _numbers(text: str, rest: str, counts: tuple[int, ...], allowed: str) -> tuple[float, ...]:
+def _numbers(wish: str, text: str, rest: str, counts: tuple[int, ...], allowed: str) -> tuple[float, ...]:
     try:
         numbers = tuple(float(word) for word in rest.replace(",", " ").split())
     except ValueError:
         numbers = ()
     if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
-        raise GraphError(f"found {text!r}, allowed: {allowed}")
+        raise GraphError(f"{wish}: found {text!r}, allowed: {allowed}")
     return numbers

@@ -253,6 +253,10 @@ def test_command_draws_turns_and_counts_samples(root, tmp_path, echousd_command)
     )  # ours
     for words, told in (
         (("-o", tmp_path / "turn.png", "--view", "turntable"), "a turntable is written as .gif, found '.png'"),
+        (
+            ("-o", tmp_path / "one.png", "--view", "side"),
+            "--view is 'side', allowed: top, perspective, eye, every-camera, sheet, turntable",
+        ),
         (("-o", tmp_path / "one.gif"), "pictures are written as .png, found '.gif'"),
         (("-o", tmp_path / "one.png", "--samples", 8), "--samples is 8, allowed: a square number, such as 4 or 9"),
     ):

@@ -78,7 +78,7 @@ def test_what_such_a_room_lacks_is_added(loft):
 
 
 def test_what_cannot_be_adopted_is_said(loft, tmp_path):
-    with pytest.raises(ValueError, match="found 'wardrobe', allowed: name:category"):
+    with pytest.raises(ValueError, match="add: found 'wardrobe', allowed: name:category"):
         adopted(loft, add=["wardrobe"])
     text = tmp_path / "graph.usda"
     adopted(loft, add=[]).to_stage(text)

@@ -77,8 +77,8 @@ def test_dry_run_says_what_would_happen_and_writes_nothing(root, echousd_command
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--move", "bed:here"), "found 'bed:here', allowed: name:x,z or name:x,y,z, metres"),
-        (("--resize", "bed:1,2"), "found 'bed:1,2', allowed: name:x,y,z, metres"),
+        (("--move", "bed:here"), "move: found 'bed:here', allowed: name:x,z or name:x,y,z, metres"),
+        (("--resize", "bed:1,2"), "resize: found 'bed:1,2', allowed: name:x,y,z, metres"),
         (("--turn", "bed:east"), "object 'bed': yaw: found 'east', allowed: radians, or degrees as in 90 deg"),
         (("--lock", "sofa"), "no object 'sofa' in this graph"),
     ],
