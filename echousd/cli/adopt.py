@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from echousd.cli.options import Assets, Licenses, Stretch, Wait
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -27,11 +29,9 @@ def adopt(
     shapes: Annotated[
         str | None, typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: parts.")
     ] = None,
-    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
-    stretch: Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)] = 1.15,
-    licenses: Annotated[
-        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
-    ] = None,
+    assets: Assets = None,
+    stretch: Stretch = 1.15,
+    licenses: Licenses = None,
     text: Annotated[str, typer.Option(help="What models shall be like, such as 'mid-century oak' (extra: text).")] = "",
     collect: Annotated[
         bool, typer.Option("--collect", help="Take the stage's pieces and models along instead of referring to them.")
@@ -39,7 +39,7 @@ def adopt(
     walls: Annotated[bool, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = False,
     dress: Annotated[str, typer.Option(help="Small things, rugs, curtains: none, some or full.")] = "none",
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    wait: Wait = False,
     json: Annotated[bool, typer.Option("--json", help="Print what was made, faults and seconds as JSON.")] = False,
 ) -> None:
     """Complete a stage that others began: its furniture stays where and as it is, new pieces stand around it.

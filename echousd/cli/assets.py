@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.output import AsJson, say
+from echousd.cli.options import AsJson
+from echousd.cli.output import say
 from echousd.cli.report import say_written
 
 assets_app = typer.Typer(

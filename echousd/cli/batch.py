@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from echousd.cli.output import AsJson, one_line, plain_json, say, say_error, say_json
+from echousd.cli.options import AsJson, Licenses, Weights
+from echousd.cli.output import one_line, plain_json, say, say_error, say_json
 
 if TYPE_CHECKING:
     from echousd.batches.run import BatchProgress
@@ -63,13 +64,11 @@ def run(
     stretch: Annotated[
         float | None, typer.Option(help="How much models may be stretched; default 1.15.", min=1, max=4)
     ] = None,
-    licenses: Annotated[
-        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
-    ] = None,
+    licenses: Licenses = None,
     text: Annotated[
         str | None, typer.Option(help='What models shall be like, "mid-century oak" (extra: text).')
     ] = None,
-    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    weights: Weights = None,
     device: Annotated[
         str | None, typer.Option(help="Of the network: cpu, cuda (a process for each) or mps; default cpu.")
     ] = None,

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import typer
 
-from echousd.cli.output import AsJson, say
+from echousd.cli.options import AsJson
+from echousd.cli.output import say
 from echousd.cli.report import say_written
 
 SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")

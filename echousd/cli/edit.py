@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from echousd.cli.options import Assets, Wait, Weights
 from echousd.cli.output import say
 from echousd.cli.report import report, say_written, telling_faults
 
@@ -48,15 +49,15 @@ def edit(
         str | None,
         typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: as the room is made."),
     ] = None,
-    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).")] = None,
-    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    assets: Assets = None,
+    weights: Weights = None,
     faces: Annotated[int | None, typer.Option(help="Faces of each new mesh; default: as the room.", min=100)] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most, the best is kept.", min=1, max=64)] = None,
     repair: Annotated[
         bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
     ] = True,
     force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    wait: Wait = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
     ] = False,
@@ -92,9 +93,9 @@ def edit(
 def update(
     layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.", show_default=False)],
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-    weights: Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")] = None,
+    weights: Weights = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    wait: Wait = False,
     json: Annotated[
         bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
     ] = False,

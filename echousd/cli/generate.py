@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from echousd.cli.options import Assets, Licenses, Stretch, Wait
 from echousd.cli.output import say
 from echousd.cli.report import report, telling_faults
 
@@ -63,11 +64,9 @@ def generate(
             "guided: those most like free shapes; boxes. Default: parts."
         ),
     ] = None,
-    assets: Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)] = None,
-    stretch: Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)] = 1.15,
-    licenses: Annotated[
-        str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
-    ] = None,
+    assets: Assets = None,
+    stretch: Stretch = 1.15,
+    licenses: Licenses = None,
     text: Annotated[
         str, typer.Option(help='What models shall be like, "mid-century oak" (extra: text).', show_default=False)
     ] = "",
@@ -123,7 +122,7 @@ def generate(
     force: Annotated[
         bool, typer.Option("--force", help="Write into a folder that is not ours, replace a file.")
     ] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    wait: Wait = False,
 ) -> None:
     """Generate a room from a scene graph: boxes, shapes, materials, physics, cameras, as layers of USD.
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import AsJson, check_picture, safe, say, say_json
+from echousd.cli.options import AsJson
+from echousd.cli.output import check_picture, safe, say, say_json
 from echousd.cli.report import say_written
 
 if TYPE_CHECKING:

@@ -11,11 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Annotated, Any, TextIO
+from typing import Any, TextIO
 
 import typer
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
 LONGEST_WORD = 300  # characters: a path is shorter, a name of a million is a prank
 LONGEST_LINE = 4000
 ENDLESS = re.compile(r"(?<![\w./-])(-?\d)(\d{39,})(?:\.\d+)?(?![\w/-]|\.\w)")  # a number that is no part of a path

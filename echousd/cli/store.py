@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.output import AsJson, say, say_json
+from echousd.cli.options import AsJson
+from echousd.cli.output import say, say_json
 
 store_app = typer.Typer(no_args_is_help=True)
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.output import AsJson, say
+from echousd.cli.options import AsJson, Wait
+from echousd.cli.output import say
 from echousd.cli.report import say_written
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def import_(
     skip: Annotated[list[str] | None, typer.Option(help="Object that keeps its look; may be repeated.")] = None,
     preview: Annotated[bool, typer.Option("--preview/--no-preview", help="Draw the room's picture anew.")] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace a look of that name.")] = False,
-    wait: Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")] = False,
+    wait: Wait = False,
     json: AsJson = False,
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
