@@ -63,7 +63,7 @@ def lounger_faces(plan: Plan) -> Found:
 
 
 def table_before_sofa(plan: Plan) -> Found:
-    """A coffee table lies before its sofa, within its width and a hand's reach."""
+    """A coffee table lies before its sofa, within its width and a hand's reach; of several one does."""
     i, j = plan.attended("before")
     if not len(i):
         return nobody(plan.size)
@@ -75,7 +75,9 @@ def table_before_sofa(plan: Plan) -> Found:
     least = torch.where(ell, BEFORE[0] - plan.size[j, 2] * 0.6, plan.numbers([BEFORE[0]]).expand_as(gap))
     within = WITHIN * plan.size[j, 0] - lateral.abs()
     margin = torch.stack([gap - least, BEFORE[1] - gap, within], -1)
-    return _first_of(i, j, margin, torch.stack([gap, gap, lateral.abs()], -1))
+    most = margin.new_full((len(plan),), -torch.inf).scatter_reduce(0, j, margin.amin(1), "amax")
+    first = margin.amin(1).detach() >= most.detach()[j]
+    return _first_of(i[first], j[first], margin[first], torch.stack([gap, gap, lateral.abs()], -1)[first])
 
 
 def nightstand_at_head(plan: Plan) -> Found:
