@@ -11,6 +11,7 @@ import numpy as np
 
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
+from echousd.repair.distances import kept_behind
 from echousd.repair.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
-BEHIND = (0.01, 0.08)  # metres between a back and its wall: as drawn, within what skirtings take in real rooms
-USUALLY_BEHIND = 0.03  # the median of real rooms, for what was drawn further off
 NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
 CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
 
@@ -132,7 +131,7 @@ def pose(
         wall = lean(words, size, position, yaw, floor, carrier, backed)
         turn = ~np.isnan(wall[:, 1, 0]) & ~fixed & ~turned
         yaw[turn] = np.arctan2(wall[turn, 1, 0], wall[turn, 1, 1])
-    behind = kept_behind(words, wall_gaps(wall, size, position, yaw))
+    behind = kept_behind(words, size, wall_gaps(wall, size, position, yaw))
     pairs = pair_indices(n)
     i, j = pairs[:, 0], pairs[:, 1]
     apart = ~(fixed[i] & fixed[j]) & (carrier[i] != j) & (carrier[j] != i)
@@ -163,13 +162,6 @@ def wall_gaps(wall: np.ndarray, size: np.ndarray, position: np.ndarray, yaw: np.
     normal = wall[:, 1]
     reach = 0.5 * np.abs(np.einsum("nkd,nd->nk", axes(yaw), normal)) * size[:, [0, 2]]
     return ((position[:, [0, 2]] - wall[:, 0]) * normal).sum(1) - reach.sum(1)
-
-
-def kept_behind(categories: Sequence[str], drawn: np.ndarray) -> np.ndarray:
-    """(n,) float: `Problem.behind` of pieces drawn so far from their walls (NaN = from none); pictures hang close."""
-    kept = np.where(drawn <= BEHIND[1], np.maximum(drawn, BEHIND[0]), USUALLY_BEHIND)
-    hung = np.array([vocabulary().category(word).support == "wall" for word in categories], bool)
-    return np.where(hung, BEHIND[0], kept)
 
 
 def axis_handicap(

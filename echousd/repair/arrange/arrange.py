@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echousd.repair.arrange.attending import expect_followers
 from echousd.repair.arrange.costs import least, price, soon_told
 from echousd.repair.arrange.groups import make_way, paid_by, slide_groups
 from echousd.repair.arrange.overlaps import depths
-from echousd.repair.arrange.places import expect_followers, places
+from echousd.repair.arrange.places import places
 from echousd.repair.arrange.seating import seat_evenly
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.spread import bareness

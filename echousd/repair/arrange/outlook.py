@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echousd.repair.arrange.attending import slots_at, stance
 from echousd.repair.arrange.overlaps import beyond, depths
-from echousd.repair.arrange.places import slots_at, stance, wrapped
+from echousd.repair.arrange.places import wrapped
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.arrange.slots import Slot
 from echousd.repair.geometry import depth_inside

@@ -9,12 +9,12 @@ import numpy as np
 
 from echomodel.rules.living.walls import PASSAGE
 from echomodel.vocabulary import vocabulary
+from echousd.repair.arrange.attending import Row, at_anchor, out_of
 from echousd.repair.arrange.setting import Poses, Setting, State
-from echousd.repair.arrange.slots import STANDS, Slot
+from echousd.repair.distances import over_bed, spread_at_walls
 from echousd.repair.geometry import depth_inside
 from echousd.repair.problem import ON_CEILING
 
-Row = tuple[float, float, float, float]  # x, z, yaw, price
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
 GRID = 0.35  # metres between two places in the open
@@ -25,6 +25,7 @@ HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the midd
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
 WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
 TOO_FAR, IN_THE_ROOM = 5.5, 0.8  # metres from which on a sofa may leave its wall for that, and what that costs
+EDGE = 0.75  # metres between the middle of a plant and a wall: so near it may stay where it was drawn
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 
 
@@ -67,16 +68,13 @@ def places(setting: Setting, state: State, i: int) -> Poses:
         rows += along_walls(setting, i, lonely + 0.5)
     twins = beside_twin(setting, state, i)
     rows = [*twins, *((*row[:3], row[3] + LONELY * bool(twins)) for row in rows)]
-    rows = [
-        *rows,
-        *as_drawn(
-            setting,
-            i,
-            draft,
-            OFF_WALL if kind.wall else (3.0 if kind.role == "board" and kind.access else 1.0) + lonely,
-        ),
-    ]
+    afar = OFF_WALL if kind.wall else (3.0 if kind.role == "board" and kind.access else 1.0) + lonely
+    if kind.role == "decor" and float(depth_inside(setting.floor, np.array([draft]))[0]) < EDGE:
+        afar = lonely
+    rows = [*rows, *as_drawn(setting, i, draft, afar)]
     out = Poses.of([*rows, *as_stated(setting, state, i)], height)
+    if kind.role == "decor":  # plants have no front
+        out = Poses(out.position, np.full(len(out), _squared(setting, i)), out.price)
     return _as_told(setting, i, out)
 
 
@@ -136,11 +134,16 @@ def midway(setting: Setting, state: State, i: int, others: Sequence[int]) -> lis
 def as_drawn(setting: Setting, i: int, draft: tuple[float, float], price: float) -> list[Row]:
     """Where the box was drawn: parallel to the walls, or turned as it was drawn."""
     heading = float(setting.heading[i])
-    square = float(HALF_PI * np.round((heading - setting.grain) / HALF_PI) + setting.grain)
+    square = _squared(setting, i)
     if setting.kinds[i].support != "floor":
         return [(*draft, heading, price)]
     askew = 0.0 if abs(square - heading) < 0.02 else 0.5 if setting.kinds[i].role == "seat" else OFF_WALL
     return [(*draft, square, price), (*draft, heading, price + askew)]
+
+
+def _squared(setting: Setting, i: int) -> float:
+    """The heading parallel to the walls that is nearest to the drawn one."""
+    return float(HALF_PI * np.round((setting.heading[i] - setting.grain) / HALF_PI) + setting.grain)
 
 
 def _height(setting: Setting, state: State, i: int) -> float:
@@ -160,56 +163,6 @@ def _as_told(setting: Setting, i: int, poses: Poses) -> Poses:
     keep = like if like.any() else np.ones(len(poses), bool)
     yaw = np.full(int(keep.sum()), setting.heading[i])
     return Poses(poses.position[keep], yaw, poses.price[keep])
-
-
-def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
-    """Where box i may stand in the frame of its anchor; empty where its row does not say."""
-    if (i, anchor) in setting.slots:
-        return setting.slots[i, anchor]
-    stands = stance(setting, i, anchor)
-    if stands not in STANDS:
-        return []
-    count = int(setting.sitting[(setting.anchor == anchor) & setting.seats].sum())
-    found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count)
-    setting.slots[i, anchor] = found
-    return found
-
-
-def stance(setting: Setting, i: int, anchor: int) -> str:
-    """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
-    kind, to = setting.kinds[i], setting.kinds[anchor]
-    if setting.carrier[i] == anchor:
-        return "on_top"
-    if kind.support != "floor":
-        return ""
-    if kind.stands in ("at", "foot") and to.role == "board":
-        return "at_front" if to.access else "around"
-    return setting.stances[i]
-
-
-def at_anchor(setting: Setting, state: State, i: int, anchor: int) -> list[Row]:
-    """The slots of box i at its anchor as it stands now."""
-    return [out_of(state.position[anchor], float(state.yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
-
-
-def expect_followers(setting: Setting, state: State, i: int) -> None:
-    """Move what attends box i and is not placed yet to its best slot there, for others to reckon with (in `state`)."""
-    for j in np.flatnonzero((setting.anchor == i) & ~state.placed).tolist():
-        slots = slots_at(setting, j, i) if j != i else []
-        if slots and setting.standing(j):
-            best = min(slots, key=lambda slot: slot[3])
-            state.position[j, 0], state.position[j, 2], state.yaw[j], _ = out_of(
-                state.position[i], float(state.yaw[i]), best
-            )
-            expect_followers(setting, state, j)
-
-
-def out_of(position: np.ndarray, yaw: float, slot: Slot) -> Row:
-    """Where a slot of something at a position (3,) lies in the room."""
-    lateral, forward, turn, price = slot
-    c, s = math.cos(yaw), math.sin(yaw)
-    x, z = position[0] + c * lateral + s * forward, position[2] - s * lateral + c * forward
-    return float(x), float(z), yaw + turn, price
 
 
 def along_walls(setting: Setting, i: int, price: float) -> list[Row]:
@@ -237,12 +190,13 @@ def along_walls(setting: Setting, i: int, price: float) -> list[Row]:
 
 def corners(setting: Setting, i: int, price: float) -> list[Row]:
     """In the corners of the room: plants and lamps like them."""
-    half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2 + 0.03
+    half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2
+    other = spread_at_walls(setting.categories[i], setting.size[i, ::-1])
     rows = []
     polygon = setting.floor.polygon
     for k, corner in enumerate(polygon):
-        inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
-        x, z = corner + inward * half
+        one, two = setting.floor.normal[k], setting.floor.normal[k - 1]
+        x, z = corner + one * (half + setting.behind[i]) + two * (half + other)
         rows.append((float(x), float(z), setting.walls[k][3], price - 0.1))
     return rows
 
@@ -319,7 +273,7 @@ def _row_over(setting: Setting, i: int, j: int) -> list[float]:
     above = vocabulary().predicate_id("above")
     lamps = {k for k, predicate, other in setting.triplets.tolist() if predicate == above and other == j}
     if i not in lamps or len(lamps) < 2:
-        return [0.0]
+        return [over_bed(setting.size, setting.draft, setting.heading, i, j) if setting.kinds[j].role == "bed" else 0.0]
     length = float(setting.size[j, [0, 2]].max())
     return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
 

@@ -12,11 +12,10 @@ from scipy.optimize import linear_sum_assignment
 
 from echomodel.rules.living.company import STAGGERED
 from echomodel.rules.living.sizes import TUCKED
+from echousd.repair.arrange.attending import apart, out_of
 from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.groups import GAIN, paid_by
-from echousd.repair.arrange.places import out_of
 from echousd.repair.arrange.setting import Poses, Setting, State
-from echousd.repair.arrange.slots import TUCK
 
 TRIED = 2  # plans that are tried with all seats at once
 UNEVEN, AT_END = 0.25, 0.25  # for each chair more on one side or at one end than opposite, and for each at an end
@@ -181,8 +180,8 @@ def _poses(setting: Setting, state: State, table: int, i: int, places: list[tupl
     kind = setting.kinds[table]
     long, deep = (0, 2) if kind.wall else _axes_of(setting, table)
     own = float(setting.size[i, 2])
-    tuck = min(TUCK, 0.3 * own)
-    before, beside = (float(setting.size[table, axis]) / 2 + own / 2 - tuck for axis in (deep, long))
+    near, _ = apart(setting, i, table)
+    before, beside = (float(setting.size[table, axis]) / 2 + own / 2 + near for axis in (deep, long))
     rows = []
     for side, along in places:
         slot = ((along, -before, 0.0), (along, before, math.pi), (beside, along, -QUARTER), (-beside, along, QUARTER))

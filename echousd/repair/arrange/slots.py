@@ -1,4 +1,8 @@
-"""Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, price)."""
+"""Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, price).
+
+Each is asked with the metres that are kept between the two, negative under a table, and those by which the best places
+are shifted (`distances.kept_apart`).
+"""
 
 from __future__ import annotations
 
@@ -12,24 +16,23 @@ from echomodel.vocabulary import Category, vocabulary
 
 Size = np.ndarray
 Slot = tuple[float, float, float, float]
-Slots = Callable[[Size, Size, Category, int], list[Slot]]
+Slots = Callable[[Size, Size, Category, int, float, float], list[Slot]]
 HALF_PI = math.pi / 2
-TUCK = 0.12  # metres that a chair is pushed under its table
 NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
-REACH = 0.38  # metres between a sofa and its coffee table
+DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 
 
-def head(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Nightstands: at both sides of the bed, their backs level with its head."""
     out = []
     for side in (-1.0, 1.0):
-        for gap, more in ((0.03, 0.0), (0.12, 0.2), (0.25, 0.5)):
+        for gap, more in ((apart, 0.0), (apart + 0.09, 0.2), (apart + 0.22, 0.5)):
             lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
             out.append((lateral, -anchor[2] / 2 + own[2] / 2, 0.0, more))
     return out
 
 
-def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Coffee tables: before the sofa, in reach, the long side along it."""
     inner = kind.name in vocabulary().cornered
     out = []
@@ -37,7 +40,7 @@ def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
         depth, width = (own[2], own[0]) if turn != HALF_PI else (own[0], own[2])
         if width < depth * 0.95:
             more += 0.3
-        for gap, away in ((REACH, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
+        for gap, away in ((apart, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
             gap = gap - 0.25 if inner else gap
             for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
                 if abs(lateral) < anchor[0] / 2:
@@ -45,43 +48,42 @@ def before(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     return out
 
 
-def around(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Chairs: along both long sides of a table and at its ends, looking at it; along the front of one at a wall."""
     length, depth = float(anchor[0]), float(anchor[2])
     if kind.wall:
-        return _along_front(own, length, depth, count)
+        return _along_front(own, length, depth, count, -apart)
     if length >= depth:
-        return _around(own, length, depth, count)
+        return _around(own, length, depth, count, -apart)
     # the long sides are the left and the right one: the same, turned by a quarter
-    return [(ahead, -aside, turn + HALF_PI, price) for aside, ahead, turn, price in _around(own, depth, length, count)]
+    quarter = _around(own, depth, length, count, -apart)
+    return [(ahead, -aside, turn + HALF_PI, price) for aside, ahead, turn, price in quarter]
 
 
-def _around(own: Size, length: float, depth: float, count: int) -> list[Slot]:
+def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
     out = []
     fits = max(int((length + 0.1) // (own[0] + 0.06)), 1)
     wanted = max(1, min(fits, math.ceil(count / 2)))
-    tuck = min(TUCK, 0.3 * float(own[2]))
     free = length - 2 * TUCKED * (count > 2 * wanted)  # what sits at the ends keeps off the corners
     for per_side in sorted({wanted, max(wanted - 1, 1), fits}):
         spacing = max(min(free / per_side, 0.85), float(own[0]) + 0.03)
         more = 0.0 if per_side == wanted else 0.25 if count % 2 else 0.9
         for k in range(per_side):
             lateral = (k - (per_side - 1) / 2) * spacing
-            for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5), (-0.1, 0.7)):
+            for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
                 forward = depth / 2 + own[2] / 2 - tucked
                 price = more + push
                 out.append((lateral, -forward, 0.0, price))
                 out.append((lateral, forward, math.pi, price))
     at_ends = (0.9 if count <= 2 * wanted else 0.1) + (1.5 if own[0] > depth + 0.1 else 0.0)  # no bench across an end
-    for tucked, push in ((tuck, 0.0), (tuck + 0.15, 0.5), (-0.1, 0.7)):
+    for tucked, push in ((tuck, 0.0), (DEEPER, 0.5), (-0.1, 0.7)):
         out.append((length / 2 + own[2] / 2 - tucked, 0.0, -HALF_PI, at_ends + push))
         out.append((-length / 2 - own[2] / 2 + tucked, 0.0, HALF_PI, at_ends + push))
     return out
 
 
-def _along_front(own: Size, length: float, depth: float, count: int) -> list[Slot]:
+def _along_front(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
     spacing = max(min(length / max(count, 1), 0.7), float(own[0]) + 0.05)
-    tuck = min(TUCK, 0.3 * float(own[2]))
     return [
         ((k - (count - 1) / 2) * spacing, depth / 2 + own[2] / 2 - tuck + off, math.pi, price)
         for k in range(count)
@@ -89,10 +91,10 @@ def _along_front(own: Size, length: float, depth: float, count: int) -> list[Slo
     ]
 
 
-def at_front(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Chairs at desks and dressing tables: in the middle of the front, looking at it."""
     out = []
-    for tucked, push in ((0.1, 0.0), (0.25, 0.1), (0.0, 0.2), (0.4, 0.4)):
+    for tucked, push in ((-apart, 0.0), (0.25, 0.1), (0.0, 0.2), (0.4, 0.4)):
         for lateral in (0.0, -0.12, 0.12, -0.3, 0.3):
             if abs(lateral) < anchor[0] / 2:
                 out.append((lateral, anchor[2] / 2 + own[2] / 2 - min(tucked, 0.6 * own[2]), math.pi,
@@ -100,7 +102,7 @@ def at_front(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     return out
 
 
-def company(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Armchairs: beside the coffee table or before the sofa, turned into the group."""
     out = []
     if kind.role == "board":  # around the coffee table, but not on its long side towards the sofa
@@ -124,7 +126,7 @@ def company(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     return out
 
 
-def joined(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """A second sofa: opposite the first across the coffee table, or at a right angle at one of its ends."""
     out = []
     for away, more in ((1.6, 0.0), (1.9, 0.1), (1.35, 0.3)):
@@ -137,23 +139,27 @@ def joined(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     return out
 
 
-def beside(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Side tables and floor lamps: at the ends of a sofa, beside an armchair, at the head of a bed."""
     out = []
     if kind.role == "bed":  # before its middle one gets in
-        for lateral, forward, turn, more in head(own, anchor, kind, count):
+        for lateral, forward, turn, more in head(own, anchor, kind, count, min(apart, 0.1), 0.0):
             out += [(lateral, forward, turn, more), (lateral + math.copysign(NIGHTSTAND, lateral), forward, turn, 0.3)]
     for side in (-1.0, 1.0):
-        for gap, more in ((0.04, 0.0), (0.12, 0.1), (0.25, 0.3)):
+        for gap, more in ((apart, 0.0), (apart + 0.08, 0.1), (apart + 0.21, 0.3)):
             lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)
             back = -anchor[2] / 2 + own[2] / 2
             if kind.role == "bed":
                 more += 0.8
-            out += [(lateral, 0.0, 0.0, more), (lateral, back, 0.0, more + 0.02), (lateral, back / 2, 0.0, more + 0.05)]
+            out += [
+                (lateral, max(aside, min(back, 0.0)), 0.0, more),
+                (lateral, back, 0.0, more + 0.02),
+                (lateral, back / 2, 0.0, more + 0.05),
+            ]
     return out
 
 
-def foot(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Benches and ottomans: at the foot of a bed, before a sofa or armchair."""
     out = []
     bed = kind.role == "bed"
@@ -169,7 +175,7 @@ def foot(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
     return out
 
 
-def on_top(own: Size, anchor: Size, kind: Category, count: int) -> list[Slot]:
+def on_top(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
     """Lamps and televisions: on the top of what carries them, towards its back."""
     room_x, room_z = max(anchor[0] - own[0], 0.0) / 2, max(anchor[2] - own[2], 0.0) / 2
     out = []
