@@ -51,7 +51,7 @@ APART = {
 }
 SHIFTED = {
     "at_front": Usual(-0.15, 0.15, 0.0, 0.06),
-    "before": Usual(-0.15, 0.15, 0.0, 0.06),
+    "before": Usual(-0.1, 0.1, 0.0, 0.05),
     "beside": Usual(-0.3, 0.15, -0.05, 0.12),
 }
 BED_LIT = Usual(-0.2, 0.7, 0.3, 0.3)  # metres from the middle of a bed to its lamp, towards the foot

@@ -15,6 +15,7 @@ from echomodel.rules.living.company import PLACE
 from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
+from echousd.repair.distances import kept_behind
 from echousd.repair.geometry import Floor, axes
 from echousd.repair.problem import ON_FLOOR, Posed, required_order
 
@@ -53,7 +54,8 @@ class Setting:
         triplets: (e, 3) int, what must hold; rules: their rule set; centre: (2,) float, x and z of the room's centre.
         fixed, turned: (n,) bool, boxes that must not move, must not turn.
         floor: the floor polygon; height: of the ceiling, metres.
-        carrier, behind: (n,) int and float, as in `Problem`. anchor: (n,) int, whom each attends, -1 = nobody.
+        carrier, behind: (n,) int and float, as in `Problem`, the latter spread. anchor: (n,) int, whom each attends,
+            -1 = nobody.
         stances: how each stands to that (`Plan.stance`). group: (n,) int, the box that its group is about.
         stated: where single objects must stand in the room; surroundings: the walls that this is measured to.
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
@@ -274,9 +276,12 @@ def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], ou
     assert problem.surroundings is not None
     plan = plan_of(at, problem.categories, problem.floor.polygon, (), problem.triplets)
     top = float((at.position[:, 1] + at.size[:, 1]).max(initial=0.0))
+    behind = kept_behind(
+        problem.categories, at.size, np.full(len(at.size), np.nan)
+    )  # those that were drawn are too alike
     return Setting(
         problem.categories, at.size, at.position, at.yaw, problem.triplets, problem.rules, problem.centre,
-        problem.fixed, turned, problem.floor, problem.height or top, problem.carrier, problem.behind,
+        problem.fixed, turned, problem.floor, problem.height or top, problem.carrier, behind,
         plan.anchor.numpy(), plan.stance, plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
     )  # fmt: skip
 
