@@ -40,8 +40,7 @@ class Usual:
         return max(min(max(found, self.least), self.most), self.floor)
 
 
-# By how a piece stands to what it attends: metres between the two, negative under it, and by which it stands aside of
-# its usual place or, beside something, before the middle of that.
+# By how a piece stands to what it attends: metres between the two, negative under it.
 APART = {
     "around": Usual(-0.24, 0.05, -0.085, 0.08),
     "at_front": Usual(-0.24, 0.05, -0.08, 0.08),
@@ -49,11 +48,7 @@ APART = {
     "before": Usual(0.3, 0.5, 0.38, 0.06),
     "beside": Usual(0.02, 0.3, 0.1, 0.08),
 }
-SHIFTED = {
-    "at_front": Usual(-0.15, 0.15, 0.0, 0.06),
-    "before": Usual(-0.1, 0.1, 0.0, 0.05),
-    "beside": Usual(-0.3, 0.15, -0.05, 0.12),
-}
+BESIDE = Usual(-0.3, 0.15, -0.05, 0.12)  # metres that side tables stand before the middle of their sofa's ends
 BED_LIT = Usual(-0.2, 0.7, 0.3, 0.3)  # metres from the middle of a bed to its lamp, towards the foot
 MOST_UNDER = 0.45  # of its depth that a chair is pushed under its table
 
@@ -93,7 +88,7 @@ def spread_at_walls(category: str, size: np.ndarray) -> float:
 
 
 def kept_apart(stands: str, drawn: np.ndarray, anchor: str, whole: np.ndarray) -> tuple[float, float]:
-    """Metres that all who stand so keep from what they attend, and by which they are shifted there.
+    """Metres that all who stand so keep from what they attend, and those by which they stand before its middle.
 
     Arguments:
         stands: how they stand, a key of `APART`. drawn: (k, 4) float, `seen_from` of them as drawn.
@@ -101,9 +96,8 @@ def kept_apart(stands: str, drawn: np.ndarray, anchor: str, whole: np.ndarray) -
     """
     beside = stands in ("head", "beside")
     gaps = drawn[:, 2:].max(1) if stands == "around" else drawn[:, 2 if beside else 3]
-    shift = SHIFTED.get(stands)
-    aside = 0.0 if shift is None else shift.of(drawn[:, 1 if beside else 0], score(anchor, whole[::-1]))
-    return APART[stands].of(gaps, score(anchor, whole)), aside
+    ahead = BESIDE.of(drawn[:, 1], score(anchor, whole[::-1])) if stands == "beside" else 0.0
+    return APART[stands].of(gaps, score(anchor, whole)), ahead
 
 
 def seen_from(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, of: int) -> np.ndarray:

@@ -31,13 +31,13 @@ def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
 
 
 def apart(setting: Setting, i: int, anchor: int) -> tuple[float, float]:
-    """Metres between box i and its anchor and those it is shifted by there, as `distances.kept_apart`."""
+    """Metres between box i and its anchor and those it stands before its middle, as `distances.kept_apart`."""
     stands = stance(setting, i, anchor)
     if stands not in APART:
         return 0.0, 0.0
     drawn = seen_from(setting.size, setting.draft, setting.heading, anchor)[_mates(setting, stands, anchor)]
-    kept, aside = kept_apart(stands, drawn, setting.categories[anchor], setting.size[anchor])
-    return max(kept, -MOST_UNDER * float(setting.size[i, 2])), aside
+    kept, ahead = kept_apart(stands, drawn, setting.categories[anchor], setting.size[anchor])
+    return max(kept, -MOST_UNDER * float(setting.size[i, 2])), ahead
 
 
 def _mates(setting: Setting, stands: str, anchor: int) -> list[int]:

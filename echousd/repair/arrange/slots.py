@@ -1,7 +1,7 @@
 """Slots: where things stand around what they attend, in its frame, as (lateral, forward, turn, price).
 
-Each is asked with the metres that are kept between the two, negative under a table, and those by which the best places
-are shifted (`distances.kept_apart`).
+Each is asked with the metres that are kept between the two, negative under a table, and those that what stands beside
+something is before the middle of that (`distances.kept_apart`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 
 
-def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Nightstands: at both sides of the bed, their backs level with its head."""
     out = []
     for side in (-1.0, 1.0):
@@ -32,7 +32,7 @@ def head(own: Size, anchor: Size, kind: Category, count: int, apart: float, asid
     return out
 
 
-def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Coffee tables: before the sofa, in reach, the long side along it."""
     inner = kind.name in vocabulary().cornered
     out = []
@@ -48,7 +48,7 @@ def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, as
     return out
 
 
-def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Chairs: along both long sides of a table and at its ends, looking at it; along the front of one at a wall."""
     length, depth = float(anchor[0]), float(anchor[2])
     if kind.wall:
@@ -57,7 +57,7 @@ def around(own: Size, anchor: Size, kind: Category, count: int, apart: float, as
         return _around(own, length, depth, count, -apart)
     # the long sides are the left and the right one: the same, turned by a quarter
     quarter = _around(own, depth, length, count, -apart)
-    return [(ahead, -aside, turn + HALF_PI, price) for aside, ahead, turn, price in quarter]
+    return [(forward, -lateral, turn + HALF_PI, price) for lateral, forward, turn, price in quarter]
 
 
 def _around(own: Size, length: float, depth: float, count: int, tuck: float) -> list[Slot]:
@@ -91,7 +91,7 @@ def _along_front(own: Size, length: float, depth: float, count: int, tuck: float
     ]
 
 
-def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Chairs at desks and dressing tables: in the middle of the front, looking at it."""
     out = []
     for tucked, push in ((-apart, 0.0), (0.25, 0.1), (0.0, 0.2), (0.4, 0.4)):
@@ -102,7 +102,7 @@ def at_front(own: Size, anchor: Size, kind: Category, count: int, apart: float, 
     return out
 
 
-def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Armchairs: beside the coffee table or before the sofa, turned into the group."""
     out = []
     if kind.role == "board":  # around the coffee table, but not on its long side towards the sofa
@@ -126,7 +126,7 @@ def company(own: Size, anchor: Size, kind: Category, count: int, apart: float, a
     return out
 
 
-def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """A second sofa: opposite the first across the coffee table, or at a right angle at one of its ends."""
     out = []
     for away, more in ((1.6, 0.0), (1.9, 0.1), (1.35, 0.3)):
@@ -139,7 +139,7 @@ def joined(own: Size, anchor: Size, kind: Category, count: int, apart: float, as
     return out
 
 
-def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Side tables and floor lamps: at the ends of a sofa, beside an armchair, at the head of a bed."""
     out = []
     if kind.role == "bed":  # before its middle one gets in
@@ -152,14 +152,14 @@ def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, as
             if kind.role == "bed":
                 more += 0.8
             out += [
-                (lateral, max(aside, min(back, 0.0)), 0.0, more),
+                (lateral, max(ahead, min(back, 0.0)), 0.0, more),
                 (lateral, back, 0.0, more + 0.02),
                 (lateral, back / 2, 0.0, more + 0.05),
             ]
     return out
 
 
-def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Benches and ottomans: at the foot of a bed, before a sofa or armchair."""
     out = []
     bed = kind.role == "bed"
@@ -175,7 +175,7 @@ def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, asid
     return out
 
 
-def on_top(own: Size, anchor: Size, kind: Category, count: int, apart: float, aside: float) -> list[Slot]:
+def on_top(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
     """Lamps and televisions: on the top of what carries them, towards its back."""
     room_x, room_z = max(anchor[0] - own[0], 0.0) / 2, max(anchor[2] - own[2], 0.0) / 2
     out = []
