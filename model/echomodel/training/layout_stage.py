@@ -14,16 +14,17 @@ from echomodel.compact.predictors import layout_predictor
 from echomodel.objectives import add_noise, clean_from, draw_levels, target
 from echomodel.openingrows import clearances
 from echomodel.randomness import normal
-from echomodel.rules import margins, verdicts
+from echomodel.rules import verdicts
 from echomodel.samplers import sample
 from echomodel.training.living_loss import HEADINGS, heading_distance, living_loss
+from echomodel.training.own_samples import SPARSE, own_loss
+from echomodel.training.relation_loss import relation_hinge
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
 DRAFT = 0.3  # weight of each draft's own denoising loss
 OPENINGS = 0.5  # weight of the clearances of doors and windows beside the gaps to the walls
-SLACK = 0.02  # the hinge asks for this much more than the rule does (metres or ratio)
 
 
 def edited_latent(model: CompactModel, batch: LayoutBatch) -> Tensor:
@@ -101,32 +102,6 @@ def measure_distance(batch: LayoutBatch, boxes: Boxes, floor: Tensor, level: Ten
     return (walls * own).sum() / own.sum().clamp_min(1) + (between * both).sum() / both.sum().clamp_min(1)
 
 
-def relation_hinge(batch: LayoutBatch, decoded: Boxes, level: Tensor, known: Tensor, rules: tuple[str, ...]) -> Tensor:
-    """Mean over told relations of how far the predicted boxes miss them, weighted by (1 - level)^2."""
-    # ratios to a height near or below zero would explode or change their sign
-    lifted = torch.cat([decoded.position[:, :1], decoded.position[:, 1:2].clamp_min(0), decoded.position[:, 2:]], dim=1)
-    boxes = Boxes(decoded.size.clamp(0.05, 8.0), lifted, decoded.yaw)
-    pair, predicate = batch.predicates.nonzero(as_tuple=True)
-    ids = [entry.id for entry in vocabulary().predicates if entry.measures]
-    ruled = torch.isin(predicate, predicate.new_tensor(ids)).nonzero()[:, 0]
-    pair, predicate = pair[ruled], predicate[ruled]
-    triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
-    total, weights = level.new_zeros(()), level.new_zeros(())
-    emphasis = level.new_tensor([entry.loss_weight for entry in vocabulary().predicates])
-    own = batch.rules[batch.graph.scene[triplets[:, 0]]]
-    for number, name in enumerate(rules):
-        chosen = triplets[own == number]
-        if not len(chosen):
-            continue
-        ends = chosen[:, [0, 2]]
-        weight = (1 - level[ends].amax(1)).square() * ~known[ends].all(1)
-        margin = margins(boxes, chosen, rules=name, rigid=True)
-        weight = weight * emphasis[chosen[:, 1]]
-        total = total + (torch.log1p((SLACK - margin).clamp_min(0)) * weight).sum()
-        weights = weights + weight.sum()
-    return total / weights.clamp_min(1)
-
-
 def draw_known(scene: Tensor, scenes: int, generator: torch.Generator) -> Tensor:
     """(N,) bool: in half of the scenes nothing is known, in the others a random share of the nodes."""
     some = torch.rand(scenes, generator=generator) < 0.5
@@ -144,6 +119,8 @@ class LayoutStage:
         frozen: parts that stay as they are.
         measure_weight: weight of the difference in what predicted and true boxes measure.
         living_weight: weight of what a person would point at in the predicted boxes.
+        own_weight: weight of what is wrong with rooms that the network arranges alone. own_kept: last steps of sampling
+            that it is led back through.
     """
 
     saved = ("latent", "layout")
@@ -159,9 +136,12 @@ class LayoutStage:
         frozen: tuple[str, ...] = (),
         measure_weight: float = 0.0,
         living_weight: float = 0.0,
+        own_weight: float = 0.0,
+        own_kept: int = 2,
     ) -> None:
         self.rooms, self.held, self.nodes = rooms, held, nodes
         self.weights = relation_weight, measure_weight, living_weight
+        self.own_weight, self.own_kept = own_weight, own_kept
         self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 
     @classmethod
@@ -170,12 +150,18 @@ class LayoutStage:
         recipe, (rooms, held) = start.recipe, (start.rooms(held=held) for held in (False, True))
         if "layout" not in start.given:
             start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rooms.category, recipe.model.categories)
-        weights = recipe.measure_weight, recipe.living_weight
+        weights = recipe.measure_weight, recipe.living_weight, recipe.own_weight, recipe.own_kept
         return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
-        """Loss of one random batch."""
-        return self.scored(model, draw_batch(self.rooms, self.nodes, generator).to(model.device), generator)
+        """Loss of one random batch, and of rooms that the network arranges alone."""
+        batch = draw_batch(self.rooms, self.nodes, generator).to(model.device)
+        loss, parts = self.scored(model, batch, generator)
+        if self.own_weight:
+            alone = draw_batch(self.rooms, self.nodes, generator, SPARSE).to(model.device)
+            own, of_own = own_loss(model, alone, generator, self.own_kept)
+            loss, parts = loss + self.own_weight * own, {**parts, **of_own}
+        return loss, parts
 
     def scored(
         self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 
@@ -9,6 +11,7 @@ from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable
 from echomodel.openingrows import kept_free
 from echomodel.rules.living import RULES, Plan
+from echomodel.training.relation_loss import told_triplets
 from echomodel.training.rooms import LayoutBatch
 from echomodel.vocabulary import vocabulary
 
@@ -26,30 +29,45 @@ def living_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) 
     Arguments:
         boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
     """
-    graph = batch.graph
-    kinds = vocabulary().categories
+    plan = plan_of_batch(batch, boxes, known)
+    with torch.no_grad():
+        truth = replace(plan, size=batch.boxes.size, position=batch.boxes.position, yaw=batch.boxes.yaw)
+        vars(plan)["anchor"] = truth.anchor  # whom each attends is not the network's to choose
+    weight = (1 - level).square() * ~known * (batch.tidy[batch.graph.scene] > 0)
+    return living_miss(plan, batch.graph.openings[batch.graph.scene], stands_low(batch.boxes), weight)
+
+
+def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:
+    """What the living rules look at, for all rooms of a batch at once; sizes are not pulled at."""
+    graph, kinds = batch.graph, vocabulary().categories
     free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
-    plan = Plan(
+    return Plan(
         tuple(kinds[number] for number in graph.category.tolist()),
         free.size, free.position, free.yaw, graph.scene, graph.floor, ((),) * graph.num_scenes,
-        _told(batch), known,
+        told_triplets(batch), known,
     )  # fmt: skip
-    weight = (1 - level).square() * ~known * (batch.tidy[graph.scene] > 0)
-    with torch.no_grad():
-        truth = Plan(
-            plan.kinds, batch.boxes.size, batch.boxes.position, batch.boxes.yaw, plan.scene, plan.floor, plan.openings,
-            plan.triplets, known,
-        )  # fmt: skip
-        vars(plan)["anchor"] = truth.anchor  # whom each attends is not the network's to choose
+
+
+def stands_low(boxes: Boxes) -> Tensor:
+    """(N,) bool, what begins so low that it is in the way of doors and windows."""
+    return (boxes.position[:, 1] < STANDING).detach()
+
+
+def living_miss(plan: Plan, openings: Tensor, low: Tensor, weight: Tensor) -> Tensor:
+    """Weighted mean over the boxes of how far they miss the living rules and stand in the way of doors and windows.
+
+    Arguments:
+        openings: (N, O, ROW), of the room of each box. low: (N,) bool, what stands so low that it is in their way.
+        weight: (N,).
+    """
     total = weight.new_zeros(())
     for rule in RULES:
         if rule.name in OTHERWISE:
             continue
         seen = rule.find(plan)
-        total = total + (_miss(seen.margin) * weight[seen.who]).sum()
-    clear = kept_free(free, graph.openings[graph.scene])
-    low = (batch.boxes.position[:, 1] < STANDING) & plan.which(lambda kind: kind.support == "floor")
-    total = total + (_miss(clear) * weight * low).sum()
+        total = total + (missed(seen.margin) * weight[seen.who]).sum()
+    clear = kept_free(Boxes(plan.size, plan.position, plan.yaw), openings)
+    total = total + (missed(clear) * weight * (low & plan.which(lambda kind: kind.support == "floor"))).sum()
     return total / weight.sum().clamp_min(1)
 
 
@@ -61,11 +79,6 @@ def heading_distance(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Ten
     return (off * weight).sum() / weight.sum().clamp_min(1)
 
 
-def _miss(margin: Tensor) -> Tensor:
+def missed(margin: Tensor) -> Tensor:
+    """By how much margins are missed, as the losses count it: logarithmic, so that none pulls without bounds."""
     return torch.log1p(FIRM * (SLACK - margin.float()).clamp_min(0))
-
-
-def _told(batch: LayoutBatch) -> Tensor:
-    """(E, 3) int64, the relations that the graphs tell."""
-    pair, predicate = batch.predicates.nonzero(as_tuple=True)
-    return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)

@@ -56,6 +56,8 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     ("relation_weight", 0, 10**6),
     ("measure_weight", 0, 10**6),
     ("living_weight", 0, 10**6),
+    ("own_weight", 0, 10**6),
+    ("own_kept", 1, 1000),
 )
 
 
@@ -80,6 +82,8 @@ class Recipe:
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         living_weight: weight of what a person would point at in the predicted boxes (the living rules' margins).
+        own_weight: weight of what is wrong with rooms that the network arranges alone (`training.own_samples`).
+        own_kept: last steps of sampling that it is led back through.
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes.
@@ -101,6 +105,8 @@ class Recipe:
     relation_weight: float = 0.5
     measure_weight: float = 0.0
     living_weight: float = 0.0
+    own_weight: float = 0.0
+    own_kept: int = 2
     validate_every: int = 2000
     save_every: int = 1000
     log_every: int = 50
