@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from echomodel.rules.living.plan import kind_of
+from echomodel.vocabulary import vocabulary
 
 OVER = 0.15  # metres between the middles of a lamp and of what it hangs over
 
@@ -22,6 +23,7 @@ def lamps_along(
         fixed: (n,) bool, boxes that must not move.
     """
     kinds, out = [kind_of(word) for word in categories], after.copy()
+    above = vocabulary().predicate_id("above")
     lit = [j for j, kind in enumerate(kinds) if kind.support == "floor" and kind.role in ("board", "bed")]
     for i, kind in enumerate(kinds):
         if kind.support != "ceiling" or fixed[i] or not lit:
@@ -29,6 +31,11 @@ def lamps_along(
         off = np.hypot(*(before[lit] - before[i])[:, [0, 2]].T)
         j = lit[int(off.argmin())]
         ends = triplets[(triplets[:, [0, 2]] == i).any(1)][:, [0, 2]].ravel().tolist()
-        if off.min() < OVER and {*ends} <= {i, j}:
+        told = [k for a, predicate, k in triplets.tolist() if a == i and predicate == above and k in lit]
+        if len(told) == 1:  # perhaps in a row with others
+            j = told[0]
+        elif off.min() >= OVER:
+            continue
+        if {*ends} <= {i, j}:
             out[i, [0, 2]] += (after[j] - before[j])[[0, 2]] - (after[i] - before[i])[[0, 2]]
     return out

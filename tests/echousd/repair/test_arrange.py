@@ -263,3 +263,5 @@ def test_a_lamp_follows_the_table_that_is_moved_below_it():
     assert np.array_equal(lamps_along(words, before, after, none, first), after)
     told = np.array([(1, ID["left"], 2)])
     assert np.array_equal(lamps_along(words, before, after, told, free), after)
+    row = np.array([(1, ID["above"], 0), (2, ID["above"], 0)])  # both hang over it, beside each other
+    np.testing.assert_allclose(lamps_along(words, before, after, row, free)[2], (1.8, 1.8, 0.2))
