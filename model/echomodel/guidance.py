@@ -68,6 +68,8 @@ def relation_guided(
     def guided(x: Tensor, level: Tensor) -> Tensor:
         clean = predict(x, level)
         weight = ((1 - level) * (level > 0))[:, None]
+        if not bool(weight.any()):  # in nothing but noise no step has a length
+            return clean
         for _ in range(rounds):
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()

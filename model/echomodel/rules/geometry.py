@@ -158,9 +158,11 @@ def pairs(
         fronts: (N,) bool, boxes that have a front; None = none.
     """
     position = boxes.position - centre
+    size, yaw = boxes.size, boxes.yaw
     return PairGeometry(
-        boxes.size[subject], boxes.size[object_], position[subject], position[object_],
-        boxes.yaw[subject], boxes.yaw[object_], oriented,
+        size.index_select(0, subject), size.index_select(0, object_),
+        position.index_select(0, subject), position.index_select(0, object_),
+        yaw.index_select(0, subject), yaw.index_select(0, object_), oriented,
         None if fronts is None else fronts[subject] & fronts[object_],
     )  # fmt: skip
 
