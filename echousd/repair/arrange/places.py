@@ -27,6 +27,7 @@ WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, wher
 TOO_FAR, IN_THE_ROOM = 5.5, 0.8  # metres from which on a sofa may leave its wall for that, and what that costs
 EDGE = 0.75  # metres between the middle of a plant and a wall: so near it may stay where it was drawn
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
+AMID = 3.0  # for a desk or plant that stands where it was drawn, in the room
 
 
 def places(setting: Setting, state: State, i: int) -> Poses:
@@ -66,9 +67,10 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     else:
         rows += in_the_open(setting, i, lonely)
         rows += along_walls(setting, i, lonely + 0.5)
+    at_edge = (kind.role == "board" and kind.access > 0) or kind.role == "decor"
     twins = beside_twin(setting, state, i)
     rows = [*twins, *((*row[:3], row[3] + LONELY * bool(twins)) for row in rows)]
-    afar = OFF_WALL if kind.wall else (3.0 if kind.role == "board" and kind.access else 1.0) + lonely
+    afar = OFF_WALL if kind.wall else (AMID if at_edge else 1.0) + lonely
     if kind.role == "decor" and float(depth_inside(setting.floor, np.array([draft]))[0]) < EDGE:
         afar = lonely
     rows = [*rows, *as_drawn(setting, i, draft, afar)]
