@@ -18,6 +18,7 @@ Size = np.ndarray
 Slot = tuple[float, float, float, float]
 Slots = Callable[[Size, Size, Category, int, float, float], list[Slot]]
 HALF_PI = math.pi / 2
+LONG = 1.3  # times as long as deep
 NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 
@@ -163,11 +164,12 @@ def foot(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahea
     """Benches and ottomans: at the foot of a bed, before a sofa or armchair."""
     out = []
     bed = kind.role == "bed"
+    askew = 1.5 if max(own[0], own[2]) > LONG * min(own[0], own[2]) else 0.3  # a bench lies along the foot
     for gap, more in ((0.04 if bed else 0.3, 0.0), (0.1 if bed else 0.45, 0.1), (0.2 if bed else 0.6, 0.3)):
         for lateral in (0.0, -0.15, 0.15) if bed else (0.0, -0.5, 0.5, -0.9, 0.9, -1.3, 1.3):
             for turn in (0.0, HALF_PI):
                 depth = own[2] if turn == 0.0 else own[0]
-                wide = 0.0 if (own[0] >= own[2]) == (turn == 0.0) else 0.3
+                wide = 0.0 if (own[0] >= own[2]) == (turn == 0.0) else askew
                 out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + wide + 0.2 * abs(lateral)))
     if not bed:  # at the sides of the group
         for side in (-1.0, 1.0):

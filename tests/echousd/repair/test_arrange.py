@@ -174,6 +174,14 @@ def test_chairs_are_not_squeezed_where_there_is_room_at_the_other_side():
     assert 2.4 - np.abs(position[1:, [0, 2]]).max() - 0.25 > 0.4
 
 
+def test_a_bench_lies_along_the_foot_of_its_bed():
+    size = [(1.8, 1.0, 2.1), (1.2, 0.45, 0.4)]
+    drawn = [(-1.2, 0, 0.0), (2.0, 0, 0.4)]
+    (bed, bench), yaw = arranged(["double_bed", "bench"], size, drawn, [np.pi / 2, np.pi])
+    assert abs(np.cos(yaw[0] - yaw[1])) == pytest.approx(1.0, abs=0.01)
+    assert np.linalg.norm(bed - bench) < 1.05 + 0.2 + 0.25
+
+
 def test_in_a_room_that_is_too_full_furniture_is_smaller():
     words = ["double_bed", "nightstand", "nightstand", "wardrobe", "tv_stand", "armchair"]
     size = [(2.0, 1, 2.3), (0.6, 0.5, 0.5), (0.6, 0.5, 0.5), (2.2, 2.2, 0.65), (2.4, 0.5, 0.5), (0.95, 0.9, 0.95)]
