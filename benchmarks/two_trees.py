@@ -1,6 +1,6 @@
 """What the same work costs in another checkout of this repository, in CPU seconds of one thread, in turns.
 
-    git worktree add --detach /tmp/before REVISION && python benchmarks/two_trees.py /tmp/before [--repeats 3]
+    git worktree add --detach ../before REVISION && python benchmarks/two_trees.py ../before [--repeats 3]
 
 A ratio below one: this tree is faster. Graphs without the relations that only one of them knows, a room of boxes.
 """

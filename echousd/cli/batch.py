@@ -60,7 +60,7 @@ def run(
     shapes: Annotated[
         str | None, typer.Option(help="parts, sdf, library, guided, boxes; default: the best of the model.")
     ] = None,
-    assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library.")] = None,
+    assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library and guided.")] = None,
     stretch: Annotated[
         float | None, typer.Option(help="How much models may be stretched; default 1.15.", min=1, max=4)
     ] = None,

@@ -1,4 +1,4 @@
-"""Options that several commands have, each told in one way."""
+"""Options that several commands have in the same words."""
 
 from __future__ import annotations
 

@@ -31,7 +31,8 @@ from echousd.room.paths import (
 from echousd.room.placing import place_layouts
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
-from echousd.room.styles import ROOM_STYLE, free_name
+from echousd.naming import free_name
+from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface
 from echousd.room.thumbnails import thumbnails
 from echousd.room.volume import room_points, room_volume

@@ -102,7 +102,7 @@ def edit(
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
             made_of = saved.manifest["shapes"]
-            again = made_of in ("parts", "sdf") or (made_of == "library" and wishes.library is not None)
+            again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and wishes.library is not None)
             shapes = shapes or (made_of if again else default_source(model_used))
             check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
             given = given_pieces(graph, shapes, wishes, fresh)

@@ -37,7 +37,7 @@ def style_groups(graph: SceneGraph) -> dict[str, str]:
     for relation in graph.relations:
         if "style" in vocabulary().predicate(relation.predicate).unites:
             alike.append((place[relation.subject], place[relation.object]))
-    alike += _rows(graph)
+    alike += _rows(graph, _joined(alike, len(place)))
     alike += _sets(graph, _joined(alike, len(place)))
     group_of = _joined(alike, len(place))
     members: dict[int, list[str]] = {}
@@ -64,17 +64,18 @@ def _joined(alike: Sequence[tuple[int, int]], count: int) -> list[int]:
     return connected_components(links, directed=False)[1].tolist() if count else []
 
 
-def _rows(graph: SceneGraph) -> list[tuple[int, int]]:
-    """Pairs of lamps without a style that are told to hang above the same piece, in a row."""
+def _rows(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of lamps without a style that are told to hang above the same piece, in a row; none of two told styles."""
     place = {node.name: number for number, node in enumerate(graph.nodes)}
-    first: dict[tuple[str, str], int] = {}
-    pairs = []
+    stated = {group_of[number] for number, node in enumerate(graph.nodes) if node.style}
+    rows: dict[tuple[str, str], list[int]] = {}
     for relation in graph.relations:
-        lamp = graph.nodes[place[relation.subject]]
+        number = place[relation.subject]
+        lamp = graph.nodes[number]
         if relation.predicate == "above" and not lamp.style and vocabulary().category(lamp.category).role == "light":
-            number = place[relation.subject]
-            pairs.append((number, first.setdefault((lamp.category, relation.object), number)))
-    return pairs
+            rows.setdefault((lamp.category, relation.object), []).append(number)
+    one = [row for row in rows.values() if len(stated & {group_of[number] for number in row}) < 2]
+    return [(number, row[0]) for row in one for number in row]
 
 
 def _sets(graph: SceneGraph, group_of: Sequence[int]) -> list[tuple[int, int]]:
@@ -111,8 +112,6 @@ def equal_sizes(
 
     Those that are nearly alike get the smallest extents among them, very different ones the smallest piece's, and
     those of a set whose size is given that size. Lamps of the ceiling hang as low as the lowest of them.
-
-    Chairs of a table and nightstands need not be alike before: they become as large as their middle one.
 
     Arguments:
         names, categories: n words each.

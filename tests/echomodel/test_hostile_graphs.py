@@ -1,4 +1,4 @@
-"""Bad input that the issue names: the compact and the released model on hostile graphs, and what else they refuse."""
+"""Bad input: the compact and the released model on hostile graphs, and what else they refuse."""
 
 from __future__ import annotations
 

@@ -115,6 +115,7 @@ def test_broken_tables_are_told(tmp_path):
         ("table_lod1", ("tables",), False),
         ("table_lod1", ("table_lod2",), False),
         ("chair_collision", ("chair_visual",), True),
+        ("sofa_collision", ("sofa_high",), True),
     ],
 )
 def test_a_file_stands_in_for_one_of_the_same_name_alone(stem, others, expected):

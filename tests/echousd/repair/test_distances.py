@@ -14,7 +14,7 @@ CLOSE = next(p.id for p in vocabulary().predicates if p.name == "close_by")
 TABLE, CHAIR = (1.6, 0.75, 0.9), (0.45, 0.85, 0.5)
 
 
-def laid(gap: float, long: float = 1.6) -> np.ndarray:
+def laid(gap: float) -> np.ndarray:
     """(5, 3) float, centres of a table and four chairs that are drawn so far from it, somewhat unevenly."""
     ahead = 0.45 + 0.25 + gap
     uneven = (-0.01, 0.0, 0.0, 0.01)

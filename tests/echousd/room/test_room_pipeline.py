@@ -73,6 +73,14 @@ def test_lamps_in_a_row_and_twin_beds_are_of_one_style():
     assert found == {"table": "room", "a": "set_a", "b": "set_a", "c": "room", "l": "set_l", "r": "set_l"}
 
 
+def test_lamps_in_a_row_do_not_join_two_told_styles():
+    objects = "chair: {category: chair, style: oak}, sofa: {category: multi_seat_sofa, style: white}"
+    objects += ", table: table, a: pendant_lamp, b: pendant_lamp"
+    told = "a above table, b above table, a same_style_as chair, b same_style_as sofa"
+    found = style_groups(SceneGraph.from_yaml(f"room: bedroom\nobjects: {{{objects}}}\nrelations: [{told}]"))
+    assert found == {"chair": "oak", "sofa": "white", "table": "room", "a": "oak", "b": "white"}
+
+
 def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
     corners = ((1.0, 1.0), (5.0, 1.0), (5.0, 4.0), (3.0, 4.0), (3.0, 3.0), (1.0, 3.0))
     nodes = (Node("stool", "stool"),)
