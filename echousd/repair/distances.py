@@ -82,7 +82,7 @@ def kept_behind(categories: Sequence[str], size: np.ndarray, drawn: np.ndarray) 
 
 
 def spread_at_walls(category: str, size: np.ndarray) -> float:
-    """Metres to the wall of a piece of size (3,) that belongs at none but stands there: a plant, an armchair."""
+    """Metres to the wall of a piece of size (3,) that belongs at none but stands there: a plant, a lamp."""
     least, middle, deviation, most = IN_THE_ROOM
     return min(max(middle + deviation * score(category, size), least), most)
 
@@ -118,7 +118,7 @@ def seen_from(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, of: int) 
 
 def over_bed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, lamp: int, bed: int) -> float:
     """Metres along the longer sides of a bed from its middle to the lamp over it; boxes as `seen_from`."""
-    if size[bed, 0] > size[bed, 2]:
+    if size[bed, 0] >= size[bed, 2]:
         return 0.0
     aside, ahead, _, _ = seen_from(size, position, yaw, bed)[lamp]
     drawn = np.array([ahead] if abs(aside) < size[bed, 0] / 4 else [])

@@ -8,8 +8,9 @@ import numpy as np
 
 from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import vocabulary
+from echousd.repair.distances import BED_LIT
 
-OVER = 0.15  # metres between the middles of a lamp and of what it hangs over
+OVER = 0.15  # metres between the middles of a lamp and of the table that it hangs over
 
 
 def lamps_along(
@@ -34,7 +35,7 @@ def lamps_along(
         told = [k for a, predicate, k in triplets.tolist() if a == i and predicate == above and k in lit]
         if len(told) == 1:  # perhaps in a row with others
             j = told[0]
-        elif off.min() >= OVER:
+        elif off.min() >= (BED_LIT.most if kinds[j].role == "bed" else OVER):
             continue
         if {*ends} <= {i, j}:
             out[i, [0, 2]] += (after[j] - before[j])[[0, 2]] - (after[i] - before[i])[[0, 2]]

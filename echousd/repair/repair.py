@@ -234,9 +234,10 @@ def repair_boxes(
         chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
         if chosen.paid.max(initial=0.0) > BAD:  # too full, perhaps
             less = suited(at, smaller_sizes(at.problem.categories, at.size, free))
-            other = arrange(setting_of(less, turned, openings=openings, outline=floor_polygon))
-            if other.total < chosen.total - WORTH:
-                at, chosen = less, other
+            if not np.array_equal(less.size, at.size):
+                other = arrange(setting_of(less, turned, openings=openings, outline=floor_polygon))
+                if other.total < chosen.total - WORTH:
+                    at, chosen = less, other
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw)
     found = solve(at, config)

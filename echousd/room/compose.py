@@ -13,6 +13,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.data.dressing import KINDS
+from echousd.naming import free_name
 from echousd.room import assets, cameras, coverings, joints, lights, looks, materials, materialx, physics, structure
 from echousd.room.dressing import Dressing, dress
 from echousd.room.dressing.layer import dressing_layer
@@ -31,7 +32,6 @@ from echousd.room.paths import (
 from echousd.room.placing import place_layouts
 from echousd.room.room import RoomData
 from echousd.room.stored import Shelf
-from echousd.naming import free_name
 from echousd.room.styles import ROOM_STYLE
 from echousd.room.surface import surface
 from echousd.room.thumbnails import thumbnails

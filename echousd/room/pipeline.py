@@ -84,8 +84,8 @@ def generate(
         room: prim path of one room where the file holds several.
         seed: of all randomness, 0 to 2^63 - 1; equal arguments give equal rooms.
         shapes: where geometry comes from, a name of `echousd.room.sources`: `parts`, furniture built from the model's
-            descriptions, `sdf`, the model's shape branch, plain `boxes`, or `library` or `guided`, models of `assets`; None =
-            `parts` where the model can. An object of the graph may say otherwise (`source`, `asset`).
+            descriptions, `sdf`, the model's shape branch, plain `boxes`, or `library` or `guided`, models of `assets`;
+            None = `parts` where the model can. An object of the graph may say otherwise (`source`, `asset`).
         model: a loaded model, a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`), a weights
             file (one of `echousd convert`, too), or None for the weights that ship with the package.
         preset: which kind of model it must be (`echomodel.loading.PRESETS`); None = any.

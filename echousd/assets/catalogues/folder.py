@@ -11,7 +11,8 @@ from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
 
 STAND_IN = re.compile(r"[_\-. ](collision|collider|convex|physics|lod_?[1-9])\d*$", re.IGNORECASE)
-SHOWN = re.compile(r"([_\-. ](visual|render|mesh|geo|model|base|high|lod_?0))?", re.IGNORECASE)  # what follows the name of the other one
+# what follows the name of the other one
+SHOWN = re.compile(r"([_\-. ](visual|render|mesh|geo|model|base|high|lod_?0))?", re.IGNORECASE)
 GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
 
 

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.setting import Setting, State
-from echousd.repair.arrange.slots import STANDS, Slot
+from echousd.repair.arrange.slots import INNER, STANDS, Slot
 from echousd.repair.distances import APART, MOST_UNDER, kept_apart, seen_from
 
 Row = tuple[float, float, float, float]  # x, z, yaw, price
@@ -23,7 +24,7 @@ def slots_at(setting: Setting, i: int, anchor: int) -> list[Slot]:
     count = int(setting.sitting[(setting.anchor == anchor) & setting.seats].sum())
     near = apart(setting, i, anchor)
     found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count, *near)
-    if stands == "head":  # each with its own gap to the wall
+    if stands == "head":  # all with the same gap to the wall
         level = float(setting.behind[_mates(setting, stands, anchor)[0]] - setting.behind[anchor])
         found = [(lateral, forward + level, turn, price) for lateral, forward, turn, price in found]
     setting.slots[i, anchor] = found
@@ -36,6 +37,8 @@ def apart(setting: Setting, i: int, anchor: int) -> tuple[float, float]:
     if stands not in APART:
         return 0.0, 0.0
     drawn = seen_from(setting.size, setting.draft, setting.heading, anchor)[_mates(setting, stands, anchor)]
+    if stands == "before" and setting.kinds[anchor].name in vocabulary().cornered:
+        drawn = drawn + np.array([0.0, 0.0, 0.0, INNER])
     kept, ahead = kept_apart(stands, drawn, setting.categories[anchor], setting.size[anchor])
     return max(kept, -MOST_UNDER * float(setting.size[i, 2])), ahead
 

@@ -136,12 +136,13 @@ def _in_zones(setting: Setting, state: State, i: int, poses: Poses, others: np.n
     doors, strange = setting.doors, fronts(setting, state, strangers)
     light = setting.windows if setting.stances[i] == "opposite" else NO_ZONES  # of a screen
     own = fronts(setting, state, kept_free)
+    close = own.price == BLOCKED  # the wider space before a sofa is for other groups to leave
     at_door, glare, before, knees = _depths_of(setting.size[i], poses, (doors, light, strange, own))
     out = (np.maximum(at_door, 0) > 0.04) @ doors.price
     out += (glare > GLARE) @ light.price
     out = out + (before > 0.03) @ strange.price * (CROWDED / BLOCKED if setting.movable[i] else 1.0)
     if kept_free:
-        out = out + ELBOWS * (knees > (TUCKED if setting.stances[i] == "before" else ELBOW)).sum(1)
+        out = out + ELBOWS * (knees[:, close] > (TUCKED if setting.stances[i] == "before" else ELBOW)).sum(1)
     front = own_front(setting, i)
     if front is None:
         return out

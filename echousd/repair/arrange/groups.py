@@ -75,7 +75,7 @@ def make_way(setting: Setting, state: State, own: np.ndarray) -> None:
     others = min((group for group in groups if group is not members), key=lambda one: _between(state, members, one))
     there = _bill(setting, state, others, own)
     kept = state.position.copy()
-    best, found = cramped + there - GAIN, kept
+    best, found = cramped + there + bareness(setting, state) - GAIN, kept
     for way, step in product(_ways(setting, state, int(setting.group[others[0]])), SHOVES):
         state.position[others] += step * way
         if _bill(setting, state, others, own, there + HOPE * cramped) < there + HOPE * cramped:
@@ -83,6 +83,7 @@ def make_way(setting: Setting, state: State, own: np.ndarray) -> None:
                 state.position[members] += _best_slide(setting, state, members, own, own_way)
             after = _bill(setting, state, others, own, best)
             after += _bill(setting, state, members, own, best - after) if after < best else 0.0
+            after += bareness(setting, state) if after < best else 0.0
             if after < best:
                 best, found = after, state.position.copy()
         state.position[:] = kept
@@ -97,6 +98,7 @@ def _between(state: State, members: np.ndarray, others: np.ndarray) -> float:
 def _groups(setting: Setting) -> list[np.ndarray]:
     """Numbers of the boxes of every group of two or more, but for lamps of the ceiling and what keeps to its wall."""
     stays = np.array([stance == "near" for stance in setting.stances], bool)  # a sideboard does not go with its table
+    stays |= (setting.carrier >= 0) & stays[setting.carrier.clip(0)]  # nor does what stands on it
     standing = np.flatnonzero(~setting.hanging & ~stays)
     found = [standing[setting.group[standing] == root] for root in np.unique(setting.group[standing]).tolist()]
     return [members for members in found if len(members) > 1]

@@ -76,7 +76,10 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     rows = [*rows, *as_drawn(setting, i, draft, afar)]
     out = Poses.of([*rows, *as_stated(setting, state, i)], height)
     if kind.role == "decor":  # plants have no front
-        out = Poses(out.position, np.full(len(out), _squared(setting, i)), out.price)
+        oblong = setting.size[i, 0] != setting.size[i, 2]
+        square = _squared(setting, i)
+        across = np.abs(np.sin(out.yaw - square)) > 0.5  # an oblong one stands along its wall
+        out = Poses(out.position, np.where(across & oblong, out.yaw, square), out.price)
     return _as_told(setting, i, out)
 
 
@@ -193,7 +196,7 @@ def along_walls(setting: Setting, i: int, price: float) -> list[Row]:
 def corners(setting: Setting, i: int, price: float) -> list[Row]:
     """In the corners of the room: plants and lamps like them."""
     half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2
-    other = spread_at_walls(setting.categories[i], setting.size[i, ::-1])
+    other = spread_at_walls(f"{setting.categories[i]} aside", setting.size[i])
     rows = []
     polygon = setting.floor.polygon
     for k, corner in enumerate(polygon):

@@ -15,7 +15,7 @@ from echomodel.rules.living.company import PLACE
 from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import Category, vocabulary
 from echousd.repair.belonging import shared_fraction
-from echousd.repair.distances import kept_behind
+from echousd.repair.distances import BEHIND, kept_behind
 from echousd.repair.geometry import Floor, axes
 from echousd.repair.problem import ON_FLOOR, Posed, required_order
 
@@ -121,7 +121,7 @@ class Setting:
 
     @cached_property
     def slots(self) -> dict[tuple[int, int], list[tuple[float, float, float, float]]]:
-        """Slots of a box at what it attends, kept when they are asked for again (`places.slots_at`)."""
+        """Slots of a box at what it attends, kept when they are asked for again (`attending.slots_at`)."""
         return {}
 
     @cached_property
@@ -276,9 +276,9 @@ def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], ou
     assert problem.surroundings is not None
     plan = plan_of(at, problem.categories, problem.floor.polygon, (), problem.triplets)
     top = float((at.position[:, 1] + at.size[:, 1]).max(initial=0.0))
-    behind = kept_behind(
-        problem.categories, at.size, np.full(len(at.size), np.nan)
-    )  # those that were drawn are too alike
+    spread = kept_behind(problem.categories, at.size, np.full(len(at.size), np.nan))  # drawn ones are too alike
+    told = np.isin(np.arange(len(spread)), [one.subject for one in problem.stated if not one.others])  # of walls
+    behind = np.where(problem.fixed, problem.behind, np.where(told, np.minimum(spread, BEHIND[1]), spread))
     return Setting(
         problem.categories, at.size, at.position, at.yaw, problem.triplets, problem.rules, problem.centre,
         problem.fixed, turned, problem.floor, problem.height or top, problem.carrier, behind,

@@ -19,6 +19,7 @@ Slot = tuple[float, float, float, float]
 Slots = Callable[[Size, Size, Category, int, float, float], list[Slot]]
 HALF_PI = math.pi / 2
 LONG = 1.3  # times as long as deep
+INNER = 0.25  # metres that a coffee table reaches into the corner of a sofa
 NIGHTSTAND = 0.55  # metres that a nightstand takes beside a bed
 DEEPER = 0.27  # metres that a chair is pushed under its table where room is scarce
 
@@ -42,7 +43,7 @@ def before(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
         if width < depth * 0.95:
             more += 0.3
         for gap, away in ((apart, 0.0), (0.32, 0.05), (0.46, 0.05), (0.25, 0.3), (0.6, 0.3)):
-            gap = gap - 0.25 if inner else gap
+            gap = gap - INNER if inner else gap
             for lateral in (0.0, -0.08, 0.08, -0.2, 0.2, -0.35, 0.35):
                 if abs(lateral) < anchor[0] / 2:
                     out.append((lateral, anchor[2] / 2 + depth / 2 + gap, turn, more + away + 1.5 * abs(lateral)))
@@ -145,7 +146,8 @@ def beside(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
     out = []
     if kind.role == "bed":  # before its middle one gets in
         for lateral, forward, turn, more in head(own, anchor, kind, count, min(apart, 0.1), 0.0):
-            out += [(lateral, forward, turn, more), (lateral + math.copysign(NIGHTSTAND, lateral), forward, turn, 0.3)]
+            further = lateral + math.copysign(NIGHTSTAND, lateral)
+            out += [(lateral, forward, turn, more), (further, forward, turn, more + 0.3)]
     for side in (-1.0, 1.0):
         for gap, more in ((apart, 0.0), (apart + 0.08, 0.1), (apart + 0.21, 0.3)):
             lateral = side * (anchor[0] / 2 + own[0] / 2 + gap)

@@ -122,9 +122,7 @@ class LayoutBatch:
         return LayoutBatch(**{f.name: vars(self)[f.name].to(device) for f in fields(self)})
 
 
-def draw_batch(
-    rooms: PackedRooms, node_budget: int, generator: torch.Generator, dense: float = DENSE
-) -> LayoutBatch:
+def draw_batch(rooms: PackedRooms, node_budget: int, generator: torch.Generator, dense: float = DENSE) -> LayoutBatch:
     """Draw rooms until the node budget is reached, mirror them, thin their relations and make pseudo edits.
 
     Arguments:

@@ -88,6 +88,7 @@ def table_amid(plan: Plan) -> Found:
     least, which = worst(side, behind, about, 4 * len(plan), FAR)
     asked = side.unique()
     asked = asked[torch.isin(asked ^ 1, asked)]  # chairs sit opposite
+    asked = asked[known(plan.floor)[plan.scene[asked // 4]]]
     margin = torch.maximum(least[asked] - SQUEEZED, SPARE - least[asked ^ 1] + least[asked])
     at, other = worst(asked // 4, margin, asked, len(plan), FAR)
     who = (asked // 4).unique()

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import torch
 
-from echomodel.rules.living.found import Found, found, worst
+from echomodel.floors import signed_distance
+from echomodel.rules.living.found import Found, found, nobody, worst
 from echomodel.rules.living.plan import CLEAR_HEIGHT, FAR, Plan
 
 BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor
@@ -49,7 +50,7 @@ def floor_used(plan: Plan) -> Found:
         margin.append(limit - torch.minimum(nearest.values, walls[at]))
         measure.append(2 * radius[at])
     if not who:
-        return found(torch.zeros(0, dtype=torch.int64), plan.size.new_zeros(0))
+        return nobody(plan.size)
     return found(torch.stack(who), torch.stack(margin), measure=torch.stack(measure))
 
 
@@ -72,8 +73,6 @@ def sofa_ahead(plan: Plan) -> Found:
 
 def _inside(points: torch.Tensor, corners: torch.Tensor) -> torch.Tensor:
     """(P,): metres that points lie inside a floor, negative outside."""
-    from echomodel.floors import signed_distance
-
     return signed_distance(points[None], corners[None])[0]
 
 
