@@ -43,7 +43,7 @@ def test_new_asset_keeps_off_the_name_of_an_artists_file(root, told):
     fern = root.parent / "assets/fern/fern.usda"
     fern.parent.mkdir()
     fern.write_text(MINE)
-    graph = small_graph().add_node("fern", "bookshelf")  # nightstands and beds would share one asset
+    graph = small_graph().add_node("fern", "wardrobe")  # nightstands and beds would share one asset
     for _ in range(2):
         remade(root, graph).save(root.parent, preview=False)
         assert fern.read_text() == MINE
