@@ -81,6 +81,15 @@ def test_a_box_larger_than_its_floor_stands_in_the_middle() -> None:
     torch.testing.assert_close(guided.size, wide.size)
 
 
+def test_in_nothing_but_noise_boxes_stay() -> None:
+    boxes, floor = start(), rectangle(1.2, 1.2).expand(2, 4, 2)
+    x = boxes.encode(STATISTICS.scale())
+    assert verdicts(boxes, TRIPLETS).min() < 1
+    pull = relation_guided(lambda x, level: x, TRIPLETS, STATISTICS.scale(), rules="strict", strength=0.2, floor=floor)
+    assert torch.equal(pull(x, torch.ones(2)), x)
+    assert not torch.equal(pull(x, torch.tensor([0.9, 1.0])), x)
+
+
 def test_nothing_to_measure_leaves_the_denoiser_alone() -> None:
     def predict(x: Tensor, level: Tensor) -> Tensor:
         return x

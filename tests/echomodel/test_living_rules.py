@@ -168,6 +168,13 @@ def test_crowded_rooms_are_seen(room, fault, said):
     assert said in found[fault]
 
 
+def test_no_table_is_shoved_to_one_side_of_a_floor_that_is_unknown():
+    board = {"kind": "sideboard", "size": (1.4, 0.9, 0.4), "at": (0.0, 1.15), "yaw": np.pi}
+    room = with_one(SET, "board", **board)
+    assert ("table", "table_amid") in room.found()
+    assert ("table", "table_amid") not in room.found(floor=None)
+
+
 def test_a_sofa_stands_in_the_room_for_a_reason():
     hall = np.array([(-4.0, -5.0), (4.0, -5.0), (4.0, 2.0), (-4.0, 2.0)])
     assert ("sofa", "at_wall") not in LIVING.found(floor=hall)  # at its wall it would be 5 m from all else

@@ -70,6 +70,8 @@ def test_the_lamp_of_a_bed_hangs_where_it_was_drawn_over_it() -> None:
         assert over_bed(size, position, yaw, 1, 0) == pytest.approx(kept)
     away = np.array([(0.0, 0.0, 0.0), (1.5, 2.0, 0.5)])
     assert -0.2 <= over_bed(size, away, yaw, 1, 0) <= 0.7
+    square = np.array([(2.0, 1.0, 2.0), (0.5, 0.6, 0.5)])  # has no longer side
+    assert over_bed(square, np.array([(0.0, 0.0, 0.0), (0.1, 2.0, 0.5)]), yaw, 1, 0) == 0.0
 
 
 @pytest.mark.parametrize(("drawn", "kept"), [(-0.1, None), (0.0, 0.0), (0.045, 0.045), (0.3, None)])

@@ -1,0 +1,86 @@
+"""What the arranging reckons with: groups that slide, walls and slots that fixed or drawn pieces decide, poses."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+
+from echousd.repair import repair_boxes
+from echousd.repair.arrange.attending import slots_at
+from echousd.repair.arrange.groups import _groups
+from echousd.repair.arrange.places import places
+from echousd.repair.arrange.setting import Setting, State, setting_of
+from echousd.repair.geometry import axes, depth_inside
+from echousd.repair.problem import pose
+
+FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
+
+
+def setting(words: list[str], size: list, position: list, yaw: list, fixed: tuple[int, ...] = ()) -> Setting:
+    """The setting of boxes in a room of 5 by 4 metres, some of them fixed."""
+    still, none = np.isin(np.arange(len(words)), fixed), np.zeros(len(words), bool)
+    at = pose(
+        words, np.array(size, float), np.array(position, float), np.array(yaw, float), np.zeros((0, 3), int),
+        floor_polygon=FLOOR, height=2.7, fixed=still, rigid=none, turned=still,
+    )  # fmt: skip
+    return setting_of(at, still, openings=(), outline=FLOOR)
+
+
+def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> None:
+    words = ["dining_table", "dining_chair", "sideboard", "table_lamp"]
+    size = [(1.4, 0.75, 0.9), (0.5, 0.9, 0.5), (1.4, 0.9, 0.4), (0.3, 0.5, 0.3)]
+    found = setting(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
+    assert found.stances[2] == "near"
+    assert found.carrier[3] == 2
+    assert [members.tolist() for members in _groups(found)] == [[0, 1]]
+
+
+@pytest.mark.parametrize("width", [1.6, 1.8])
+def test_a_nightstand_comes_close_to_a_fixed_bed_that_is_flush_with_its_wall(width: float) -> None:
+    size = [(width, 1.0, 2.1), (0.5, 0.5, 0.4)]
+    drawn, still = [(0.0, 0.0, -0.95), (1.6, 0.0, 0.8)], [True, False]
+    found = setting(["double_bed", "nightstand"], size, drawn, [0.0, 0.0], (0,))
+    assert found.behind[0] == pytest.approx(0.0, abs=1e-9)
+    done = repair_boxes(
+        ["double_bed", "nightstand"], np.array(size), np.array(drawn), np.zeros(2), np.zeros((0, 3), int),
+        floor_polygon=FLOOR, height=2.7, fixed=np.array(still), rigid=np.array(still),
+    )  # fmt: skip
+    assert abs(done.position[1, 0]) - (done.size[1, 0] + width) / 2 < 0.13
+    assert done.position[1, 2] - done.size[1, 2] / 2 + 2.0 == pytest.approx(found.behind[1], abs=0.02)
+
+
+def test_the_coffee_table_of_a_corner_sofa_keeps_the_distance_that_was_drawn() -> None:
+    """0.35 m before the seats, which is 0.1 m before the box: it reaches into the corner."""
+    sofa, table = (2.6, 0.8, 1.6), (0.9, 0.4, 0.6)
+    ahead = 0.8 + 0.3 + 0.1
+    found = setting(["l_shaped_sofa", "coffee_table"], [sofa, table], [(0, 0, -1.2), (0, 0, ahead - 1.2)], [0, 0])
+    _, forward, _, _ = min(slots_at(found, 1, 0), key=lambda slot: slot[3])
+    assert forward == pytest.approx(ahead)
+
+
+@pytest.mark.parametrize("size", [(0.8, 1.0, 0.3), (0.3, 1.0, 0.8), (0.5, 1.0, 0.5)])
+def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, float]) -> None:
+    found = setting(["plant"], [size], [(0.4, 0.0, 0.3)], [0.0])
+    state = State(found.draft.copy(), found.heading.copy(), np.zeros(1, bool), {})
+    poses = places(found, state, 0)
+    side = axes(poses.yaw) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
+    signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
+    corners = poses.position[:, None, [0, 2]] + signs @ side
+    assert len(poses) > 20
+    assert depth_inside(found.floor, corners.reshape(-1, 2)).min() > -1e-6
+
+
+@pytest.mark.parametrize(("rigid", "times"), [(True, 1), (False, 2)])
+def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch, rigid: bool, times: int) -> None:
+    module, calls = import_module("echousd.repair.repair"), []
+    arrange = module.arrange
+    monkeypatch.setattr(module, "arrange", lambda found: calls.append(found) or arrange(found))
+    size = np.array([(2.0, 1.0, 2.2), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6)])
+    small = FLOOR * (0.46, 0.6)
+    repair_boxes(
+        ["double_bed", *["wardrobe"] * 3], size, np.zeros((4, 3)), np.zeros(4), np.zeros((0, 3), int),
+        floor_polygon=small, height=2.7, rigid=np.full(4, rigid),
+    )  # fmt: skip
+    assert len(calls) == times
