@@ -10,10 +10,10 @@ from statistics import NormalDist
 
 import numpy as np
 
-from echomodel.data.rooms.statistics import back_gaps, quantile
+from echomodel.data.rooms.statistics import USUAL_GAPS, back_gaps, quantile
 from echomodel.vocabulary import vocabulary
 
-BEHIND = (0.0, 0.12)  # metres between a back and its wall: what nine in ten real pieces keep, none runs into it
+BEHIND = (0.0, 0.08)  # metres between a back and its wall: more is seen as away from it, none runs into it
 GRAZE = 0.005  # metres
 HUNG = 0.01  # the same of what hangs on a wall
 IN_THE_ROOM = (0.02, 0.12, 0.08, 0.3)  # least, middle, deviation and most of what belongs at no wall but stands there
@@ -49,7 +49,7 @@ APART = {
     "beside": Usual(0.02, 0.3, 0.1, 0.08),
 }
 BESIDE = Usual(-0.3, 0.15, -0.05, 0.12)  # metres that side tables stand before the middle of their sofa's ends
-BED_LIT = Usual(-0.2, 0.7, 0.3, 0.3)  # metres from the middle of a bed to its lamp, towards the foot
+BED_LIT = Usual(-0.1, 0.25, 0.05, 0.08)  # metres from the middle of a bed to its lamp, towards the foot
 MOST_UNDER = 0.45  # of its depth that a chair is pushed under its table
 
 
@@ -73,7 +73,8 @@ def kept_behind(categories: Sequence[str], size: np.ndarray, drawn: np.ndarray) 
         if BEHIND[0] - GRAZE <= drawn[i] <= BEHIND[1]:
             out[i] = max(drawn[i], BEHIND[0])
         elif kind.wall or kind.access:
-            low, middle, high = back_gaps(word)
+            found = back_gaps(word)
+            low, middle, high = found if found[1] < BEHIND[1] else USUAL_GAPS  # desks, half of them further off
             spread = quantile((2 * low - middle, low, middle, high, 2 * high - middle), luck)
             out[i] = min(max(spread, BEHIND[0]), BEHIND[1])
         else:

@@ -25,7 +25,7 @@ HIGH_UP = 0.6  # for a lamp at the ceiling itself that does not hang in the midd
 AHEAD = np.arange(0.0, 15.0, 0.1)  # metres before a sofa
 WATCHED = 3.6  # metres between a screen's wall and the middle of its sofa, where there is room
 TOO_FAR, IN_THE_ROOM = 5.5, 0.8  # metres from which on a sofa may leave its wall for that, and what that costs
-EDGE = 0.75  # metres between the middle of a plant and a wall: so near it may stay where it was drawn
+EDGE = 0.5  # metres between the middle of a plant and a wall: so near it may stay where it was drawn
 OFF_WALL = 5.0  # for a piece that belongs at a wall and stands elsewhere
 AMID = 3.0  # for a desk or plant that stands where it was drawn, in the room
 
