@@ -18,7 +18,7 @@ from echomodel.rules import verdicts
 from echomodel.samplers import sample
 from echomodel.training.living_loss import HEADINGS, heading_distance, living_loss
 from echomodel.training.own_samples import SPARSE, own_loss
-from echomodel.training.relation_loss import relation_hinge
+from echomodel.training.relation_loss import relation_hinge, told_triplets
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
@@ -180,11 +180,10 @@ class LayoutStage:
                 continue
             batch = make_batch(self.held, picked, generator, train=False).to(model.device)
             boxes = sample_boxes(model, batch, generator)
-            pair, predicate = batch.predicates.nonzero(as_tuple=True)
-            triplets = torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
+            triplets = told_triplets(batch)
             kept = verdicts(boxes, triplets, rules=name)
             for entry in vocabulary().predicates:
-                mine = kept[(predicate == entry.id) & (kept >= 0)]
+                mine = kept[(triplets[:, 1] == entry.id) & (kept >= 0)]
                 if len(mine):
                     out[f"{name}/{entry.name}"] = float(mine.float().mean())
             out[f"{name}/all"] = float(kept[kept >= 0].float().mean())

@@ -8,8 +8,6 @@ import pytest
 import torch
 
 from echomodel.compact.model import CompactModel
-from echomodel.data.build import build_data
-from echomodel.data.roomset import RoomSet
 from echomodel.samplers import sample
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.own_samples import LONGEST, own_loss, own_rooms
@@ -18,18 +16,6 @@ from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
 from echomodel.training.run import open_run
 
 RECIPES = Path(__file__).parents[3] / "model" / "recipes"
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    build_data(folder, "smoke", seed=3)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def packed(data: Path) -> PackedRooms:
-    return PackedRooms.from_set(RoomSet(data / "rooms"), ("sgfront", "strict"), held=False)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.compact.model import WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.data.build import build_data
 from echomodel.data.rooms.generator import generate_rooms
 from echomodel.data.roomset import RoomSet
 from echomodel.echo import EchoModel
@@ -24,28 +23,12 @@ from echomodel.training.layout_stage import measure_distance
 from echomodel.training.living_loss import heading_distance, living_loss
 from echomodel.training.logs import read_log
 from echomodel.training.recipe import OptimizerConfig, Recipe, read_recipe
-from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch, make_batch
+from echomodel.training.relation_loss import told_triplets
+from echomodel.training.rooms import PackedRooms, draw_batch, make_batch
 from echomodel.training.run import open_run
 from echomodel.training.trainer import step_generator
 
 RECIPES = Path(__file__).parents[3] / "model" / "recipes"
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    build_data(folder, "smoke", seed=3)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def packed(data: Path) -> PackedRooms:
-    return PackedRooms.from_set(RoomSet(data / "rooms"), ("sgfront", "strict"), held=False)
-
-
-def told_triplets(batch: LayoutBatch) -> torch.Tensor:
-    pair, predicate = batch.predicates.nonzero(as_tuple=True)
-    return torch.stack([batch.pairs.receiver[pair], predicate, batch.pairs.sender[pair]], dim=1)
 
 
 def smoke(stage: str, data: Path, *settings: str) -> Recipe:
