@@ -14,7 +14,18 @@ from echousd.batches.devices import CPU, network_processes
 from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
-from echousd.batches.plan import STATE, URL, Plan, difference, load_plan, make_plan, packed, save_plan
+from echousd.batches.plan import (
+    ELSEWHERE,
+    STATE,
+    URL,
+    Plan,
+    difference,
+    is_elsewhere,
+    load_plan,
+    make_plan,
+    packed,
+    save_plan,
+)
 from echousd.batches.remote import Remote, complete
 from echousd.batches.run import Run, RunOptions
 from echousd.naming import free_name
@@ -90,9 +101,9 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     if out.exists() and not out.is_dir():
         raise ValueError(f"{out}: is a file, the output must be a folder")
     check_writable(out)
-    if URL.match(out.as_posix()) or (how.to and not URL.match(how.to)):
+    if URL.match(out.as_posix()) or (how.to and not is_elsewhere(how.to)):
         what = out if URL.match(out.as_posix()) else how.to
-        raise ValueError(f"{what}: allowed: -o a folder on a disk, --to a URL such as s3://bucket/night, or none")
+        raise ValueError(f"{what}: allowed: -o a folder on a disk, --to {ELSEWHERE}, or none")
     if how.to:
         Remote(how.to).sizes(STATE)  # who cannot reach it is told before the first room
     device = request.options.device

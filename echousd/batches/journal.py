@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from echousd.batches.plan import STATE, STORE
-from echousd.batches.rows import is_row
+from echousd.batches.rows import LONGEST, is_row
 from echousd.room.journal import STAGING
 from echousd.room.lock import LOCK
 from echousd.room.manifest import find_manifest
-from echousd.room.within import check_links
+from echousd.room.within import check_links, inside
 from echousd.store import Store
 
 JOURNAL = "journal.jsonl"
@@ -29,15 +29,16 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self.path = folder / JOURNAL
+        self.path = inside(folder, JOURNAL, f"{folder}: the run")
         torn = self.path.is_file() and self.path.stat().st_size and not _ends_line(self.path)
-        self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        links = getattr(os, "O_NOFOLLOW", 0)
+        self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | links, 0o644)
         if torn:  # of a run that was killed while it wrote: its half line is no room
             os.write(self._file, b"\n")
 
     def append(self, row: dict[str, Any]) -> None:
         """Add one line; raises OSError where the disk is full, after which no half line counts."""
-        content = (json.dumps(row, sort_keys=True) + "\n").encode()
+        content = (json.dumps(row, sort_keys=True, ensure_ascii=False) + "\n").encode("utf-8", "replace")
         written = os.write(self._file, content)
         if written != len(content):
             raise OSError(28, "No space left on device", str(self.path))
@@ -49,8 +50,8 @@ class Journal:
 
 
 def shard_folder(folder: Path, shard: tuple[int, int]) -> Path:
-    """Where a shard keeps its journal and its lock."""
-    return folder / STATE / f"shard_{shard[0]}_of_{shard[1]}"
+    """Where a shard keeps its journal and its lock; raises ValueError where a link leads out of the run's folder."""
+    return inside(folder, f"{STATE}/shard_{shard[0]}_of_{shard[1]}", f"{folder}: the run")
 
 
 def read_journals(folder: Path) -> dict[str, dict[str, Any]]:
@@ -68,13 +69,15 @@ def read_journals(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def room_digest(folder: Path) -> str:
-    """SHA-256 of a room's files, their paths and their bytes; "" where there is none."""
+    """SHA-256 of a room's files, their paths and bytes; "" where there is none. Nothing is read through a link."""
     if not folder.is_dir():
         return ""
     total = hashlib.sha256()
-    for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+    for path in sorted(p for p in folder.rglob("*") if p.is_symlink() or p.is_file()):
         name = path.relative_to(folder).as_posix()
-        if name != LOCK and not name.startswith(f"{STAGING}/"):
+        if path.is_symlink():
+            total.update(f"{name}\0link\n".encode())
+        elif name != LOCK and not name.startswith(f"{STAGING}/"):
             with path.open("rb") as file:
                 total.update(f"{name}\0{hashlib.file_digest(file, 'sha256').hexdigest()}\n".encode())
     return total.hexdigest()
@@ -97,9 +100,10 @@ def fault_of(folder: Path, row: dict[str, Any], stored: Collection[str]) -> str:
 
 def whole_keys(folder: Path, *, mend: bool = False) -> set[str]:
     """Keys of what is whole in the store of a run; `mend` takes away what is not, for its rooms to put it again."""
-    if not (folder / STORE).is_dir():
+    place = inside(folder, STORE, f"{folder}: the run")
+    if not place.is_dir():
         return set()
-    store = Store.open(folder / STORE)
+    store = Store.open(place)
     wrong = set(store.wrong())
     for key in wrong if mend else ():
         store.remove(key)
@@ -108,11 +112,11 @@ def whole_keys(folder: Path, *, mend: bool = False) -> set[str]:
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
     with path.open("rb") as file:
-        for line in file:
+        while line := file.readline(LONGEST):
             try:
                 row = json.loads(line)
             except (ValueError, RecursionError):
-                continue  # torn by a kill or a power cut
+                continue  # torn by a kill or a power cut, or longer than any of ours
             if is_row(row):
                 yield row
 

@@ -13,18 +13,25 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import echousd
-from echomodel.files import whole_file
+from echomodel.files import bounded_lines, whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
-from echousd.batches.rows import ID
+from echousd.batches.rows import ID, LONGEST, is_text
 from echousd.batches.sources import find_graphs
 from echousd.naming import as_identifier
+from echousd.room.manifest import MAX_SEED
 from echousd.room.within import inside
 
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share
 PLAN, GRAPHS = "plan.jsonl", "graphs.jsonl"
 # of a URL, though `Path` made one slash of its two; no drive, and no chain of file systems (`zip://a::file:///b`)
-URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/(?!.*::)")
+URL = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+):/(?!.*::)")
+# file systems of fsspec that read this machine's disk, or open another one
+HERE = (
+    "file", "local", "dir", "reference", "generic", "zip", "tar", "libarchive", "simplecache", "filecache",
+    "blockcache", "cached", "data", "git", "jupyter", "jlab", "pyscript", "asyncwrapper", "async_wrapper",
+)  # fmt: skip
+ELSEWHERE = "a URL of another machine, such as s3://bucket/night"
 PACK, LEAST = 32, 4  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
 SHELF = 1000  # rooms in one folder
 
@@ -124,6 +131,7 @@ def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
         number = len(entries)
         chosen = sets.setdefault(request.chosen(copy), len(sets))
         seed = request.seed + copy
+        origin, error = (text.encode("utf-8", "replace").decode() for text in (origin, error))  # of odd file names
         entries.append(Entry(number, f"{_word(name)}_{number:06d}", origin, digest, seed, chosen, draw, error))
 
     for found in find_graphs(request.sources):
@@ -163,15 +171,17 @@ def load_plan(folder: Path) -> Plan:
     if not path.is_file():
         raise ValueError(f"{folder}: no run of echousd batch (no {STATE}/{PLAN})")
     try:
-        with path.open(encoding="utf-8") as file:
-            head = _head(json.loads(next(file)))
+        with path.open("rb") as file:
+            lines = bounded_lines(file, LONGEST, path)
+            head = _head(json.loads(next(lines)))
             sets = tuple(BatchOptions(**raw) for raw in head.pop("sets"))
-            entries = tuple(_entry(json.loads(line), number, len(sets)) for number, line in enumerate(file))
+            entries = tuple(_entry(json.loads(line), number, len(sets)) for number, line in enumerate(lines))
         texts = inside(folder, f"{STATE}/{GRAPHS}", f"{folder}: the run")
         if not texts.is_file():
             raise ValueError(f"no regular file {STATE}/{GRAPHS}")
-        with texts.open(encoding="utf-8") as file:
-            graphs = {str(row["graph"]): str(row["text"]) for row in map(json.loads, file)}
+        with texts.open("rb") as file:
+            rows = map(json.loads, bounded_lines(file, LONGEST, texts))
+            graphs = {str(row["graph"]): str(row["text"]) for row in rows}
         if head["echousd_batch"] != 1 or head["rooms"] != len(entries):
             raise ValueError("it is not whole")
     except (OSError, StopIteration, KeyError, TypeError, ValueError, RecursionError) as error:
@@ -204,9 +214,15 @@ def _head(raw: Any) -> dict[str, Any]:
     if not isinstance(raw, dict) or any(type(raw.get(key)) is not kind for key, kind in kinds.items()):
         raise ValueError("line 1 is no head of a plan")
     to = raw.get("to", "")
-    if not isinstance(to, str) or (to and not URL.match(to)):
-        raise ValueError(f"line 1: to is {to!r:.200}, allowed: a URL such as s3://bucket/night")
+    if not isinstance(to, str) or (to and not is_elsewhere(to)):
+        raise ValueError(f"line 1: to is {to!r:.200}, allowed: {ELSEWHERE}")
     return raw
+
+
+def is_elsewhere(to: str) -> bool:
+    """Whether a text is the URL of a file system that is not this machine's."""
+    found = URL.match(to)
+    return found is not None and found[1].lower() not in HERE
 
 
 def _entry(raw: Any, number: int, sets: int) -> Entry:
@@ -217,14 +233,23 @@ def _entry(raw: Any, number: int, sets: int) -> Entry:
     entry = Entry(**raw, draw=tuple(draw) if draw else None)
     if type(entry.number) is not int or entry.number != number:
         raise ValueError(f"line {number + 2}: number is {entry.number!r:.40}, allowed: {number}")
-    texts = (entry.id, entry.origin, entry.graph, entry.error)
-    if not all(isinstance(text, str) for text in texts) or not ID.fullmatch(entry.id):
+    for name in ("origin", "graph", "error"):
+        if not is_text(getattr(entry, name)):
+            raise ValueError(f"line {number + 2}: {name} is {getattr(entry, name)!r:.80}, allowed: a text")
+    if not isinstance(entry.id, str) or not ID.fullmatch(entry.id):
         raise ValueError(f"line {number + 2}: id is {entry.id!r:.80}, allowed: letters, digits and _")
-    if entry.draw and [type(part) for part in entry.draw] != [str, int, int]:
+    kind, *numbers = entry.draw or ("", 0, 0)
+    if not is_text(kind) or len(numbers) != 2 or not all(map(_is_seed, numbers)):
         raise ValueError(f"line {number + 2}: draw is {entry.draw!r:.80}, allowed: room type, seed, number")
-    if type(entry.seed) is not int or type(entry.options) is not int or not 0 <= entry.options < sets:
+    if not _is_seed(entry.seed):
+        raise ValueError(f"line {number + 2}: seed is {entry.seed!r:.40}, allowed: 0 to {MAX_SEED}")
+    if type(entry.options) is not int or not 0 <= entry.options < sets:
         raise ValueError(f"line {number + 2}: options is {entry.options!r:.40}, allowed: 0 to {sets - 1}")
     return entry
+
+
+def _is_seed(value: Any) -> bool:
+    return type(value) is int and 0 <= value <= MAX_SEED
 
 
 def _word(name: str) -> str:

@@ -41,7 +41,7 @@ class Remote:
 
             found, root = url_to_fs(self.url)
             return found, root.rstrip("/")
-        except (ImportError, OSError, ValueError) as error:
+        except Exception as error:  # each file system fails in its own way
             raise ValueError(f"{self.url}: no file system that fsspec can reach ({error})") from None
 
     def sizes(self, path: str = "") -> dict[str, int]:

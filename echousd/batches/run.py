@@ -13,6 +13,7 @@ from echousd.batches import work
 from echousd.batches.executor import Executor, Outcome, Task
 from echousd.batches.journal import Journal
 from echousd.batches.plan import PACK, STORE, Entry, Plan
+from echousd.room.within import inside
 
 MEMORY = 4096  # MiB that a worker may hold
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
@@ -288,7 +289,7 @@ class Run:
 
     def _job(self, entry: Entry, text: str = "", rounds: tuple[tuple[work.Rows, ...], ...] = ()) -> work.Job:
         options = self.plan.options[entry.options]
-        folder, store = str(entry.folder(self.folder)), str(self.folder / STORE)
+        folder, store = str(entry.folder(self.folder)), str(inside(self.folder, STORE, f"{self.folder}: the run"))
         if self.plan.to:
             folder, store = entry.path, STORE
         return work.Job(

@@ -31,12 +31,18 @@ def status(folder: Path) -> dict[str, Any]:
     return summary(manifest_rows(load_plan(folder), folder))
 
 
-def verify(folder: Path, *, check: bool = False) -> Iterator[Wrong]:
+def verify(folder: Path, *, check: bool = False, to: str = "") -> Iterator[Wrong]:
     """Rooms that are missing, failed, changed or, with `check`, do not pass `echousd check`.
 
-    Raises ValueError for a folder without a run.
+    Arguments:
+        to: URL of the run's rooms; nobody is contacted for what a plan says alone, which may come from anybody.
+
+    Raises ValueError for a folder without a run, and for a URL that is not the plan's.
     """
     plan, rows, stored = load_plan(folder), read_journals(folder), whole_keys(folder)
+    if plan.to != to:
+        where = f"at {plan.to}, allowed: --to {plan.to}" if plan.to else "in its folder, allowed: no --to"
+        raise ValueError(f"{folder}: the rooms are {where}")
     for entry in plan.entries:
         row, place = rows.get(entry.id), entry.folder(folder)
         if row is None:

@@ -6,11 +6,13 @@ import io
 import json
 import tarfile
 from collections.abc import Iterable, Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
-from echomodel.files import whole_file
+from echomodel.files import read_bounded, read_json, whole_file
+from echousd.room.manifest import LARGEST
 from echousd.room.within import inside
+from echousd.textures import MAX_BYTES
 
 FOLDER = "webdataset"
 ROOMS = 1000  # in one tar
@@ -42,12 +44,15 @@ def write_webdataset(folder: Path, rows: Iterable[dict[str, Any]], rooms: int = 
 
 
 def _members(folder: Path, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
-    root = folder / row["root"]
     told = {key: value for key, value in row.items() if key != "seconds"}  # the only thing that no seed decides
-    told["room"] = json.loads(root.with_suffix(".json").read_bytes())
+    beside, picture = (
+        inside(folder, str(PurePosixPath(row["root"]).with_suffix(ending)), f"{folder}: the manifest")
+        for ending in (".json", ".png")
+    )
+    told["room"] = read_json(beside, LARGEST)
     yield f"{row['id']}.json", (json.dumps(told, sort_keys=True) + "\n").encode()
-    if root.with_suffix(".png").is_file():
-        yield f"{row['id']}.png", root.with_suffix(".png").read_bytes()
+    if picture.is_file():
+        yield f"{row['id']}.png", read_bounded(picture, MAX_BYTES)
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:

@@ -161,13 +161,14 @@ def status(
 def verify(
     folder: Annotated[Path, typer.Argument(help="Folder of the run.", show_default=False)],
     check: Annotated[bool, typer.Option("--check", help="Also run echousd check on every room.")] = False,
+    to: Annotated[str, typer.Option(help="URL that the rooms went to; it is contacted only if it is named.")] = "",
     json: AsJson = False,
 ) -> None:
     """Compare every room with the journal: there, whole, unchanged. Exit code 1 where one is not."""
     from echousd.batches.verify import verify as found_wrong
 
     wrong = []
-    for fault in found_wrong(folder, check=check):
+    for fault in found_wrong(folder, check=check, to=to):
         wrong.append({"room": fault.room, "problem": fault.problem})
         if not json:
             say(f"{fault.room}: {one_line(fault.problem)}")

@@ -9,7 +9,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -28,6 +28,7 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
     path = Path(path)
     beside = path.with_name(f".{path.name}.{os.getpid()}{ending}")
     try:
+        beside.unlink(missing_ok=True)  # a link that waits under that name in a folder that somebody sent
         yield beside
         flush(beside)
         if path.is_file():
@@ -84,6 +85,14 @@ def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
         if found.st_size > most:
             raise ValueError(f"{path}: {found.st_size} bytes, allowed: at most {most}")
         return opened.read(most)
+
+
+def bounded_lines(file: BinaryIO, most: int, name: str | os.PathLike[str]) -> Iterator[bytes]:
+    """Lines of an open file that anybody may have put there; raises ValueError for one of more than `most` bytes."""
+    for number, line in enumerate(iter(lambda: file.readline(most + 1), b""), 1):
+        if len(line) > most:
+            raise ValueError(f"{name}, line {number}: more than {most} bytes, allowed: that many")
+        yield line
 
 
 def read_json(path: str | os.PathLike[str], most: int) -> Any:

@@ -15,6 +15,7 @@ from echousd.batches.plan import make_plan, save_plan
 from echousd.batches.remote import Remote, complete
 from echousd.batches.rows import is_row
 from echousd.batches.sources import find_graphs
+from echousd.batches.verify import finish
 
 WRONG = (None, 5, -1, 1e300, "x", "\0", [], {}, [1], {"a": 1}, True)
 
@@ -65,6 +66,52 @@ def test_lines_that_a_resumed_run_would_fall_over_are_none(made, extra):
     assert complete("memory://nobody", {row["room"]: row}, {row["room"]: "rooms/0000/bedroom_000000"}) == set()
 
 
+@pytest.mark.parametrize(
+    "extra",
+    [{"living_faults": [1]}, {"check_errors": [None]}, {"licences": [2]}, {"bounds": [1e308] * 6}, {"objects": 2**70},
+     {"objects": 1.5}, {"faces": -1}, {"when": 1e300}, {"when": -1}, {"rounds": 10**9}, {"type": "\ud800"},
+     {"living_faults": ["\udfff"]}, {"categories": {"\ud800": 1}}, {"seconds": -1}],
+)  # fmt: skip
+def test_lines_that_no_artefact_can_hold_are_none(made, extra, tmp_path, echousd_command):
+    lines = (made / ".batch/shard_0_of_1/journal.jsonl").read_text()
+    row = json.loads(lines)
+    assert not is_row({**row, **extra})
+    shutil.copytree(made, tmp_path / "run")
+    (tmp_path / "run/.batch/shard_0_of_1/journal.jsonl").write_text(json.dumps({**row, **extra}) + "\n")
+    assert finish(tmp_path / "run")["missing"] == 2
+    assert echousd_command("batch", "verify", tmp_path / "run").code == 1
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [({"seed": 2**70}, "seed is 1180591620717411303424"), ({"seed": -1}, "seed is -1"),
+     ({"origin": "\ud800"}, "origin is"), ({"error": "\ud800"}, "error is"), ({"graph": "\udc80"}, "graph is"),
+     ({"draw": ["bedroom", 2**70, 1]}, "draw is"), ({"draw": ["\ud800", 0, 1]}, "draw is")],
+)  # fmt: skip
+def test_rooms_of_a_plan_that_no_artefact_can_hold_are_refused(made, extra, said, tmp_path, echousd_command):
+    shutil.copytree(made, tmp_path / "run")
+    head, first, *rest = (made / ".batch/plan.jsonl").read_text().splitlines()
+    first = json.dumps({**json.loads(first), **extra})
+    (tmp_path / "run/.batch/plan.jsonl").write_text("\n".join([head, first, *rest]) + "\n")
+    done = echousd_command("batch", "status", tmp_path / "run")
+    assert (done.code, f"line 2: {said}" in done.err) == (2, True)
+
+
+def test_an_endless_line_of_a_run_is_told(made, tmp_path, echousd_command):
+    for name, code in (("plan.jsonl", 2), ("graphs.jsonl", 2), ("shard_0_of_1/journal.jsonl", 0)):
+        shutil.copytree(made, tmp_path / code_name(name))
+        path = tmp_path / code_name(name) / ".batch" / name
+        path.write_bytes(b"")
+        os.truncate(path, 40 * 2**20)
+        done = echousd_command("batch", "status", tmp_path / code_name(name))
+        assert done.code == code
+        assert code == 0 or f"{name}, line 1: more than 16777216 bytes" in done.err
+
+
+def code_name(name):
+    return name.partition(".")[0].replace("/", "_")
+
+
 def test_a_bucket_of_somebody_else_writes_nothing_outside(tmp_path, echousd_command):
     with zipfile.ZipFile(tmp_path / "evil.zip", "w") as packed:
         packed.writestr("night/rooms/0000/bedroom_000000/../../../../escaped/owned.txt", "x")
@@ -78,7 +125,7 @@ def test_a_bucket_of_somebody_else_writes_nothing_outside(tmp_path, echousd_comm
         done = echousd_command("batch", "verify", run)
         assert done.code == 2
         assert re.search(rf"to is .*{re.escape(said)}", done.err)
-        assert "allowed: a URL such as s3://bucket/night" in done.err
+        assert "allowed: a URL of another machine, such as s3://bucket/night" in done.err
 
 
 @pytest.mark.parametrize("name", ["plan.jsonl", "graphs.jsonl", "shard_0_of_1/journal.jsonl"])

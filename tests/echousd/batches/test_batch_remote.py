@@ -38,7 +38,7 @@ def test_rooms_go_to_a_bucket_and_are_those_of_a_folder(bucket, graphs, tmp_path
     batch(graphs, here, executor=Inline(), **QUICK)
     assert batch(graphs, out, executor=Inline(), to=URL, **QUICK).complete
     assert sorted(path.name for path in out.iterdir()) == [".batch"]
-    assert list(verify(out, check=True)) == list(verify(here, check=True))
+    assert list(verify(out, check=True, to=URL)) == list(verify(here, check=True))
     held = Remote(URL).sizes()
     assert {path for path in held if path.startswith("store/")} == {
         path.relative_to(here).as_posix() for path in (here / "store").rglob("*") if path.is_file()
@@ -56,17 +56,17 @@ def test_rooms_go_to_a_bucket_and_are_those_of_a_folder(bucket, graphs, tmp_path
     # what is cut short or changed is told, and made again
     bucket.rm("/bucket/night/rooms/0000/graphs_000001/graphs_000001.json")
     bucket.pipe_file("/bucket/night/rooms/0000/graphs_000000/layers/graph.usda", b"#usda 1.0\n")
-    assert {wrong.room for wrong in verify(out)} == {"graphs_000000", "graphs_000001"}
+    assert {wrong.room for wrong in verify(out, to=URL)} == {"graphs_000000", "graphs_000001"}
     again = Inline()
     assert batch(graphs, out, executor=again, to=URL, resume=True, **QUICK).complete
     assert sorted(key for key in again.calls if key.startswith("room")) == ["room graphs_000000", "room graphs_000001"]
-    assert list(verify(out)) == []
+    assert list(verify(out, to=URL)) == []
     lost = next(path for path in bucket.find("/bucket/night/store") if path.endswith(".usdc"))
     bucket.rm(lost)
-    assert {"missing in the store" in wrong.problem for wrong in verify(out)} == {True}
+    assert {"missing in the store" in wrong.problem for wrong in verify(out, to=URL)} == {True}
     assert batch(graphs, out, executor=Inline(), to=URL, resume=True, **QUICK).complete
     assert bucket.exists(lost)
-    assert list(verify(out)) == []
+    assert list(verify(out, to=URL)) == []
     assert batch(graphs, out, executor=(idle := Inline()), to=URL, resume=True, **QUICK).complete
     assert idle.calls == []
     with pytest.raises(ValueError, match=r'another plan \(to was "memory://bucket/night", now null\)'):
@@ -93,7 +93,7 @@ def test_what_cannot_be_written_there_fails_a_room_with_its_cause(bucket, graphs
         patch.setattr(type(bucket), "put_file", full)
         result = batch(graphs, tmp_path / "run", executor=Inline(), to=URL, **QUICK)
     assert (result.done, result.failed) == (0, 2)
-    assert [wrong.problem for wrong in verify(tmp_path / "run")] == [
+    assert [wrong.problem for wrong in verify(tmp_path / "run", to=URL)] == [
         f"failed: {URL}: cannot be written (the bucket is gone)"
     ] * 2
     assert batch(graphs, tmp_path / "run", executor=Inline(), to=URL, resume=True, **QUICK).complete
