@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import PurePosixPath
 
-from pxr import Sdf, Tf, Usd, UsdShade, UsdUtils
+from pxr import Sdf, Tf, UsdShade
 
-from echousd.checks.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading, specs
 from echousd.packing import Reach
 from echousd.stage.encoding import StageError
 from echousd.stage.units import unit_faults
@@ -19,14 +20,11 @@ from echousd.textures import READABLE, TextureError, file_of, read_image
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
 
-def relative_paths(stage: Usd.Stage) -> Iterator[Finding]:
+def relative_paths(reading: Reading) -> Iterator[Finding]:
     """Every asset path is relative and written with forward slashes."""
-    session = stage.GetSessionLayer()
     told = set()
-    for layer in stage.GetUsedLayers():
-        if layer == session:
-            continue
-        for path in _asset_paths(layer):
+    for layer, paths in reading.named_files.items():
+        for path in paths:
             if (layer.identifier, path) in told or not (ABSOLUTE.match(path) or "\\" in path):
                 continue
             told.add((layer.identifier, path))
@@ -35,16 +33,16 @@ def relative_paths(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(_holder(layer, path), f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
 
 
-def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
+def paths_inside(reading: Reading) -> Iterator[Finding]:
     """Every file that the room names lies below its folder: it stays behind when the folder is sent, or leaks."""
-    if not stage.GetRootLayer().realPath:
+    if not reading.stage.GetRootLayer().realPath:
         return
-    reach = Reach.of(stage)
+    reach = Reach.of(reading.stage)
     told = set()
-    for layer in stage.GetUsedLayers():
-        if layer == stage.GetSessionLayer() or (layer.realPath and not reach.holds(layer.realPath)):
+    for layer, paths in reading.named_files.items():
+        if layer.realPath and not reach.holds(layer.realPath):
             continue  # what a layer outside names is outside with it; the layer itself is told
-        for path in _asset_paths(layer):
+        for path in paths:
             if not path or (layer.identifier, path) in told or ABSOLUTE.match(path):
                 continue
             told.add((layer.identifier, path))
@@ -57,10 +55,10 @@ def paths_inside(stage: Usd.Stage) -> Iterator[Finding]:
                 )
 
 
-def images(stage: Usd.Stage) -> Iterator[Finding]:
+def images(reading: Reading) -> Iterator[Finding]:
     """Every image that a shader reads can be read."""
     known: dict[str, str] = {}
-    for prim in prims(stage):
+    for prim in reading.prims:
         if not prim.IsA(UsdShade.Shader):
             continue
         try:
@@ -94,33 +92,9 @@ def _image_fault(path: str, _stamp: tuple[int, ...]) -> str:
     return ""
 
 
-def _asset_paths(layer: Sdf.Layer) -> list[str]:
-    """All asset paths that a layer authors: sublayers, references, payloads, clips, attributes, metadata."""
-    copy = Sdf.Layer.CreateAnonymous(".usda")
-    copy.TransferContent(layer)
-    found: list[str] = []
-
-    def note(path: str) -> str:
-        found.append(path)
-        return path
-
-    UsdUtils.ModifyAssetPaths(copy, note)
-    for spec in _specs(layer):
-        identifier = (spec.assetInfo or {}).get("identifier") if isinstance(spec, Sdf.PrimSpec) else None
-        if identifier:
-            found.append(getattr(identifier, "path", str(identifier)))
-    return found
-
-
-def _specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
-    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]
-
-
 def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
     """The prim of a layer whose opinions mention an asset path; the pseudo-root for sublayers."""
-    for spec in _specs(layer):
+    for spec in specs(layer):
         if isinstance(spec, Sdf.AttributeSpec) and getattr(spec.default, "path", None) == path:
             return spec.path.GetPrimPath()
         if isinstance(spec, Sdf.PrimSpec):
@@ -131,9 +105,9 @@ def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
     return Sdf.Path.absoluteRootPath
 
 
-def units(stage: Usd.Stage) -> Iterator[Finding]:
+def units(reading: Reading) -> Iterator[Finding]:
     """The root layer says the unit and the up axis of the layers that it composes."""
-    for message, wrong in unit_faults(stage):
+    for message, wrong in unit_faults(reading.stage):
         yield Finding(Sdf.Path.absoluteRootPath, message, warning=not wrong)
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from echousd.checks.findings import Finding, Rule, applied, is_guide, prims
+from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.reading import Reading
 from echousd.stage.encoding import NODE_API, StageError
 from echousd.stage.values import array, matrix, targets
 
@@ -16,13 +17,13 @@ NO_UVS = "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
 PHYSICAL = ("PhysicsRigidBodyAPI", "PhysicsCollisionAPI")
 
 
-def texture_coordinates(stage: Usd.Stage) -> Iterator[Finding]:
+def texture_coordinates(reading: Reading) -> Iterator[Finding]:
     """Every visible mesh has `primvars:st`, with as many values as its interpolation asks for and indices in range.
 
     Models of others that have none are warnings: they may need none.
     """
-    for prim in prims(stage):
-        if not prim.IsA(UsdGeom.Mesh) or is_guide(prim):
+    for prim in reading.prims:
+        if not prim.IsA(UsdGeom.Mesh) or reading.is_guide(prim):
             continue
         try:
             fault = _uv_fault(UsdGeom.Mesh(prim))
@@ -63,16 +64,15 @@ def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
     return None
 
 
-def scale(stage: Usd.Stage) -> Iterator[Finding]:
+def scale(reading: Reading) -> Iterator[Finding]:
     """No scale is zero, and no node of a graph, body or collider is scaled differently along its axes."""
-    cache = UsdGeom.XformCache()
     told: set[Sdf.Path] = set()
-    for prim in prims(stage):
+    for prim in reading.prims:
         if not prim.IsA(UsdGeom.Xformable):
             continue
         try:
-            local = _factors(matrix(cache.GetLocalTransformation(prim)[0], prim))
-            whole = matrix(cache.GetLocalToWorldTransform(prim), prim)
+            local = _factors(matrix(reading.cache.GetLocalTransformation(prim)[0], prim))
+            whole = reading.world(prim)
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
         if local.min() < 1e-6:
@@ -85,21 +85,20 @@ def scale(stage: Usd.Stage) -> Iterator[Finding]:
         world = _factors(whole)
         if world.min() < 1e-6 or world.max() / world.min() < 1 + EVEN:
             continue
-        culprit = _unevenly_scaled(prim, cache)
+        culprit = _unevenly_scaled(prim, reading.cache)
         if culprit.GetPath() not in told:
             told.add(culprit.GetPath())
             what = "a body, collider or object of a scene graph"
             yield Finding(culprit.GetPath(), f"scale is {_shown(world)}, allowed on {what}: the same along all axes")
 
 
-def mirrored(stage: Usd.Stage) -> Iterator[Finding]:
+def mirrored(reading: Reading) -> Iterator[Finding]:
     """No transform mirrors: physics engines and many clients turn such meshes inside out."""
-    cache = UsdGeom.XformCache()
-    for prim in prims(stage):
+    for prim in reading.prims:
         if not prim.IsA(UsdGeom.Xformable):
             continue
         try:
-            turn = matrix(cache.GetLocalTransformation(prim)[0], prim)[:3, :3]
+            turn = matrix(reading.cache.GetLocalTransformation(prim)[0], prim)[:3, :3]
         except (StageError, Tf.ErrorException):
             continue
         if np.linalg.det(turn) < -1e-12:
@@ -124,19 +123,19 @@ def _shown(factors: np.ndarray) -> str:
     return "(" + ", ".join(f"{factor:.4g}" for factor in sorted(factors)) + ")"
 
 
-def materials_inside(stage: Usd.Stage) -> Iterator[Finding]:
+def materials_inside(reading: Reading) -> Iterator[Finding]:
     """Bound materials lie below the default prim, so that a reference to the stage brings them along."""
-    default = stage.GetDefaultPrim()
+    default = reading.stage.GetDefaultPrim()
     if not default:
         return
-    for prim in prims(stage):
+    for prim in reading.prims:
         if not prim.GetPath().HasPrefix(default.GetPath()):
             continue
         for relationship in prim.GetRelationships():
             if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
                 continue
             for target in targets(prim, relationship.GetName()):
-                found = stage.GetPrimAtPath(target.GetPrimPath())
+                found = reading.stage.GetPrimAtPath(target.GetPrimPath())
                 if found and found.IsA(UsdShade.Material) and not target.HasPrefix(default.GetPath()):
                     yield Finding(
                         prim.GetPath(),

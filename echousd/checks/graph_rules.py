@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from pxr import Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule, applied, is_guide, prims
+from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.reading import Reading
 from echousd.stage import encoding as usd
 from echousd.stage.dressing import read_small
 from echousd.stage.encoding import StageError
@@ -18,12 +19,12 @@ LABELS_PREFIX = "SemanticsLabelsAPI:"
 OURS = frozenset((usd.GRAPH_TYPE, usd.RELATION_TYPE, usd.NODE_API))
 
 
-def edge_targets(stage: Usd.Stage) -> Iterator[Finding]:
+def edge_targets(reading: Reading) -> Iterator[Finding]:
     """Every relation has one subject, one known predicate and one object, all in its own room."""
     try:
-        rooms = find_rooms(stage)
+        rooms = reading.rooms or find_rooms(reading.stage)
     except StageError as error:
-        yield Finding(stage.GetPseudoRoot().GetPath(), str(error))
+        yield Finding(reading.stage.GetPseudoRoot().GetPath(), str(error))
         return
     owned = set()
     for room in rooms:
@@ -38,18 +39,18 @@ def edge_targets(stage: Usd.Stage) -> Iterator[Finding]:
                 relation_of(prim, names)
             except StageError as error:
                 yield Finding(prim.GetPath(), _without_place(str(error), prim))
-    for prim in prims(stage):
+    for prim in reading.prims:
         if prim.GetTypeName() == usd.RELATION_TYPE and prim.GetPath() not in owned:
             yield Finding(
                 prim.GetPath(), f"a relation outside every scene graph, allowed: below an {usd.GRAPH_TYPE} prim"
             )
 
 
-def consistent_graph(stage: Usd.Stage) -> Iterator[Finding]:
+def consistent_graph(reading: Reading) -> Iterator[Finding]:
     """The relations of a room do not contradict each other, and its words are those of the vocabulary."""
-    if any(True for _ in edge_targets(stage)):
+    if any(True for _ in edge_targets(reading)):
         return
-    for room in find_rooms(stage):
+    for room in reading.rooms:
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always", StatedTwice)
             try:
@@ -66,10 +67,10 @@ def consistent_graph(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(room.graph.GetPath(), message.split(": ", 1)[-1], warning=True)
 
 
-def known_types(stage: Usd.Stage) -> Iterator[Finding]:
+def known_types(reading: Reading) -> Iterator[Finding]:
     """Every prim type and applied API schema is known to this OpenUSD."""
     registry = Usd.SchemaRegistry()
-    for prim in prims(stage):
+    for prim in reading.prims:
         name = prim.GetTypeName()
         if name and not registry.FindConcretePrimDefinition(name) and name not in OURS:
             yield Finding(prim.GetPath(), f"unknown prim type {name!r}: no registered schema defines it")
@@ -79,11 +80,11 @@ def known_types(stage: Usd.Stage) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"unknown API schema {schema!r}: no registered schema defines it")
 
 
-def semantics(stage: Usd.Stage) -> Iterator[Finding]:
+def semantics(reading: Reading) -> Iterator[Finding]:
     """All visible geometry carries semantics labels, itself or through a prim above it."""
     told: set = set()
-    for prim in prims(stage):
-        if not prim.IsA(UsdGeom.Gprim) or is_guide(prim) or _labelled(prim):
+    for prim in reading.prims:
+        if not prim.IsA(UsdGeom.Gprim) or reading.is_guide(prim) or _labelled(prim):
             continue
         owner = _component(prim)
         if owner.GetPath() not in told:

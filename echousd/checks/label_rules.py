@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pxr import Tf, Usd
+from pxr import Tf
 
 from echomodel.vocabulary import UnknownWord, normalised
-from echousd.checks.findings import Finding, Rule, prims
+from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading
 from echousd.stage import encoding as usd
 from echousd.stage.encoding import StageError
 from echousd.stage.labels import is_structure, known_category, spaced
-from echousd.stage.read import find_rooms
 from echousd.stage.taxonomy import SHELL, ade20k
 from echousd.stage.values import texts
 
 CLASSES = "semantics:labels:ade20k"
 
 
-def agreeing_labels(stage: Usd.Stage) -> Iterator[Finding]:
+def agreeing_labels(reading: Reading) -> Iterator[Finding]:
     """Labels of walls, floors, ceilings, doors and windows are what their names say; two taxonomies say the same."""
-    try:
-        nodes = [prim.GetPath() for room in find_rooms(stage) for prim in room.nodes]
-    except StageError:  # echo:EdgeTargets reports it
-        return
-    for prim in prims(stage):
+    nodes = [prim.GetPath() for room in reading.rooms for prim in room.nodes]
+    for prim in reading.prims:
         try:
             words, classes = texts(prim.GetAttribute(usd.LABELS)), texts(prim.GetAttribute(CLASSES))
         except (StageError, Tf.ErrorException):

@@ -8,9 +8,10 @@ import numpy as np
 from pxr import Gf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.triangles import area_normals
-from echousd.checks.findings import Finding, Rule, distinct_prims, prims
+from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading
 from echousd.stage.encoding import StageError
-from echousd.stage.values import MeshArrays, array, mesh_arrays
+from echousd.stage.values import MeshArrays, array
 
 UNIT = 0.05  # how far the length of a normal may be from 1
 EXTENT = 1e-3  # how far an extent may be from the points, in shares of their diagonal
@@ -19,9 +20,9 @@ ARTICULATION = "articulation"  # variant set of what has doors and drawers
 AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
-def mesh_indices(stage: Usd.Stage) -> Iterator[Finding]:
+def mesh_indices(reading: Reading) -> Iterator[Finding]:
     """Faces have three corners or more, as many in all as there are indices, and indices name points."""
-    for mesh in meshes(stage):
+    for mesh in reading.meshes:
         try:
             points = array(mesh.GetPointsAttr(), 3)
             counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
@@ -37,9 +38,9 @@ def mesh_indices(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(mesh.GetPath(), f"faceVertexIndices reach {reach}, allowed: 0 to {len(points) - 1}")
 
 
-def normals(stage: Usd.Stage) -> Iterator[Finding]:
+def normals(reading: Reading) -> Iterator[Finding]:
     """Normals have length 1, and are as many as their interpolation asks for."""
-    for mesh, arrays in _readable(stage):
+    for mesh, arrays in _readable(reading):
         reach = _normals_reach(mesh)
         if reach:
             yield Finding(mesh.GetPath(), f"primvars:normals:indices reach {reach}")
@@ -63,10 +64,10 @@ def normals(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(mesh.GetPath(), f"a normal has length {told}, allowed: 1")
 
 
-def extents(stage: Usd.Stage) -> Iterator[Finding]:
+def extents(reading: Reading) -> Iterator[Finding]:
     """An extent is the box around the points, a component's hint that around its meshes: clients cull by them."""
-    yield from _hints(stage)
-    for mesh, arrays in _readable(stage):
+    yield from _hints(reading)
+    for mesh, arrays in _readable(reading):
         try:
             extent = array(mesh.GetExtentAttr(), 3) if mesh.GetExtentAttr().HasAuthoredValue() else None
         except (StageError, Tf.ErrorException):
@@ -79,10 +80,10 @@ def extents(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(mesh.GetPath(), f"extent is {_shown(extent)}, its points reach {_shown(box)}")
 
 
-def _hints(stage: Usd.Stage) -> Iterator[Finding]:
+def _hints(reading: Reading) -> Iterator[Finding]:
     """Components that state another box (`extentsHint`) than that of what they show."""
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_], useExtentsHint=False)
-    for prim in prims(stage):
+    for prim in reading.prims:
         attribute = prim.GetAttribute(UsdGeom.Tokens.extentsHint)
         if not attribute or not attribute.HasAuthoredValue() or not prim.IsModel() or prim.IsGroup():
             continue
@@ -135,9 +136,9 @@ def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
     return bool(own and UsdGeom.Xformable(prim).GetXformOpOrderAttr().HasAuthoredValue())
 
 
-def winding(stage: Usd.Stage) -> Iterator[Finding]:
+def winding(reading: Reading) -> Iterator[Finding]:
     """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
-    for mesh, arrays in _readable(stage):
+    for mesh, arrays in _readable(reading):
         faces = corners_of(arrays)
         if not len(faces):
             continue
@@ -161,11 +162,6 @@ def winding(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(mesh.GetPath(), f"{share:.0%} of its surface winds against its normals, allowed: outwards")
 
 
-def meshes(stage: Usd.Stage) -> Iterator[UsdGeom.Mesh]:
-    """All meshes of a stage, those of an instance's prototype once."""
-    return (UsdGeom.Mesh(prim) for prim in distinct_prims(stage) if prim.IsA(UsdGeom.Mesh))
-
-
 def corners_of(arrays: MeshArrays) -> np.ndarray:
     """(t, 3) int: fan triangles of the faces, as positions in the indices."""
     first = np.cumsum(arrays.counts) - arrays.counts
@@ -175,12 +171,11 @@ def corners_of(arrays: MeshArrays) -> np.ndarray:
     return np.stack([start, start + step + 1, start + step + 2], 1)
 
 
-def _readable(stage: Usd.Stage) -> Iterator[tuple[UsdGeom.Mesh, MeshArrays]]:
-    for mesh in meshes(stage):
-        try:
-            yield mesh, mesh_arrays(mesh)
-        except (StageError, Tf.ErrorException):  # other rules report it
-            continue
+def _readable(reading: Reading) -> Iterator[tuple[UsdGeom.Mesh, MeshArrays]]:
+    for mesh in reading.meshes:
+        arrays = reading.mesh(mesh)
+        if arrays is not None:
+            yield mesh, arrays
 
 
 def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:

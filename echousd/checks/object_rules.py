@@ -8,12 +8,13 @@ import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
 from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage import encoding as usd
-from echousd.stage.contents import read_contents, room_frame
+from echousd.stage.contents import room_frame
 from echousd.stage.encoding import StageError
 from echousd.stage.labels import known_category
-from echousd.stage.read import RoomPrims, find_rooms, value
+from echousd.stage.read import RoomPrims, value
 from echousd.stage.values import matrix, texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's
@@ -22,10 +23,10 @@ FLOOR = usd.FLOOR_SIZE, usd.FLOOR_POLYGON
 TURN = np.radians(15)
 
 
-def upright(stage: Usd.Stage) -> Iterator[Finding]:
+def upright(reading: Reading) -> Iterator[Finding]:
     """Objects stand the right way up: their own +Y (or +Z) points upwards in the room."""
-    cache = UsdGeom.XformCache()
-    for room in _rooms(stage):
+    cache = reading.cache
+    for room in reading.rooms:
         to_room = room_frame(room.room, cache)
         for prim in room.nodes:
             ups = _ups(prim, to_room, cache)
@@ -48,9 +49,9 @@ def _ups(prim: Usd.Prim, to_room: np.ndarray, cache: UsdGeom.XformCache) -> np.n
     return None if (length < 1e-9).any() else own[1, 1:3] / length
 
 
-def one_label(stage: Usd.Stage) -> Iterator[Finding]:
+def one_label(reading: Reading) -> Iterator[Finding]:
     """An object has one label of the taxonomy `category`, and it is the category that the graph states."""
-    for room in _rooms(stage):
+    for room in reading.rooms:
         for prim in room.nodes:
             try:
                 words = texts(prim.GetAttribute(usd.LABELS))
@@ -72,11 +73,11 @@ def one_label(stage: Usd.Stage) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
 
 
-def stated_boxes(stage: Usd.Stage) -> Iterator[Finding]:
+def stated_boxes(reading: Reading) -> Iterator[Finding]:
     """Geometry is as large and turned as the graph states."""
-    for room in _rooms(stage):
+    for room in reading.rooms:
         paths = {prim.GetName(): prim.GetPath() for prim in room.nodes if _states(prim, (usd.SIZE, usd.YAW))}
-        for thing in read_contents(room).objects if paths else ():
+        for thing in reading.contents(room).objects if paths else ():
             node = thing.node
             if node.name not in paths or not len(thing.points):
                 continue
@@ -97,9 +98,9 @@ def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:
     return any(prim.GetAttribute(name).HasAuthoredValue() for name in names if prim.HasAttribute(name))
 
 
-def floors(stage: Usd.Stage) -> Iterator[Finding]:
+def floors(reading: Reading) -> Iterator[Finding]:
     """Every room with objects has a floor: stated by its graph or as labelled geometry."""
-    for room in _rooms(stage):
+    for room in reading.rooms:
         stated = any(
             room.graph.GetAttribute(name).HasAuthoredValue() for name in FLOOR if room.graph.HasAttribute(name)
         )
@@ -125,13 +126,6 @@ def _others(room: RoomPrims) -> list[Usd.Prim]:
             if prim.GetPath() not in nodes:
                 found.append(prim)
     return found
-
-
-def _rooms(stage: Usd.Stage) -> list[RoomPrims]:
-    try:
-        return find_rooms(stage)
-    except StageError:  # echo:EdgeTargets reports it
-        return []
 
 
 def _shown(size: object) -> str:

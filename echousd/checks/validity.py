@@ -20,6 +20,7 @@ from echousd.checks import (
     value_rules,
 )
 from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said
 
@@ -35,6 +36,7 @@ FAMILIES = (
 )
 RULES: tuple[Rule, ...] = tuple(rule for family in FAMILIES for rule in family.RULES)
 KEYWORD = "EchoUSD"
+ALONE = "echo:Validators"
 UNKNOWN_NODE, MATERIALX = ".MissingShaderIdInRegistry", "shaderId 'ND_"
 
 
@@ -76,17 +78,17 @@ def _validator(rule: Rule) -> Callable[[Usd.Stage, Any], list]:
                 [UsdValidation.ValidationErrorSite(stage, found.path)],
                 found.message,
             )
-            for found in safely(rule, stage)
+            for found in safely(rule, Reading(stage))
         ]
 
     return validate
 
 
-def safely(rule: Rule, stage: Usd.Stage) -> list[Finding]:
+def safely(rule: Rule, reading: Reading) -> list[Finding]:
     """What a rule finds; a stage that it cannot read through is a finding as well."""
     found: list[Finding] = []
     try:
-        found.extend(rule.find(stage))
+        found.extend(rule.find(reading))
     except Tf.ErrorException as error:
         found.append(Finding(Sdf.Path.absoluteRootPath, f"cannot be read through: {said(error)}"))
     except StageError as error:
@@ -95,49 +97,51 @@ def safely(rule: Rule, stage: Usd.Stage) -> list[Finding]:
 
 
 def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
-    """Errors and warnings of all validators, in a stable order.
+    """Errors and warnings of all validators, in a stable order; ours share what they read of the stage.
 
     An OpenUSD without UsdValidation runs our rules alone and says so in a warning.
     """
     assert echousd.__version__  # importing the package registers the schema plugin
+    reading = Reading(stage)
+    own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
+    errors = {_fault(rule, found) for rule, found in own if not found.warning}
+    warnings = {_fault(rule, found) for rule, found in own if found.warning}
+    theirs = _faults_of_usd(stage)
+    errors |= theirs[0]
+    return tuple(sorted(errors, key=_key)), tuple(sorted(warnings | theirs[1], key=_key))
+
+
+def _faults_of_usd(stage: Usd.Stage) -> tuple[set[Fault], set[Fault]]:
+    """Errors and warnings of OpenUSD's own validators."""
     try:
         from pxr import UsdValidation
 
-        register()
+        known = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+        theirs = [each for each in known if KEYWORD not in each.GetMetadata().GetKeywords()]
     except (ImportError, AttributeError, TypeError):
-        errors, warnings = _own_faults(stage)
-        alone = (
-            f"OpenUSD {'.'.join(map(str, Usd.GetVersion()))} has no UsdValidation for Python: only our own rules ran"
-        )
-        return tuple(errors), (*warnings, Fault("echo:Validators", "/", alone))
-    context = UsdValidation.ValidationContext(UsdValidation.ValidationRegistry().GetOrLoadAllValidators())
+        version = ".".join(map(str, Usd.GetVersion()))
+        alone = f"OpenUSD {version} has no UsdValidation for Python: only our own rules ran"
+        return set(), {Fault(ALONE, "/", alone)}
+    context = UsdValidation.ValidationContext(theirs)
     silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the report says as well
     try:
         told = context.Validate(stage)
-    except Tf.ErrorException as stopped:  # a validator of OpenUSD's own that cannot read the stage ends the whole run
-        errors, warnings = _own_faults(stage)
-        fault = Fault("echo:Validators", "/", f"OpenUSD's validators stopped: {said(stopped)}")
-        return (*errors, fault), tuple(warnings)
+    except Tf.ErrorException as stopped:  # a validator that cannot read the stage ends the whole run
+        return {Fault(ALONE, "/", f"OpenUSD's validators stopped: {said(stopped)}")}, set()
     finally:
         silence.TakeUncoalescedDiagnostics()
         del silence
-    errors, warnings = [], []
+    errors, warnings = set(), set()
     knows_materialx = bool(Plug.Registry().GetPluginWithName("usdMtlx"))  # usd-core comes without it
     for error in told:
         fault = Fault(_rule_name(error), _site(error), " ".join(error.GetMessage().split()))
         if not knows_materialx and fault.rule.endswith(UNKNOWN_NODE) and MATERIALX in fault.message:
             continue
         if error.GetType() == UsdValidation.ValidationErrorType.Error:
-            errors.append(fault)
+            errors.add(fault)
         elif error.GetType() == UsdValidation.ValidationErrorType.Warn:
-            warnings.append(fault)
-    return tuple(sorted(set(errors), key=_key)), tuple(sorted(set(warnings), key=_key))
-
-
-def _own_faults(stage: Usd.Stage) -> tuple[list[Fault], list[Fault]]:
-    own = [(rule, found) for rule in RULES for found in safely(rule, stage)]
-    errors = [_fault(rule, found) for rule, found in own if not found.warning]
-    return errors, [_fault(rule, found) for rule, found in own if found.warning]
+            warnings.add(fault)
+    return errors, warnings
 
 
 def _fault(rule: Rule, found: Finding) -> Fault:
@@ -149,8 +153,7 @@ def _key(fault: Fault) -> tuple[str, str, str]:
 
 
 def _rule_name(error: Any) -> str:
-    name = error.GetValidator().GetMetadata().name
-    return name if name.startswith("echo:") else f"{name}.{error.GetName()}"
+    return f"{error.GetValidator().GetMetadata().name}.{error.GetName()}"
 
 
 def _site(error: Any) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Tf, Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule, distinct_prims, prims
+from echousd.checks.findings import Finding, Rule
+from echousd.checks.reading import Reading
 from echousd.stage.files import said
 from echousd.stage.values import LARGEST, misfit, shown
 
@@ -15,9 +16,9 @@ INVERTED = "!invert!"
 RESET = "!resetXformStack!"
 
 
-def value_types(stage: Usd.Stage) -> Iterator[Finding]:
+def value_types(reading: Reading) -> Iterator[Finding]:
     """Every value can be read and is of the type of its attribute: clients read nothing, or crash, on others."""
-    for attribute in _authored(stage):
+    for attribute in reading.authored:
         try:
             found = attribute.Get()
         except Tf.ErrorException as error:
@@ -27,9 +28,9 @@ def value_types(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(attribute.GetPath(), f"holds {shown(found)}, allowed: {attribute.GetTypeName()}")
 
 
-def finite_values(stage: Usd.Stage) -> Iterator[Finding]:
+def finite_values(reading: Reading) -> Iterator[Finding]:
     """No NaN, no infinity (but for physics' "unlimited"), nothing beyond a thousand million."""
-    for attribute in _authored(stage):
+    for attribute in reading.authored:
         try:
             found = np.asarray(attribute.Get())
         except (Tf.ErrorException, TypeError, ValueError):
@@ -43,14 +44,9 @@ def finite_values(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(attribute.GetPath(), f"holds {told}, allowed: -{LARGEST:g} to {LARGEST:g}")
 
 
-def _authored(stage: Usd.Stage) -> Iterator[Usd.Attribute]:
-    for prim in distinct_prims(stage):
-        yield from prim.GetAuthoredAttributes()
-
-
-def transform_ops(stage: Usd.Stage) -> Iterator[Finding]:
+def transform_ops(reading: Reading) -> Iterator[Finding]:
     """Every op that an xformOpOrder names is there; what is not there does not move its prim."""
-    for prim in prims(stage):
+    for prim in reading.prims:
         attribute = prim.GetAttribute(UsdGeom.Tokens.xformOpOrder)
         try:
             order = attribute.Get() if attribute else None
@@ -63,9 +59,9 @@ def transform_ops(stage: Usd.Stage) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"xformOpOrder names {name!r}, allowed: ops that the prim has")
 
 
-def at_rest(stage: Usd.Stage) -> Iterator[Finding]:
+def at_rest(reading: Reading) -> Iterator[Finding]:
     """Nothing moves or changes shape over time: placement, collisions and relations are measured at rest."""
-    for attribute in _authored(stage):
+    for attribute in reading.authored:
         name = attribute.GetName()
         moves = name.startswith("xformOp") or name in ("points", "visibility")
         if moves and attribute.GetNumTimeSamples():
@@ -73,9 +69,9 @@ def at_rest(stage: Usd.Stage) -> Iterator[Finding]:
             yield Finding(attribute.GetPath(), f"has {count} time samples, allowed: one value, without time")
 
 
-def variants(stage: Usd.Stage) -> Iterator[Finding]:
+def variants(reading: Reading) -> Iterator[Finding]:
     """Every chosen variant exists."""
-    for prim in prims(stage):
+    for prim in reading.prims:
         if prim.IsInstanceProxy():
             continue
         sets = prim.GetVariantSets()
@@ -88,9 +84,9 @@ def variants(stage: Usd.Stage) -> Iterator[Finding]:
                 yield Finding(prim.GetPath(), f"variant {name!r} is {word!r}, allowed: {allowed}")
 
 
-def payloads_loaded(stage: Usd.Stage) -> Iterator[Finding]:
+def payloads_loaded(reading: Reading) -> Iterator[Finding]:
     """Every payload is loaded: what is not loaded cannot be checked."""
-    for prim in Usd.PrimRange.Stage(stage, Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract):
+    for prim in Usd.PrimRange.Stage(reading.stage, Usd.PrimIsActive & Usd.PrimIsDefined & ~Usd.PrimIsAbstract):
         if prim.HasAuthoredPayloads() and not prim.IsLoaded():
             yield Finding(prim.GetPath(), "its payload is not loaded, so nothing below it was checked; load it first")
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, Vt
 
+from echousd.checks.reading import Reading
 from echousd.checks.validity import RULES, safely
 
 GOOD = Path(__file__).parents[1] / "bad/good.usda"
@@ -34,7 +35,7 @@ def stage():
 
 def found(stage):
     """(rule, prim, message) of all that our rules find."""
-    return [(rule.name, str(one.path), one.message) for rule in RULES for one in safely(rule, stage)]
+    return [(rule.name, str(one.path), one.message) for rule in RULES for one in safely(rule, Reading(stage))]
 
 
 def author(stage, path, value, kind=None):
@@ -141,9 +142,9 @@ def test_walls_are_labelled_walls(stage):
     classes.default = Vt.TokenArray([])
     prim.attributes[LABELS].default = Vt.TokenArray(["floor"])
     assert found(stage) == [("echo:LabelsAgree", path, f"{LABELS} is 'floor', its name says 'wall'")]
-    assert [one.warning for rule in RULES for one in safely(rule, stage)] == [False]
+    assert [one.warning for rule in RULES for one in safely(rule, Reading(stage))] == [False]
     prim.attributes[LABELS].default = Vt.TokenArray(["partition"])  # of somebody's own vocabulary
-    assert [one.warning for rule in RULES for one in safely(rule, stage)] == [True]
+    assert [one.warning for rule in RULES for one in safely(rule, Reading(stage))] == [True]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,134 @@
+"""A stage as the rules read it: its prims, rooms, transforms and meshes, each read once however many rules ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+
+from echousd.stage.contents import HIDDEN, RoomContents, read_contents
+from echousd.stage.encoding import StageError
+from echousd.stage.read import RoomPrims, find_rooms
+from echousd.stage.units import metres_per_unit
+from echousd.stage.values import MeshArrays, matrix, mesh_arrays
+
+Found = TypeVar("Found")
+
+
+class Reading:
+    """What several rules read of one stage, as it is now: a stage that changes needs another one."""
+
+    def __init__(self, stage: Usd.Stage) -> None:
+        self.stage = stage
+        self.cache = UsdGeom.XformCache()
+        self._kept: dict[tuple[str, Sdf.Path], object] = {}
+
+    @cached_property
+    def prims(self) -> list[Usd.Prim]:
+        """All prims that are active, defined and loaded, instances included."""
+        return list(Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies()))
+
+    @cached_property
+    def distinct(self) -> list[Usd.Prim]:
+        """The same prims, those of an instance's prototype once."""
+        seen: set[Sdf.Path] = set()
+        found = []
+        for prim in self.prims:
+            if prim.IsInstanceProxy():
+                prototype = prim.GetPrimInPrototype().GetPath()
+                if prototype in seen:
+                    continue
+                seen.add(prototype)
+            found.append(prim)
+        return found
+
+    @cached_property
+    def meshes(self) -> list[UsdGeom.Mesh]:
+        """The meshes among the distinct prims."""
+        return [UsdGeom.Mesh(prim) for prim in self.distinct if prim.IsA(UsdGeom.Mesh)]
+
+    @cached_property
+    def authored(self) -> list[Usd.Attribute]:
+        """All attributes of the distinct prims that somebody authored."""
+        return [attribute for prim in self.distinct for attribute in prim.GetAuthoredAttributes()]
+
+    @cached_property
+    def rooms(self) -> list[RoomPrims]:
+        """The rooms; none where they cannot be told, which echo:EdgeTargets reports."""
+        try:
+            return find_rooms(self.stage)
+        except StageError:
+            return []
+
+    @cached_property
+    def named_files(self) -> dict[Sdf.Layer, list[str]]:
+        """The layers in use, but for the session's, and all asset paths that each authors."""
+        session = self.stage.GetSessionLayer()
+        return {layer: _asset_paths(layer) for layer in self.stage.GetUsedLayers() if layer != session}
+
+    @cached_property
+    def metres(self) -> float:
+        """Metres per unit."""
+        return metres_per_unit(self.stage)
+
+    def contents(self, room: RoomPrims) -> RoomContents:
+        """The objects of one of the rooms."""
+        return self._once("contents", room.graph, lambda: read_contents(room))
+
+    def world(self, prim: Usd.Prim) -> np.ndarray:
+        """(4, 4) float, column vectors, prim to world; raises StageError where it is not finite."""
+        return self._once("world", prim, lambda: matrix(self.cache.GetLocalToWorldTransform(prim), prim))
+
+    def mesh(self, mesh: UsdGeom.Mesh) -> MeshArrays | None:
+        """Points and faces of a mesh, None where they cannot be read, which the rules on values report."""
+
+        def read() -> MeshArrays | None:
+            try:
+                return mesh_arrays(mesh)
+            except (StageError, Tf.ErrorException):
+                return None
+
+        return self._once("mesh", mesh.GetPrim(), read)
+
+    def is_guide(self, prim: Usd.Prim) -> bool:
+        """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
+        return self._once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)
+
+    def _once(self, what: str, prim: Usd.Prim, read: Callable[[], Found]) -> Found:
+        key = what, prim.GetPath()
+        if key not in self._kept:
+            self._kept[key] = read()
+        return self._kept[key]  # type: ignore[return-value]
+
+
+def below(prim: Usd.Prim) -> list[Usd.Prim]:
+    """A prim and all below it, instances included."""
+    return list(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))
+
+
+def _asset_paths(layer: Sdf.Layer) -> list[str]:
+    """All asset paths that a layer authors: sublayers, references, payloads, clips, attributes, metadata."""
+    copy = Sdf.Layer.CreateAnonymous(".usda")
+    copy.TransferContent(layer)
+    found: list[str] = []
+
+    def note(path: str) -> str:
+        found.append(path)
+        return path
+
+    UsdUtils.ModifyAssetPaths(copy, note)
+    for spec in specs(layer):
+        identifier = (spec.assetInfo or {}).get("identifier") if isinstance(spec, Sdf.PrimSpec) else None
+        if identifier:
+            found.append(getattr(identifier, "path", str(identifier)))
+    return found
+
+
+def specs(layer: Sdf.Layer) -> list[Sdf.Spec]:
+    """All that a layer holds."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    return [spec for spec in map(layer.GetObjectAtPath, paths) if spec]
