@@ -1,0 +1,112 @@
+"""Terms of composition: for each a room that breaks it just so, and one that does not."""
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.rules.living import composition
+from echomodel.rules.living.plan import plan_of
+
+HALF = np.pi / 2
+
+
+def seen(term, things, floor=(5.0, 4.0)):
+    """What a term finds in a room of (category, (w, h, d), (x, z), yaw): {number of the box: margin}, and the plan."""
+    x, z = np.array(floor) / 2
+    boxes = Boxes(
+        torch.tensor([size for _, size, _, _ in things], dtype=torch.float64),
+        torch.tensor([(at[0], 0.0, at[1]) for _, _, at, _ in things], dtype=torch.float64, requires_grad=True),
+        torch.tensor([yaw for _, _, _, yaw in things], dtype=torch.float64),
+    )
+    outline = np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
+    found = term(plan_of(boxes, [word for word, *_ in things], outline))
+    return dict(zip(found.who.tolist(), found.margin.tolist(), strict=True)), found, boxes
+
+
+def row_of(count, width, pitch):
+    """A table 1.6 m long with chairs on one side, their middles a pitch apart."""
+    table = [("dining_table", (1.6, 0.75, 0.9), (0.0, 0.0), 0.0)]
+    places = (np.arange(count) - (count - 1) / 2) * pitch
+    return table + [("dining_chair", (width, 0.9, 0.5), (x, 0.6), np.pi) for x in places]
+
+
+def test_every_seat_has_room_for_the_elbows():
+    assert seen(composition.elbow_room, row_of(2, 0.45, 0.6))[0][0] == pytest.approx(0.12)  # 0.15 m between the chairs
+    margin, found, _ = seen(composition.elbow_room, row_of(3, 0.45, 0.53))
+    assert margin == {0: pytest.approx(1.6 / 3 - 0.55)}
+    assert found.measure.tolist() == [pytest.approx(1.6 / 3)]
+    assert found.words.tolist() == [0]
+
+
+def test_chairs_stand_no_fence():
+    margin, found, _ = seen(composition.elbow_room, row_of(2, 0.6, 0.62))
+    assert margin == {0: pytest.approx(0.02 - 0.03)}
+    assert found.words.tolist() == [1]
+    turned = [(word, size, (at[1], -at[0]), yaw + HALF) for word, size, at, yaw in row_of(2, 0.6, 0.62)]
+    assert seen(composition.elbow_room, turned)[0] == {0: pytest.approx(0.02 - 0.03)}
+
+
+def test_seats_at_desks_and_single_chairs_need_no_elbow_room():
+    assert seen(composition.elbow_room, row_of(1, 0.6, 1.0))[0] == {}
+    desk = [("desk", (1.0, 0.75, 0.6), (0.0, 0.0), 0.0), *row_of(2, 0.6, 0.6)[1:]]
+    assert seen(composition.elbow_room, desk)[0] == {}
+
+
+@pytest.mark.parametrize(("gap", "aside", "margin"), [(0.5, 0.0, -0.05), (0.6, 0.0, 0.05), (0.5, 1.4, 0.10)])
+def test_one_stands_before_an_open_wardrobe(gap, aside, margin):
+    bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
+    wardrobe = ("wardrobe", (1.6, 2.2, 0.6), (aside, 1.0 + gap + 0.3), np.pi)
+    found, *_ = seen(composition.wardrobe_opens, [bed, wardrobe])
+    # beside the bed's foot only 0.3 m of its front are faced
+    expected = 0.3 * 1.6 - (0.9 + 0.8 - aside) if aside else margin
+    assert found == {1: pytest.approx(expected)}
+
+
+def test_a_bed_behind_a_wardrobe_is_not_before_it():
+    bed = ("double_bed", (1.8, 0.5, 2.0), (0.0, 0.0), 0.0)
+    assert seen(composition.wardrobe_opens, [bed, ("wardrobe", (1.6, 2.2, 0.6), (0.0, 1.5), 0.0)])[0][1] > 0
+
+
+def test_furniture_huddled_at_one_end_leaves_the_floor_unserved():
+    one = np.array([(-2.9, -1.7), (-1.2, -1.6), (-2.5, 0.0), (-2.8, 1.7), (-1.0, 1.6), (-0.8, 0.2)])
+    other = one * [(1, 1), (-1, 1), (1, 1), (1, 1), (-1, 1), (-1, 1)]  # half of them at the other end
+
+    def room(places):
+        return [("bookshelf", (1.3, 2.0, 0.6), tuple(place), 0.0) for place in places]
+
+    spread, _, _ = seen(composition.floor_served, room(other), (7.0, 4.0))
+    huddled, found, boxes = seen(composition.floor_served, room(one), (7.0, 4.0))
+    assert min(spread.values()) > 0
+    assert max(huddled.values()) < 0
+    assert 30 < float(found.measure.detach()) < 60  # percent
+    found.margin.sum().backward()
+    assert float(boxes.position.grad[:, 0].max()) > 0  # drawn into the bare half
+
+
+def test_an_emptier_room_may_leave_more_of_its_floor():
+    one = torch.ones(1, dtype=torch.float64)
+    assert composition.served_limit(8.0, one, one) == pytest.approx(1.0)  # exp(1 - 2 * 4 / 8)
+    assert composition.served_limit(4.0, one, one) == pytest.approx(np.exp(-1.0))
+    assert composition.served_limit(100.0, one, one) == 1.0
+
+
+def test_no_desk_goes_without_a_chair_while_another_has_two():
+    desks = [("desk", (1.2, 0.75, 0.6), (-1.5, 0.0), 0.0), ("desk", (1.2, 0.75, 0.6), (1.5, 0.0), 0.0)]
+    chairs = [("office_chair", (0.5, 0.9, 0.5), at, np.pi) for at in ((-1.8, 0.6), (-1.2, 0.6))]
+    margin, found, _ = seen(composition.each_served, [*desks, *chairs])
+    assert margin == {1: -1.0}
+    assert found.other.tolist() == [0]
+    shared = [chairs[0], ("office_chair", (0.5, 0.9, 0.5), (1.5, 0.6), np.pi)]
+    assert seen(composition.each_served, [*desks, *shared])[0] == {}
+    assert seen(composition.each_served, [*desks, chairs[0]])[0] == {}  # one chair in all: nobody was passed over
+
+
+def test_no_bed_goes_without_a_nightstand_while_another_has_two():
+    beds = [("single_bed", (1.0, 0.5, 2.0), (-1.4, 0.0), 0.0), ("single_bed", (1.0, 0.5, 2.0), (1.4, 0.0), 0.0)]
+
+    def stands(*places):
+        return [("nightstand", (0.4, 0.5, 0.4), (x, -0.8), 0.0) for x in places]
+
+    assert seen(composition.each_served, [*beds, *stands(-2.15, -0.65)])[0] == {1: -1.0}
+    assert seen(composition.each_served, [*beds, *stands(-0.65, 0.65)])[0] == {}
