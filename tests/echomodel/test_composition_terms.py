@@ -69,11 +69,11 @@ def test_a_bed_behind_a_wardrobe_is_not_before_it():
 
 
 def test_furniture_huddled_at_one_end_leaves_the_floor_unserved():
-    one = np.array([(-2.9, -1.7), (-1.2, -1.6), (-2.5, 0.0), (-2.8, 1.7), (-1.0, 1.6), (-0.8, 0.2)])
+    one = np.array([(-2.9, -1.7), (-1.5, -1.6), (-2.8, 0.0), (-2.9, 1.7), (-1.5, 1.6), (-1.4, 0.2)])
     other = one * [(1, 1), (-1, 1), (1, 1), (1, 1), (-1, 1), (-1, 1)]  # half of them at the other end
 
     def room(places):
-        return [("bookshelf", (1.3, 2.0, 0.6), tuple(place), 0.0) for place in places]
+        return [("bookshelf", (1.3, 2.0, 0.9), tuple(place), 0.0) for place in places]
 
     spread, _, _ = seen(composition.floor_served, room(other), (7.0, 4.0))
     huddled, found, boxes = seen(composition.floor_served, room(one), (7.0, 4.0))
@@ -86,8 +86,8 @@ def test_furniture_huddled_at_one_end_leaves_the_floor_unserved():
 
 def test_an_emptier_room_may_leave_more_of_its_floor():
     one = torch.ones(1, dtype=torch.float64)
-    assert composition.served_limit(8.0, one, one) == pytest.approx(1.0)  # exp(1 - 2 * 4 / 8)
-    assert composition.served_limit(4.0, one, one) == pytest.approx(np.exp(-1.0))
+    assert composition.served_limit(8.0, one, one) == pytest.approx(np.exp(0.8 - 2 * 4 / 8))
+    assert composition.served_limit(4.0, one, one) == pytest.approx(np.exp(0.8 - 2))
     assert composition.served_limit(100.0, one, one) == 1.0
 
 
