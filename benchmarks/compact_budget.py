@@ -42,7 +42,7 @@ def budget() -> dict[str, float]:
     """What each part of the compact preset costs; the figures do not depend on the weights."""
     config, nodes = PRESETS["compact"], 12
     statistics = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3, log_size=True)
-    model = CompactModel(config, statistics, [name for name in PARTS if name != "tokens"]).eval()  # those that ship
+    model = CompactModel(config, statistics, PARTS).eval()  # those that ship
     graph = dense_graph(nodes)
     pairs = pairs_of(graph)
     latent = model.latent(graph.category, pairs)

@@ -17,7 +17,7 @@ EXTRAS = (
     ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
     ("ray", ("ray",), "`echousd batch` on a Ray cluster"),
     ("text", ("open_clip",), "text features of the released models"),
-    ("train", ("tensorboard", "h5py"), "curves in TensorBoard, signed distances of 3D-FUTURE"),
+    ("train", ("tensorboard",), "curves in TensorBoard"),
 )
 OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
 

@@ -50,11 +50,6 @@ def allowed(licence: str, wanted: Sequence[str]) -> bool:
     return False
 
 
-def needs_credit(licence: str) -> bool:
-    """Whether whoever shows the model must name its author."""
-    return spdx(licence) not in ("CC0-1.0",)
-
-
 def _beginning(file: Path) -> str:
     with file.open(encoding="utf-8", errors="replace") as opened:
         return opened.read(MOST)

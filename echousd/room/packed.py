@@ -22,21 +22,6 @@ if TYPE_CHECKING:
 NODES = 512  # of one pass of the network: larger products, bounded memory
 
 
-def sample_many(
-    model: RoomModel, graphs: Sequence[SceneGraph], seeds: Sequence[int], *, steps: int | None = None
-) -> list[Boxes]:
-    """The first draft of the first layout of every graph, as `generate` takes it (`drawn`).
-
-    A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
-    `reproducible.LENGTH`, and exactly the same for the same list of graphs and seeds.
-
-    Arguments:
-        model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
-        graphs, seeds: as many of each. steps: sampling steps, None for the model's own.
-    """
-    return [boxes for (boxes,) in sample_round(model, graphs, seeds, [1] * len(graphs), steps=steps)]
-
-
 def sample_round(
     model: RoomModel,
     graphs: Sequence[SceneGraph],
@@ -46,9 +31,14 @@ def sample_round(
     number: int = 0,
     steps: int | None = None,
 ) -> list[tuple[Boxes, ...]]:
-    """The drafts of one round (`draft_rounds`) of the first layout of every graph; arguments as for `sample_many`.
+    """The drafts of one round (`draft_rounds`) of the first layout of every graph, as `generate` takes them (`drawn`).
+
+    A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
+    `reproducible.LENGTH`, and exactly the same for the same list of graphs and seeds.
 
     Arguments:
+        model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
+        graphs, seeds: as many of each. steps: sampling steps, None for the model's own.
         drafts: how many each graph gets at most in all rounds. number: of the round, 0 = the first draft.
     """
     starts, counts = zip(*(draft_rounds(most)[number] for most in drafts), strict=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -192,17 +191,6 @@ def shown(found: Any, most: int = 40) -> str:
     """A value of an unexpected type in few words: its type and its beginning."""
     text = " ".join(str(found)[:200].split())
     return f"{type(found).__name__} {text if len(text) <= most else text[: most - 3] + '...'}"
-
-
-def finite(found: Any) -> bool:
-    """Whether a number, or every number of a list, is neither NaN nor infinite; True for what holds no numbers."""
-    if isinstance(found, float):
-        return math.isfinite(found)
-    try:
-        table = np.asarray(found)
-    except (TypeError, ValueError):
-        return True
-    return table.dtype.kind != "f" or bool(np.isfinite(table).all())
 
 
 @contextmanager

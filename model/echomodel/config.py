@@ -146,33 +146,6 @@ class FurnitureConfig:
 
 
 @dataclass(frozen=True)
-class TokensConfig:
-    """Denoiser of part tokens (`echomodel.data.furniture.tokens`).
-
-    Arguments:
-        kinds: words of every kind that a token tells, in order.
-        numbers: its frame, extents, body and shape.
-        most: tokens of a piece.
-        width, layers, heads: of the transformer over the tokens of a piece.
-        echo: exchange information between the objects at every step.
-        temperature: scale of the starting noise.
-        objective, steps, sampler: as in `LayoutConfig`; the network says the clean tokens.
-    """
-
-    kinds: tuple[int, ...] = (14, 43, 16, 4, 4)
-    numbers: int = 39
-    most: int = 64
-    width: int = 128
-    layers: int = 4
-    heads: int = 4
-    echo: bool = True
-    temperature: float = 1.0
-    objective: Objective = "flow"
-    steps: int = 32
-    sampler: Sampler = "ancestral"
-
-
-@dataclass(frozen=True)
 class CompactConfig:
     """The compact echo model: sizes of its parts and of its vocabulary.
 
@@ -190,7 +163,6 @@ class CompactConfig:
     autoencoder: AutoencoderConfig = field(default_factory=AutoencoderConfig)
     shape: ShapeConfig = field(default_factory=ShapeConfig)
     furniture: FurnitureConfig = field(default_factory=FurnitureConfig)
-    tokens: TokensConfig = field(default_factory=TokensConfig)
 
 
 PRESETS = {"compact": CompactConfig()}

@@ -46,7 +46,6 @@ CONFIG = from_dict(
             "candidates": 2, "steps": 2,
         },
         "furniture": {"width": 16, "layers": 1, "steps": 2},
-        "tokens": {"width": 16, "layers": 1, "heads": 2},
     },
 )  # fmt: skip
 

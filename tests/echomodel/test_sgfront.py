@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from echomodel.data.rooms import generate_rooms
-from echomodel.data.sgfront import SGFront, SGFrontError, read_sdf
-from echomodel.data.sgfront_writer import write_sdf, write_sgfront
+from echomodel.data.sgfront import SGFront, SGFrontError
+from echomodel.data.sgfront_writer import write_sgfront
 from echomodel.graph import GraphBatch
 from echomodel.rules import label_relations, verdicts
 from echomodel.vocabulary import vocabulary
@@ -78,18 +78,6 @@ def test_written_graphs_satisfy_the_published_metric(folder):
     for scan in SGFront(folder).scans:
         kept = verdicts(scan, scan.triples, rules="sgfront")
         assert (kept != 0).all()
-
-
-def test_sdf_grids_come_back(tmp_path):
-    pytest.importorskip("h5py")
-    grid = np.linspace(-1, 1, 64**3, dtype=np.float32).reshape(64, 64, 64)
-    write_sdf(tmp_path, "s1_chair", grid)
-    assert np.array_equal(read_sdf(tmp_path, "s1_chair"), grid.clip(-0.2, 0.2))
-    with pytest.raises(SGFrontError, match=r"s2_chair/ori_sample_grid.h5: no such file"):
-        read_sdf(tmp_path, "s2_chair")
-    write_sdf(tmp_path, "small", grid[:, :, :2])
-    with pytest.raises(SGFrontError, match="8192 values, expected 262144"):
-        read_sdf(tmp_path, "small")
 
 
 def edited(folder, name, change):

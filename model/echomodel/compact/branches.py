@@ -17,7 +17,6 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.compact.tokens import TokenDenoiser
 from echomodel.config import CompactConfig, FurnitureConfig
 
 MEASURES = 2  # set of measures of the drafts that this version computes
@@ -66,7 +65,6 @@ PARTS: dict[str, Part] = {
     "autoencoder": Part(Autoencoder),
     "shape": Part(ShapeDenoiser, ("latent", "autoencoder"), branch=True),
     "furniture": Part(FurnitureDenoiser, ("latent",), branch=True, outdated=_outdated_furniture),
-    "tokens": Part(TokenDenoiser, ("latent",), branch=True),
 }
 
 

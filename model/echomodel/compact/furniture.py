@@ -13,7 +13,6 @@ from torch import Tensor, nn
 
 from echomodel.compact.echo import EchoLayer, level_features
 from echomodel.compact.pairs import Pairs
-from echomodel.compact.pieces import PieceDenoiser
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 
@@ -26,7 +25,7 @@ class FurnitureContext:
     pairs: Pairs
 
 
-class FurnitureDenoiser(PieceDenoiser):
+class FurnitureDenoiser(nn.Module):
     """Says the clean description of every object in a noisy one; each has its own level, 0 = known.
 
     Kinds are said as the probabilities of their words, so that the mean of what fits is a mixture and no third thing.
@@ -37,7 +36,13 @@ class FurnitureDenoiser(PieceDenoiser):
 
     def __init__(self, config: CompactConfig) -> None:
         own, width = config.furniture, config.furniture.width
-        super().__init__(config, own)
+        super().__init__()
+        self.kinds, self.numbers = own.kinds, own.numbers
+        self.values = sum(own.kinds) + own.numbers
+        self.category = nn.Embedding(config.categories, width)
+        self.room_type = nn.Embedding(config.room_types, width)
+        self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
+        self.latent = nn.Linear(config.latent.width, width)
         self.own = nn.Linear(self.values, width)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * own.layers)
@@ -64,10 +69,17 @@ class FurnitureDenoiser(PieceDenoiser):
             pairs: the merged relations of the graph.
             latent: (N, latent width), output of the graph manipulator.
         """
-        return FurnitureContext(self.nodes(graph, size, latent), pairs)
+        nodes = self.category(graph.category) + self.size(size.clamp_min(0.01).log()) + self.latent(latent)
+        return FurnitureContext(nodes + self.room_type(graph.room_type)[graph.scene], pairs)
 
     def forward(self, x: Tensor, level: Tensor, context: FurnitureContext) -> Tensor:
         return self.clean(self.scores(x, level, context))
+
+    def clean(self, scores: Tensor) -> Tensor:
+        """(..., D) that scores (..., D) stand for: each word's probability on [-1, 1], numbers cut."""
+        *words, numbers = scores.split([*self.kinds, self.numbers], dim=-1)
+        said = [2 * torch.softmax(part, dim=-1) - 1 for part in words]
+        return torch.cat([*said, numbers.clamp(-1.0, 1.0)], dim=-1)
 
     def scores(self, x: Tensor, level: Tensor, context: FurnitureContext) -> Tensor:
         """Logarithms of the words' odds, and the numbers as they are: (N, D)."""

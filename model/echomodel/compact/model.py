@@ -24,7 +24,6 @@ from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.rounding import restored, rounded
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.compact.tokens import TokenDenoiser
 from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
@@ -58,7 +57,6 @@ class CompactModel(nn.Module):
     autoencoder: Autoencoder
     shape: ShapeDenoiser
     furniture: FurnitureDenoiser
-    tokens: TokenDenoiser
 
     @property
     def device(self) -> torch.device:

@@ -22,7 +22,6 @@ ROOMS = ("bedroom", "livingroom", "diningroom", "library", "all")
 SPLITS = ("trainval", "test")  # the paper's; test is what its tables are computed on
 SCENE, FLOOR, IN = "_scene_", "floor", 0
 BOUNDS = 14
-SDF_LIMIT = 0.2
 
 
 class SGFrontError(ValueError):
@@ -270,28 +269,6 @@ class SGFront:
 
 def _normalised(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return 2 * (values - low) / (high - low) - 1
-
-
-def read_sdf(folder: str | os.PathLike[str], model_id: str) -> np.ndarray:
-    """The grid (64, 64, 64) float32 of a 3D-FUTURE model, clamped to +-0.2 as in training (SPEC 1.3).
-
-    Raises:
-        SGFrontError: no file, or not 64^3 values; ImportError: h5py is not there.
-    """
-    try:
-        import h5py
-    except ImportError as error:
-        raise ImportError("reading 3D-FUTURE-SDF needs h5py: pip install 'echousd[train]'") from error
-    path = Path(folder) / model_id / "ori_sample_grid.h5"
-    if not path.exists():
-        raise SGFrontError(f"{path}: no such file")
-    with h5py.File(path, "r") as file:
-        if "pc_sdf_sample" not in file:
-            raise SGFrontError(f"{path}: no data set pc_sdf_sample, found {', '.join(file) or 'none'}")
-        values = np.asarray(file["pc_sdf_sample"], np.float32)
-    if values.size != 64**3:
-        raise SGFrontError(f"{path}: {values.size} values, expected {64**3}")
-    return values.reshape(64, 64, 64).clip(-SDF_LIMIT, SDF_LIMIT)
 
 
 def small_mapping() -> dict[str, str]:

@@ -62,16 +62,6 @@ def write_sgfront(
         _write(folder / f"centered_bounds_{room}_trainval.txt", _bounds(np.concatenate(rows)))
 
 
-def write_sdf(folder: str | os.PathLike[str], model_id: str, grid: np.ndarray) -> None:
-    """Write a grid (64, 64, 64) as 3D-FUTURE-SDF has it; raises ImportError where h5py is not there."""
-    import h5py
-
-    path = Path(folder) / model_id / "ori_sample_grid.h5"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with h5py.File(path, "w") as file:
-        file.create_dataset("pc_sdf_sample", data=np.asarray(grid, np.float32).reshape(-1, 1))
-
-
 def _graph(name: str, room: RoomBoxes, edges: np.ndarray) -> dict:
     words = vocabulary()
     floor = len(room) + 1

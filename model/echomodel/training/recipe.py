@@ -11,7 +11,7 @@ from typing import Literal
 from echomodel.config import CompactConfig, from_dict, with_settings
 from echomodel.released.config import PaperSizes
 
-Stage = Literal["vqvae", "layout", "shape", "parts", "tokens", "joint", "paper_vqvae", "paper"]
+Stage = Literal["vqvae", "layout", "shape", "parts", "joint", "paper_vqvae", "paper"]
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class Recipe:
     """One training run.
 
     Arguments:
-        stage: `vqvae` (autoencoder), `layout`, `shape`, `parts` (descriptions of furniture), `tokens` (its solids one
-            by one) or `joint` (layouts and shapes on one latent graph); `paper_vqvae` and `paper` are the autoencoder
+        stage: `vqvae` (autoencoder), `layout`, `shape`, `parts` (descriptions of furniture) or `joint`
+            (layouts and shapes on one latent graph); `paper_vqvae` and `paper` are the autoencoder
             and the joint stage of the `paper` preset.
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.

@@ -17,7 +17,6 @@ from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.shape_stage import ShapeStage
 from echomodel.training.start import CompactStage, data_folder, started
-from echomodel.training.tokens_stage import TokensStage
 from echomodel.training.trainer import Report, Trainer
 
 STAGES: dict[str, type[CompactStage]] = {
@@ -26,7 +25,6 @@ STAGES: dict[str, type[CompactStage]] = {
     "shape": ShapeStage,
     "joint": JointStage,
     "parts": PartsStage,
-    "tokens": TokensStage,
 }  # the stages of the compact model, as recipes name them
 
 

@@ -222,7 +222,7 @@ def test_recipes_name_what_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "b.toml").write_text('stage = "layout"\nsteps = 5\n[optimizer]\nspeed = 3\n')
     with pytest.raises(ValueError, match=r"unknown field 'optimizer.speed', allowed: rate"):
         read_recipe(tmp_path / "b.toml")
-    with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, parts, tokens, joint"):
+    with pytest.raises(ValueError, match="stage is 'layouts', allowed: vqvae, layout, shape, parts, joint"):
         read_recipe(RECIPES / "layout.toml", ["stage=layouts"])
     with pytest.raises(ValueError, match="setting 'steps' has no '='"):
         read_recipe(RECIPES / "layout.toml", ["steps"])
