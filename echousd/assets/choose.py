@@ -45,6 +45,9 @@ class AssetWishes:
         text: words that the models shall be like, "" = none.
         collect: take models along with all that they need, instead of referring to where they lie.
         encoder: of texts, None = CLIP (extra `text`), whose weights must be there.
+        outside: folders besides those of the index and of the graph's file in which models may lie.
+
+    Raises ValueError for a stretch that is not allowed and for an index of models that lie elsewhere.
     """
 
     library: Library | None = None
@@ -53,8 +56,11 @@ class AssetWishes:
     text: str = ""
     collect: bool = False
     encoder: TextEncoder | None = None
+    outside: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.library is not None:
+            self.library.check_reach(self.outside)
         if not (math.isfinite(self.stretch) and 1 <= self.stretch <= 4):
             raise ValueError(f"stretch is {self.stretch:g}, allowed: 1 to 4")
 
@@ -95,7 +101,13 @@ def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishe
 
 
 def asked_of(
-    assets: Path | None, *, stretch: float = STRETCH, licences: str | None = None, collect: bool = False, text: str = ""
+    assets: Path | None,
+    *,
+    stretch: float = STRETCH,
+    licences: str | None = None,
+    collect: bool = False,
+    text: str = "",
+    outside: Sequence[Path] = (),
 ) -> AssetWishes:
     """What the options of a command ask for; raises ValueError for an option that is not allowed."""
     words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
@@ -103,7 +115,8 @@ def asked_of(
         raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
     if text and assets is None:
         raise ValueError(f"--text {text!r} needs models to choose from; name a library's index with --assets")
-    wishes = AssetWishes(None if assets is None else read_library(assets), stretch, words, text, collect)
+    library = None if assets is None else read_library(assets)
+    wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(outside))
     _ = wishes.unlikeness  # what is absent is told before any long work
     return wishes
 

@@ -6,7 +6,7 @@ import io
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,6 +22,20 @@ MESHES = (".obj", ".glb", ".gltf")
 MODELS = (*STAGES, *MESHES)
 MAX_MODEL = 2 * 2**30  # bytes
 TEXTS, MAX_TEXT = (".obj", ".gltf"), 2**28  # what is read takes ten times as much memory
+
+
+def check_reach(path: Path, folder: Path, outside: Sequence[Path], entry: str) -> None:
+    """Raises ValueError for a file or folder that a graph or an index names in none of the folders that it may.
+
+    Arguments:
+        path: what is named. folder: that of the graph or index. outside: those that the caller allows besides.
+        entry: what the error calls the place that names it. Links are followed in all of them.
+    """
+    real = os.path.realpath(path)
+    for place in (folder, *outside):
+        if os.path.commonpath([top := os.path.realpath(place), real]) == top:
+            return
+    raise ValueError(f"{entry} names {real}, allowed: files below {folder} (--allow-outside DIR adds a folder)")
 
 
 @dataclass(frozen=True)

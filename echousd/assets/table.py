@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 from echomodel.files import whole_file
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import MOST
+from echousd.assets.model_file import check_reach
 from echousd.assets.record import AssetRecord
 
 VERSION = 2
@@ -49,6 +50,12 @@ class Library:
         """The file of a record, and its member in it where it is an archive."""
         file, _, member = record.uri.partition("!")
         return (self.file.absolute().parent / file), member
+
+    def check_reach(self, outside: Sequence[Path] = ()) -> None:
+        """Raises ValueError where models lie neither below the index's folder nor in those that the caller allows."""
+        here = self.file.absolute().parent
+        for root in dict.fromkeys(record.root for record in self.records.values()):
+            check_reach(here / root, here, outside, f"{self.file}: a row")
 
     def root(self, record: AssetRecord) -> Path:
         """The folder that a record's files lie in; the model's own where an index claims all that somebody has."""

@@ -83,7 +83,7 @@ def batch(
         variations: option -> values, whose combinations a graph's rooms take in turn.
         options: of the rooms, fields of `echousd.batches.options.BatchOptions` (shapes, weights, drafts, dress ...);
             of the run, fields of `echousd.batches.run.RunOptions`: workers, shard=(i, n), resume, max_failures,
-            timeout, until, memory, ray, executor, progress.
+            timeout, until, memory, ray, to, outside, executor, progress.
 
     Raises ValueError for what is not allowed, a folder in use or with another plan, and says the difference.
     """
@@ -109,7 +109,7 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     device = request.options.device
     if not how.ray and how.executor is None:
         network_processes(device)
-    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.to))
+    plan = _with_libraries(make_plan(request, weights_hash(request.options.weights), how.to, how.outside), how.outside)
     place = shard_folder(out, how.shard)
     with locked(place):
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
@@ -204,10 +204,10 @@ def weights_hash(weights: str) -> str:
     return digest.hexdigest()[:12]
 
 
-def _with_libraries(plan: Plan) -> Plan:
+def _with_libraries(plan: Plan, outside: tuple[str, ...]) -> Plan:
     """The plan that knows its libraries by their bytes; raises ValueError for what its rooms would miss."""
     for options in plan.options:
-        _ = options.wishes
+        options.wishes(outside)
         if options.settle:
             from echousd.settle import require_engine
 

@@ -78,20 +78,25 @@ class BatchOptions(BaseModel):
         """How a room is written; raises ValueError for a word that is not allowed."""
         return RoomOptions(**{field.name: getattr(self, field.name) for field in fields(RoomOptions)})
 
-    @property
-    def wishes(self) -> AssetWishes:
-        """What is asked of a library; raises ValueError for what is not allowed or not there."""
+    def wishes(self, outside: tuple[str, ...] = ()) -> AssetWishes:
+        """What is asked of a library; raises ValueError for what is not allowed or not there.
+
+        Arguments:
+            outside: folders besides that of the index in which its models may lie.
+        """
         index = Path(self.assets)
         changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
-        return _wishes(self.assets, changed, self.stretch, self.licenses, self.text, self.collect)
+        return _wishes(self.assets, changed, self.stretch, self.licenses, self.text, self.collect, outside)
 
 
 @lru_cache(maxsize=4)  # words are compared with those of all models once in a process
-def _wishes(assets: str, changed: int, stretch: float, licenses: str, text: str, collect: bool) -> AssetWishes:
+def _wishes(
+    assets: str, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
+) -> AssetWishes:
     from echousd.assets.choose import asked_of
 
-    index = Path(assets) if assets else None
-    return asked_of(index, stretch=stretch, licences=licenses or None, collect=collect, text=text)
+    index, folders = Path(assets) if assets else None, [Path(folder) for folder in outside]
+    return asked_of(index, stretch=stretch, licences=licenses or None, collect=collect, text=text, outside=folders)
 
 
 class BatchRequest(BaseModel):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import islice
@@ -117,11 +117,12 @@ def packed(rooms: Iterable[Item]) -> Iterator[tuple[Item, ...]]:
         first = False
 
 
-def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
+def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequence[str] = ()) -> Plan:
     """The plan of a request; the same for the same request, files and weights.
 
     Arguments:
         weights: hash of the weights. to: URL that the rooms go to (`echousd.batches.remote`), "" = the run's folder.
+        outside: folders besides those of the graphs' files in which files of models may lie.
     """
     sets: dict[BatchOptions, int] = {}
     entries: list[Entry] = []
@@ -134,7 +135,7 @@ def make_plan(request: BatchRequest, weights: str, to: str = "") -> Plan:
         origin, error = (text.encode("utf-8", "replace").decode() for text in (origin, error))  # of odd file names
         entries.append(Entry(number, f"{_word(name)}_{number:06d}", origin, digest, seed, chosen, draw, error))
 
-    for found in find_graphs(request.sources):
+    for found in find_graphs(request.sources, outside):
         digest = hashlib.sha256(found.text.encode()).hexdigest()[:16] if found.text else ""
         if digest:
             graphs[digest] = found.text

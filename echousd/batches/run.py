@@ -63,6 +63,7 @@ class RunOptions:
         memory: MiB a worker; a room that needs more fails.
         ray: `auto` or the address of a Ray cluster, whose nodes see the folder under one path; "" = local processes.
         to: URL of a file system of fsspec that rooms and store go to, "" = the run's folder, which keeps the rest.
+        outside: folders besides those of the graphs and of the index in which models may lie.
         executor: runs the tasks in place of either.
         progress: called after every room.
 
@@ -78,6 +79,7 @@ class RunOptions:
     memory: int | None = MEMORY
     ray: str = ""
     to: str = ""
+    outside: tuple[str, ...] = ()
     executor: Executor | None = None
     progress: Callable[[BatchProgress], None] | None = None
 
@@ -294,5 +296,5 @@ class Run:
             folder, store = entry.path, STORE
         return work.Job(
             entry.id, folder, entry.seed, options, text or self.plan.graphs.get(entry.graph, ""), entry.draw, rounds,
-            "" if options.self_contained else store, to=self.plan.to,
+            "" if options.self_contained else store, to=self.plan.to, outside=self.how.outside,
         )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from echousd.assets.table import LARGEST, unpacked
@@ -33,19 +33,34 @@ class Found:
     error: str = ""
 
 
-def find_graphs(sources: Sequence[str]) -> Iterator[Found]:
-    """All graphs of the sources in their order; raises ValueError for a source that matches nothing."""
+def find_graphs(sources: Sequence[str], outside: Sequence[str] = ()) -> Iterator[Found]:
+    """All graphs of the sources in their order; raises ValueError for a source that matches nothing.
+
+    Arguments:
+        outside: folders besides that of its graph in which the file of a model may lie.
+    """
     for source in sources:
         paths = _files(source)
         if not paths:
             raise ValueError(f"{source}: no graphs there; allowed: {', '.join((*FORMS, *MANY))} files, folders, globs")
         for path in paths:
-            if path.suffix.lower() == ".jsonl":
-                yield from _lines(path)
-            elif path.suffix.lower() == ".parquet":
-                yield from _rows(path)
-            else:
-                yield from _file(path)
+            read = {".jsonl": _lines, ".parquet": _rows}.get(path.suffix.lower(), _file)
+            yield from (_anchored(found, path.parent, outside) for found in read(path))
+
+
+def _anchored(found: Found, folder: Path, outside: Sequence[str]) -> Found:
+    """What was found with the files of its models as absolute paths, or why they may not be read."""
+    if '"asset"' not in found.text:
+        return found
+    from echousd.assets.choose import AssetWishes
+    from echousd.room.sources.retrieval import anchored, check_files
+
+    graph = anchored(SceneGraph.from_json(found.text), folder)
+    try:
+        check_files(graph, folder, AssetWishes(outside=tuple(map(Path, outside))), found.origin)
+    except ValueError as error:
+        return replace(found, text="", error=str(error))
+    return replace(found, text=graph.to_json())
 
 
 def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> SceneGraph:

@@ -51,6 +51,7 @@ class Job:
         best: of all rounds but the last, None = nobody has judged them.
         answers: samples of the process that has the device.
         to: URL that `folder` and `store` are below, "" = they lie on a disk.
+        outside: as of the run (`RunOptions`).
     """
 
     id: str
@@ -64,6 +65,7 @@ class Job:
     best: Best | None = None
     answers: tuple[bytes, ...] = ()
     to: str = ""
+    outside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -171,9 +173,9 @@ def generated(job: Job, *, here: bool = False) -> Any:
     if asked.device != CPU and not here:
         model = ElsewhereModel(model, job.answers)
     made = generate(
-        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.wishes, model=model, preset=asked.preset,
-        repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps, faces=asked.faces,
-        options=asked.look, drawn=drawn, fit=asked.fit,
+        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.wishes(job.outside), model=model,
+        preset=asked.preset, repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps,
+        faces=asked.faces, options=asked.look, drawn=drawn, fit=asked.fit,
     )  # fmt: skip
     if not asked.settle:
         return made

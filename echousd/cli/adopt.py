@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.options import Assets, Licenses, Stretch, Wait
+from echousd.cli.options import Assets, Licenses, Outside, Stretch, Wait
 
 
 def register(app: typer.Typer) -> None:
@@ -32,6 +32,7 @@ def adopt(
     assets: Assets = None,
     stretch: Stretch = 1.15,
     licenses: Licenses = None,
+    outside: Outside = None,
     text: Annotated[str, typer.Option(help="What models shall be like, such as 'mid-century oak' (extra: text).")] = "",
     collect: Annotated[
         bool, typer.Option("--collect", help="Take the stage's pieces and models along instead of referring to them.")
@@ -62,7 +63,7 @@ def adopt(
         from echousd.room.room import RoomOptions
         from echousd.room.written import write_room
 
-        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
+        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text, outside=outside or ())
         graph = adopted(stage, room=room, add=add, relate=relate or ())
         made = generate(
             graph, seed=seed, shapes=shapes, assets=wishes, options=RoomOptions(walls=walls, dress=dress),

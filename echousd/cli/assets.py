@@ -68,6 +68,9 @@ def index(
     if len(done.faults) > SHOWN:
         say(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
     say(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")
+    for folder in folders:
+        if not folder.resolve().is_relative_to(output.resolve().parent):
+            say(f"note     {folder} is not below the index: generate asks for --allow-outside {folder}")
 
 
 @assets_app.command(epilog="Example: echousd assets review models.parquet")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from echousd.cli.options import AsJson, Licenses, Weights
+from echousd.cli.options import AsJson, Licenses, Outside, Weights
 from echousd.cli.output import one_line, plain_json, say, say_error, say_json
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ def run(
         str | None, typer.Option(help="parts, sdf, library, guided, boxes; default: the best of the model.")
     ] = None,
     assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library and guided.")] = None,
+    outside: Outside = None,
     stretch: Annotated[
         float | None, typer.Option(help="How much models may be stretched; default 1.15.", min=1, max=4)
     ] = None,
@@ -125,7 +126,7 @@ def run(
     with _shown(json) as tell:
         how = RunOptions(
             workers=workers, shard=_shard(shard), resume=resume, max_failures=max_failures, timeout=timeout,
-            until=_clock(until), memory=memory, ray=ray, to=to, progress=tell,
+            until=_clock(until), memory=memory, ray=ray, to=to, progress=tell, outside=tuple(map(str, outside or ())),
         )  # fmt: skip
         result = run_batch(request, output, how)
     found = finish(output, webdataset=webdataset)

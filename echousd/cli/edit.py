@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.options import Assets, Wait, Weights
+from echousd.cli.options import Assets, Outside, Wait, Weights
 from echousd.cli.output import say
 from echousd.cli.report import report, say_written, telling_faults
 
 if TYPE_CHECKING:
+    from echousd.assets.choose import AssetWishes
     from echousd.graph import SceneGraph
 
 
@@ -50,6 +51,7 @@ def edit(
         typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: as the room is made."),
     ] = None,
     assets: Assets = None,
+    outside: Outside = None,
     weights: Weights = None,
     faces: Annotated[int | None, typer.Option(help="Faces of each new mesh; default: as the room.", min=100)] = None,
     drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most, the best is kept.", min=1, max=64)] = None,
@@ -75,8 +77,8 @@ def edit(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
-    options = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces, "assets": assets}
-    options["drafts"] = drafts
+    options: dict[str, Any] = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces}
+    options |= {"drafts": drafts, "assets": _allowed(assets, outside)}
     if undo or redo:
         if wishes != Wishes() or dry_run or output is not None or (undo and redo):
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
@@ -93,6 +95,7 @@ def edit(
 def update(
     layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.", show_default=False)],
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
+    outside: Outside = None,
     weights: Weights = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
     wait: Wait = False,
@@ -115,9 +118,15 @@ def update(
             say(f"locked   {name}, where {layer.name} puts it")
         return own, graph
 
-    options = {"seed": seed, "shapes": None, "model": weights, "repair": True}
+    options = {"seed": seed, "shapes": None, "model": weights, "repair": True, "assets": _allowed(None, outside)}
     nothing = f"{layer}: changes nothing about the room"
     _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+
+
+def _allowed(assets: Path | None, outside: list[Path] | None) -> AssetWishes:
+    from echousd.assets.choose import asked_of
+
+    return asked_of(assets, outside=outside or ())
 
 
 def _step(room: Path, wait: bool, json: bool, *, back: bool) -> None:

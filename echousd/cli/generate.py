@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.options import Assets, Licenses, Stretch, Wait
+from echousd.cli.options import Assets, Licenses, Outside, Stretch, Wait
 from echousd.cli.output import say
 from echousd.cli.report import report, telling_faults
 
@@ -65,6 +65,7 @@ def generate(
         ),
     ] = None,
     assets: Assets = None,
+    outside: Outside = None,
     stretch: Stretch = 1.15,
     licenses: Licenses = None,
     text: Annotated[
@@ -163,7 +164,7 @@ def generate(
             up_axis.upper(), walls, atlas, ceiling, dress, merge=meshes, materialx=materialx, crate=crated,
             instances=instances, thumbnails=thumbnails, dress_graph=dress_graph,
         )  # fmt: skip
-        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text)
+        wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text, outside=outside or ())
         spent = {"imports": time.perf_counter() - started}
         restless: list[str] = []
 

@@ -33,6 +33,7 @@ from echousd.room.sources.mixing import check_sources, mixed_shapes
 from echousd.room.sources.retrieval import (
     Retrieved,
     anchored,
+    check_files,
     given_pieces,
     retrieved,
     source_of,
@@ -90,6 +91,7 @@ def edit(
     beside = Path(root).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph)
+    check_files(graph, beside, wishes, str(root), fresh)
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None

@@ -41,7 +41,7 @@ from echousd.room.room import Provenance, RoomOptions
 from echousd.room.sources import default_source, shape_source
 from echousd.room.sources.guided import shape_nearness
 from echousd.room.sources.mixing import check_sources, mixed_shapes, sources_of
-from echousd.room.sources.retrieval import anchored, given_pieces, retrieved, with_given_sizes
+from echousd.room.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
 from echousd.room.sources.source import ShapeRequest
 from echousd.room.styles import asset_names, style_groups
 from echousd.room.tensors import graph_batch
@@ -135,6 +135,8 @@ def generate(
     else:
         graph, homeless = with_locked_places(graph, earlier)
     graph = anchored(graph, beside)
+    if file:  # a graph that was read may come from anybody; one in memory is the caller's own
+        check_files(graph, beside, wishes, file)
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
     with timer.stage("load"), one_thread():

@@ -11,7 +11,7 @@ from echousd.assets.catalogues.entry import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import measure
 from echousd.assets.measured import Measured
-from echousd.assets.model_file import MODELS, STAGES, ModelFile
+from echousd.assets.model_file import MODELS, STAGES, ModelFile, check_reach
 from echousd.assets.record import AssetRecord, Vector
 from echousd.assets.table import Library
 from echousd.room.colliders import collider
@@ -57,6 +57,7 @@ def library_file(library: Library, record: AssetRecord) -> ModelFile:
     """Where a model of a library lies; raises ValueError where it is gone or is another one than was indexed."""
     path, member = library.path(record)
     model = ModelFile(path, library.root(record), member)
+    check_reach(path, model.top, (), f"{library.file}: asset {record.id!r}")
     try:
         same = digest_of(model) == record.sha256
     except ValueError as error:

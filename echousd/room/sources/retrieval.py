@@ -12,7 +12,7 @@ import numpy as np
 from echomodel.vocabulary import vocabulary
 from echousd.assets.choose import Asked, AssetWishes, choose, fits
 from echousd.assets.describe import relative
-from echousd.assets.model_file import ModelFile
+from echousd.assets.model_file import ModelFile, check_reach
 from echousd.assets.record import AssetRecord, Vector
 from echousd.graph import SceneGraph
 from echousd.room.finishes.harmonies import HARMONIES, linear
@@ -64,6 +64,20 @@ def source_of(node: Node, shapes: str) -> str:
 def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
     """The graph with the files of assets as absolute paths; relative ones are in `folder`."""
     return _moved(graph, lambda file: (folder.absolute() / file).as_posix())
+
+
+def check_files(
+    graph: SceneGraph, folder: Path, wishes: AssetWishes, file: str, among: Container[str] | None = None
+) -> None:
+    """Raises ValueError for an asset of a graph that was read whose file lies elsewhere than the graph's own.
+
+    Arguments:
+        graph: as `anchored` gives it. folder: of the graph's file. wishes: which folders are allowed besides.
+        file: what the error calls the graph. among: names of the objects that are looked at, None = all.
+    """
+    for node in graph.nodes:
+        if node.asset is not None and is_file(node.asset) and (among is None or node.name in among):
+            check_reach(Path(split(node.asset)[0]), folder, wishes.outside, f"{file}: object {node.name!r}: asset")
 
 
 def beside(graph: SceneGraph, folder: Path) -> SceneGraph:

@@ -48,7 +48,7 @@ def test_a_batch_asks_a_library_as_generate_does(library, source, tmp_path, monk
     (room,) = made(source, tmp_path / "none", licenses="MIT", **shelf)
     assert "library" not in {one["source"] for one in room["meshes"].values()}
     options = {"assets": str(library), "stretch": 1.5}
-    wishes = request_of({"sample": {"bedroom": 1}, "options": options}, "test").options.wishes
+    wishes = request_of({"sample": {"bedroom": 1}, "options": options}, "test").options.wishes()
     assert (wishes.stretch, wishes.licences, wishes.collect) == (1.5, (), False)
 
     asked = []

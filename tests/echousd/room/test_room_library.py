@@ -79,7 +79,9 @@ def test_a_piece_of_ones_own_beside_generated_ones(tmp_path):
     root = room.save(tmp_path / "out/bedroom", preview=False)
     assert open_stage(root).GetPrimAtPath("/Room/SceneGraph")
     assert read_room(root).graph.node("wardrobe").asset == "../../mine/dresser.usda"
-    again = echousd.generate(root, model=StandIn(), shapes="boxes")
+    with pytest.raises(ValueError, match=r"'wardrobe': asset names .*dresser.usda, allowed: files below .*bedroom \("):
+        echousd.generate(root, model=StandIn(), shapes="boxes")
+    again = echousd.generate(root, model=StandIn(), shapes="boxes", assets=AssetWishes(outside=(tmp_path / "mine",)))
     assert again.geometry["wardrobe"].origin.asset == "dresser.usda"
 
 
