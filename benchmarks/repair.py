@@ -95,7 +95,7 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
 
 def repair_collisions(room: RoomBoxes) -> int:
     """Pairs that collide in a room as it is, by the repair's own measure."""
-    from echousd.repair.belonging import allowed_overlap
+    from echomodel.objective.support import allowed_overlap
     from echousd.repair.problem import pose
     from echousd.repair.report import TOUCH
 

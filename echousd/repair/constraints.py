@@ -9,10 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy import sparse
 
-from echousd.repair.belonging import allowed_overlap
+from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
 from echousd.repair.geometry import COLUMNS, Rows, axes, floor_rows, separation_rows, spread, spread_sparsely
 from echousd.repair.placements import placement_rows
-from echousd.repair.problem import ON_CEILING, ON_FLOOR, Problem, wall_gaps
+from echousd.repair.problem import Problem, wall_gaps
 from echousd.repair.relations import relation_margins
 
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from torch import Tensor
 
 from echomodel.metrics.layout_evaluation import Finish
+from echomodel.objective import faults
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rules.living import faults
 from echousd.repair.repair import repair_boxes
 
 

@@ -38,7 +38,7 @@ def living_faults(
         floor: (k, 2) float, corners where the graph states none, metres; None = no rule of walls.
         all_blamed: objects whose place the graph states, too.
     """
-    from echomodel.rules.living import faults
+    from echomodel.objective import faults
 
     names, words = list(graph.names), vocabulary()
     rows = {name: row for row, name in enumerate(names)}
@@ -60,7 +60,7 @@ def living_faults(
 
 def unusual_sizes(graph: SceneGraph) -> tuple[str, ...]:
     """One sentence for every object whose stated size no such furniture has."""
-    from echomodel.rules.living.sizes import size_range
+    from echomodel.objective.sizes import size_range
 
     told = []
     for node in graph.nodes:

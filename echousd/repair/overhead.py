@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.rules.living.plan import kind_of
+from echomodel.objective.plan import kind_of
 from echomodel.vocabulary import vocabulary
 from echousd.repair.distances import BED_LIT
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.repair.distances import kept_behind
@@ -17,11 +18,9 @@ from echousd.repair.geometry import Floor, axes, floor_from_polygon, pair_gaps, 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
 
-ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
 WALL_REACH = 0.6  # metres: wall furniture further from every wall behind it stands free
 WALL_TURN = np.radians(25.0)  # a piece turned further away from the wall's normal does not lean on it
 NEIGHBOURS = 2.0  # metres by which neighbours at one wall rather part along it than one in front of the other
-CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +122,7 @@ def pose(
     told = np.flatnonzero(np.isin(triplets[:, 1], sorted(measured(rules))))
     floor = None if floor_polygon is None else floor_from_polygon(floor_polygon)
     n = len(words)
-    carrier = carriers(words, size, position, yaw, triplets)
+    carrier = carriers([vocabulary().category(word) for word in words], size, position, yaw, triplets)
     position, yaw = stacked(size, position, carrier, height, fixed), yaw.copy()
     wall = np.full((n, 2, 2), np.nan)
     if floor is not None:
@@ -190,46 +189,6 @@ def required_order(n: int, triplets: np.ndarray) -> np.ndarray:
                 order[chosen[:, 0], chosen[:, 2], column] = -sign
                 order[chosen[:, 2], chosen[:, 0], column] = sign
     return order
-
-
-def carriers(
-    categories: Sequence[str], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray
-) -> np.ndarray:
-    """What each object stands on: as the relations say, else the nearest carrier for what rests on tables.
-
-    Returns: (n,) int as `Problem.carrier`; never a cycle.
-    """
-    n = len(categories)
-    rows = [vocabulary().category(word) for word in categories]
-    out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(row.support, FREE) for row in rows], int)
-    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
-    told = triplets[np.isin(triplets[:, 1], resting)]
-    for subject, _, target in told:
-        if subject != target and not _reaches(out, int(target), int(subject)):
-            out[subject] = target
-    for i in range(n):
-        if rows[i].support != "table" or out[i] >= 0:
-            continue
-        offsets = position[i][[0, 2]] - position[:, [0, 2]]
-        local = np.abs(np.einsum("nkd,nd->nk", axes(yaw), offsets)) - 0.5 * size[:, [0, 2]]
-        distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.linalg.norm(offsets, axis=1)
-        for k in range(n):
-            if k == i or not rows[k].carries or _reaches(out, k, i):
-                distance[k] = np.inf
-        best = int(distance.argmin())
-        if distance[best] < CARRIER_REACH:
-            out[i] = best
-        else:
-            out[i] = FREE if position[i, 1] > 0.3 and rows[i].hangs else ON_FLOOR
-    return out
-
-
-def _reaches(carrier: np.ndarray, start: int, goal: int) -> bool:
-    while start >= 0:
-        if start == goal:
-            return True
-        start = int(carrier[start])
-    return False
 
 
 def stacked(

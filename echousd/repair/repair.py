@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.objective import plan_of
+from echomodel.objective.sizes import fitting_loads, hung_lamps, laid_tables, smaller_sizes, usual_sizes
 from echomodel.openings import Opening
-from echomodel.rules.living import plan_of
-from echomodel.rules.living.sizes import fitting_loads, hung_lamps, laid_tables, smaller_sizes, usual_sizes
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import BAD, arrange, setting_of
 from echousd.repair.overhead import lamps_along

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from echousd.repair.belonging import allowed_overlap
+from echomodel.objective.support import allowed_overlap
 from echousd.repair.constraints import COLLISION, FLOOR, RELATION
 from echousd.repair.geometry import floor_rows, separation
 from echousd.repair.problem import Problem

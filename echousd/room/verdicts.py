@@ -7,10 +7,10 @@ import warnings
 import numpy as np
 
 from echomodel.boxes import Boxes
+from echomodel.objective.support import allowed_overlap
 from echomodel.rules import fronts, margins, verdicts
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
-from echousd.repair.belonging import allowed_overlap
 from echousd.repair.geometry import pair_indices, separation
 from echousd.repair.placements import stated_placements
 from echousd.repair.report import TOUCH, Collision

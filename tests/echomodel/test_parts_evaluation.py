@@ -7,7 +7,7 @@ import torch
 from echomodel.data.furniture import Choices, Style
 from echomodel.data.furniture.description import described
 from echomodel.metrics.parts_evaluation import PartsEvaluation, style_scores, usual_size
-from echomodel.rules.living.sizes import size_range
+from echomodel.objective.sizes import size_range
 
 
 @pytest.mark.parametrize("category", ["kids_bed", "desk", "floor_lamp"])

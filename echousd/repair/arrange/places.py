@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from echomodel.rules.living.walls import PASSAGE
+from echomodel.objective.support import ON_CEILING
+from echomodel.objective.walls import PASSAGE
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange.attending import Row, at_anchor, out_of
 from echousd.repair.arrange.setting import Poses, Setting, State
 from echousd.repair.distances import over_bed, spread_at_walls
 from echousd.repair.geometry import depth_inside
-from echousd.repair.problem import ON_CEILING
 
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall

@@ -10,8 +10,8 @@ from itertools import product
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from echomodel.rules.living.company import STAGGERED
-from echomodel.rules.living.sizes import TUCKED
+from echomodel.objective.company import STAGGERED
+from echomodel.objective.sizes import TUCKED
 from echousd.repair.arrange.attending import apart, out_of
 from echousd.repair.arrange.costs import price
 from echousd.repair.arrange.groups import GAIN, paid_by

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.objective.access import TALL
+from echomodel.objective.company import PLACE
+from echomodel.objective.plan import kind_of
+from echomodel.objective.support import ON_FLOOR, shared_fraction
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
-from echomodel.rules.living.access import TALL
-from echomodel.rules.living.company import PLACE
-from echomodel.rules.living.plan import kind_of
 from echomodel.vocabulary import Category, vocabulary
-from echousd.repair.belonging import shared_fraction
 from echousd.repair.distances import BEHIND, kept_behind
 from echousd.repair.geometry import Floor, axes
-from echousd.repair.problem import ON_FLOOR, Posed, required_order
+from echousd.repair.problem import Posed, required_order
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
@@ -269,7 +269,7 @@ def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], ou
     Arguments:
         turned: (n,) bool, headings that are stated. openings, outline: as in `Setting`.
     """
-    from echomodel.rules.living import plan_of
+    from echomodel.objective import plan_of
 
     problem = at.problem
     assert problem.floor is not None

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from echomodel.rules.living.sizes import TUCKED
+from echomodel.objective.sizes import TUCKED
 from echomodel.vocabulary import Category, vocabulary
 
 Size = np.ndarray

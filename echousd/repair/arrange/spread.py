@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.rules.living.zones import bare_limit
+from echomodel.objective.zones import bare_limit
 from echousd.repair.arrange.setting import Setting, State
 from echousd.repair.geometry import depth_inside
 

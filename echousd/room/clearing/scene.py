@@ -12,10 +12,10 @@ from shapely.affinity import translate
 from shapely.geometry.base import BaseGeometry
 
 from echomodel.boxes import Boxes
+from echomodel.objective.support import carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.repair.problem import carriers
 from echousd.repair.repair import DEFAULT_HEIGHT
 from echousd.room.clearing.nofit import FLUSH, Solids, depth, forbidden_moves
 from echousd.room.geometry import Geometry
@@ -165,7 +165,7 @@ def scene_of(
     return Scene(
         everything,
         np.array([node.locked or node.position is not None for node in nodes]),
-        carriers([kind.name for kind in kinds], size, position, yaw, triplets),
+        carriers(kinds, size, position, yaw, triplets),
         yaw,
         np.array([kind.role == "seat" for kind in kinds]),
         np.sqrt(size[:, 0] * size[:, 2]),

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.objective import BY_EYE, TERMS, faults_of, plan_of, unreached, walk
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rules.living import RULES, faults_of, plan_of, unreached, walk
 
 
 def living_scores(rooms: Sequence[RoomBoxes], relations: Sequence[np.ndarray]) -> dict:
@@ -37,5 +37,5 @@ def living_scores(rooms: Sequence[RoomBoxes], relations: Sequence[np.ndarray]) -
         "free_of_faults": free / max(len(rooms), 1),
         "walkable": float(np.mean(shares)) if shares else None,
         "rules": {name: count / max(objects, 1) for name, count in found.most_common()},
-        "measured": len(RULES) + 1,
+        "measured": sum(term.kind in BY_EYE for term in TERMS) + 1,
     }

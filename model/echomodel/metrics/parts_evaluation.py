@@ -22,9 +22,9 @@ from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
 from echomodel.metrics.shape_evaluation import FIRST_ROOM
 from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.objective.sizes import size_range
 from echomodel.progress import StageListener
 from echomodel.rules import label_relations
-from echomodel.rules.living.sizes import size_range
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ As relations beyond SG-FRONT they are measured, guided to, repaired and checked;
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
@@ -159,11 +159,16 @@ def placement_margins(
     return torch.cat(found) if found else size.new_zeros(0).double()
 
 
-def margin_of(one: Stated, every: Sequence[Spread], walls: Walls | None, categories: Sequence[str]) -> Tensor:
+def margin_of(
+    one: Stated,
+    every: Sequence[Spread] | Mapping[int, Spread],
+    walls: Walls | None,
+    categories: Sequence[str] | Mapping[int, str],
+) -> Tensor:
     """(K,) margin of one placement, metres; NaN where it needs walls and there are none.
 
     Arguments:
-        every: N boxes, each with K poses or with one. categories: their words.
+        every: boxes by their number, each with K poses or with one. categories: their words.
     """
     own, others = every[one.subject], [every[i] for i in one.others]
     if walls is None and not others:

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable
+from echomodel.objective import BY_EYE, TERMS, Plan
 from echomodel.openingrows import kept_free
-from echomodel.rules.living import RULES, Plan
 from echomodel.training.relation_loss import told_triplets
 from echomodel.training.rooms import LayoutBatch
 from echomodel.vocabulary import vocabulary
@@ -61,10 +61,10 @@ def living_miss(plan: Plan, openings: Tensor, low: Tensor, weight: Tensor) -> Te
         weight: (N,).
     """
     total = weight.new_zeros(())
-    for rule in RULES:
-        if rule.name in OTHERWISE:
+    for term in TERMS:
+        if term.kind not in BY_EYE or term.name in OTHERWISE:
             continue
-        seen = rule.find(plan)
+        seen = term.find(plan)
         total = total + (missed(seen.margin) * weight[seen.who]).sum()
     clear = kept_free(Boxes(plan.size, plan.position, plan.yaw), openings)
     total = total + (missed(clear) * weight * (low & plan.which(lambda kind: kind.support == "floor"))).sum()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from echomodel.boxes import Boxes
+from echomodel.objective import faults
 from echomodel.openings import Opening
-from echomodel.rules.living import faults
 from echomodel.vocabulary import vocabulary
 from echousd.repair import RepairConfig, repair_boxes
 from echousd.repair.arrange.costs import least, price

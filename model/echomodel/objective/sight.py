@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.rules.living.found import Found, found, nobody, worst
-from echomodel.rules.living.plan import FAR, Plan, facing_angle
+from echomodel.objective.found import Found, found, nobody, worst
+from echomodel.objective.plan import FAR, Plan, facing_angle
 from echomodel.vocabulary import vocabulary
 
 # From a viewer's front to the screen: 98 of 100 real sofas and 95 of 100 real beds are turned less.

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import torch
 
-from echomodel.rules.living.found import Found, found
-from echomodel.rules.living.plan import Plan, kind_of
+from echomodel.objective.found import Found, found
+from echomodel.objective.plan import Plan, kind_of
 from echomodel.sizes import size_statistics
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between

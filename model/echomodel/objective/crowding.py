@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, joined, nobody, worst
-from echomodel.rules.living.plan import FAR, Plan
+from echomodel.objective.found import Found, found, joined, nobody, worst
+from echomodel.objective.plan import FAR, Plan
 
 # Metres between pieces of different groups, by role: the 2nd to 3rd percentile in real rooms.
 APART = {

@@ -7,8 +7,8 @@ import math
 import torch
 
 from echomodel.floors import known, signed_distance
-from echomodel.rules.living.found import Found, found, joined, nobody, worst
-from echomodel.rules.living.plan import FAR, Plan
+from echomodel.objective.found import Found, found, joined, nobody, worst
+from echomodel.objective.plan import FAR, Plan
 
 EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one chair pulled out is less
 PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench

@@ -11,9 +11,9 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.data.rooms.generator import generate_rooms
+from echomodel.objective import TERMS, faults, faults_of, missed, plan_of
+from echomodel.objective.ways import ways
 from echomodel.openings import Opening
-from echomodel.rules.living import RULES, faults, faults_of, missed, plan_of
-from echomodel.rules.living.ways import ways
 from echomodel.vocabulary import vocabulary
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -268,15 +268,15 @@ def test_arms_reach_as_far_from_every_side_of_a_turned_box(yaw):
         assert found.reached.tolist() == [reached, False]
 
 
-@pytest.mark.parametrize("rule", RULES, ids=[rule.name for rule in RULES])
-def test_margins_have_finite_slopes(rule):
+@pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
+def test_margins_have_finite_slopes(term):
     room = generate_rooms(1, 5, room_type="living_dining_room")[0]
     door = Opening("door", "door", 0, 0.2, 0.9, 2.0)
     plan = plan_of(room, room.categories, room.floor_polygon, (door,))
     free = [value.clone().requires_grad_() for value in (plan.size, plan.position, plan.yaw)]
     for field, value in zip(("size", "position", "yaw"), free, strict=True):
         object.__setattr__(plan, field, value)
-    margin = rule.find(plan).margin
+    margin = term.find(plan).margin
     if margin.requires_grad:
         slopes = torch.autograd.grad(margin.sum(), free, allow_unused=True)
         assert all(bool(torch.isfinite(slope).all()) for slope in slopes if slope is not None)

@@ -12,9 +12,9 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import signed_distance
-from echomodel.rules.living.found import Found, found, joined, nobody, worst
-from echomodel.rules.living.plan import CLEAR_HEIGHT, FAR, Plan
-from echomodel.rules.living.zones import _gaps
+from echomodel.objective.found import Found, found, joined, nobody, worst
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
+from echomodel.objective.zones import _gaps
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part

@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.rules.living.found import Found, found
-from echomodel.rules.living.plan import FAR, Plan
+from echomodel.objective.found import Found, found
+from echomodel.objective.plan import FAR, Plan
 
 CROOKED = math.radians(5.0)  # 98 to 100 % of such furniture in real rooms is turned less
 TOUCHING = 0.3  # metres: 93 % of real beds, nightstands and tv stands have a smaller gap behind

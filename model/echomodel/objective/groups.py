@@ -7,8 +7,8 @@ import math
 import torch
 from torch import Tensor
 
-from echomodel.rules.living.found import Found, found, nobody
-from echomodel.rules.living.plan import Plan, facing_angle
+from echomodel.objective.found import Found, found, nobody
+from echomodel.objective.plan import Plan, facing_angle
 from echomodel.vocabulary import vocabulary
 
 LOOK = math.radians(60.0)  # chairs at a corner of their table look at it by up to 45 degrees

@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 
 from echomodel.floors import extents, known
-from echomodel.rules.living.found import Found, found, nobody
-from echomodel.rules.living.plan import Plan
+from echomodel.objective.found import Found, found, nobody
+from echomodel.objective.plan import Plan
 
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room

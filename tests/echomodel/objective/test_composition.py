@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.rules.living import composition
-from echomodel.rules.living.plan import plan_of
+from echomodel.objective import composition
+from echomodel.objective.plan import plan_of
 
 HALF = np.pi / 2
 

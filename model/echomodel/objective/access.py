@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import known, signed_distance
+from echomodel.objective.found import Found, found, nobody, worst
+from echomodel.objective.plan import Plan
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
-from echomodel.rules.living.found import Found, found, nobody, worst
-from echomodel.rules.living.plan import Plan
 
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
 SHARE = 0.3  # share of a front's width that may be covered

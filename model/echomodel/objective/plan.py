@@ -12,8 +12,10 @@ import torch
 from torch import Tensor
 
 from echomodel.floors import edges, known
+from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
+from echomodel.rules.placements import Stated
 from echomodel.vocabulary import Category, vocabulary
 
 # Predicates that say which anchor an object attends.
@@ -35,7 +37,9 @@ class Plan:
         floor: (S, K, 2) float, corners of the floors, padded with NaN, all NaN = unknown; in the frame of the boxes.
         openings: doors and windows of each room.
         triplets: (E, 3) int64, what the graphs state.
-        given: (N,) bool, boxes whose place and heading somebody stated: no rule blames them.
+        given: (N,) bool, boxes whose place and heading somebody stated: no term blames them.
+        height: (S,) float, of the ceilings, metres, NaN = unknown; None = all unknown.
+        rules: the rule set that the triplets are meant in. stated: where single boxes of the first room must stand.
     """
 
     kinds: tuple[Category, ...]
@@ -47,6 +51,9 @@ class Plan:
     openings: tuple[tuple[Opening, ...], ...]
     triplets: Tensor
     given: Tensor
+    height: Tensor | None = None
+    rules: str = "strict"
+    stated: tuple[Stated, ...] = ()
 
     # -- words -------------------------------------------------------------------------------------------------------
 
@@ -123,6 +130,51 @@ class Plan:
         """(N,) bool, boxes that stand on the floor and are in the way of legs and doors."""
         return self.which(lambda kind: kind.support == "floor") & (self.position[:, 1].detach() < 0.3)
 
+    @cached_property
+    def fronts(self) -> Tensor:
+        """(N,) bool, boxes that have a front."""
+        return self.which(lambda kind: kind.front)
+
+    @cached_property
+    def carrier(self) -> Tensor:
+        """(N,) int64, what each box stands on, as `support.carriers`."""
+        boxes = (value.detach().cpu().double().numpy() for value in (self.size, self.position, self.yaw))
+        size, position, yaw = boxes
+        scene, triplets = self.scene.numpy(), self.triplets.numpy()
+        out = np.empty(len(self), int)
+        for room in np.unique(scene):
+            here = np.flatnonzero(scene == room)
+            number = np.full(len(self), -1)
+            number[here] = np.arange(len(here))
+            told = triplets[(scene[triplets[:, 0]] == room)] if len(triplets) else triplets
+            local = np.stack([number[told[:, 0]], told[:, 1], number[told[:, 2]]], 1) if len(told) else told
+            found = carriers([self.kinds[k] for k in here], size[here], position[here], yaw[here], local)
+            out[here] = np.where(found >= 0, here[found.clip(0)], found)
+        return torch.from_numpy(out)
+
+    @cached_property
+    def ceiling(self) -> Tensor:
+        """(N,) float, height of the ceiling over each box, metres; NaN = unknown."""
+        if self.height is None:
+            return torch.full_like(self.yaw, torch.nan)
+        return self.height.to(self.yaw)[self.scene]
+
+    @cached_property
+    def centres(self) -> Tensor:
+        """(N, 3) float, middle of the bounding box of each box's floor, on the floor, metres; 0 where it is unknown."""
+        corners = torch.where(torch.isfinite(self.floor), self.floor, self.floor[:, :1])
+        middle = torch.nan_to_num((corners.amax(1) + corners.amin(1)) / 2).to(self.size)
+        return torch.stack([middle[:, 0], torch.zeros_like(middle[:, 0]), middle[:, 1]], 1)[self.scene]
+
+    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
+        """Subjects (P,) and objects (P,) of the relations of one name that the graphs state."""
+        rows = self.triplets[self.triplets[:, 1] == vocabulary().predicate_id(predicate)]
+        return rows[:, 0], rows[:, 2]
+
+    def everywhere(self, number: int) -> Tensor:
+        """(1,) int64, a box of the first room; of copies of one room (K,), in each of them."""
+        return torch.tensor([number])
+
     # -- pairs -------------------------------------------------------------------------------------------------------
 
     def pairs(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
@@ -158,6 +210,22 @@ class Plan:
         """(P,): distance from i's centre to j's footprint, 0 inside it, metres."""
         lateral, forward = self.nearest_point(i, j)
         return (lateral.square() + forward.square()).clamp_min(1e-12).sqrt()
+
+    @cached_property
+    def couples(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Pairs (P,), (P,) of boxes, each once, none on the other, and metres (P,) that they may overlap."""
+        every = torch.ones(len(self), dtype=torch.bool)
+        i, j = self.pairs(every, every)
+        keep = (i < j) & (self.carrier[i] != j) & (self.carrier[j] != i)
+        i, j = i[keep], j[keep]
+        known = {pair: shared_fraction(*pair) for pair in {(self.kinds[a], self.kinds[b]) for a, b in _listed(i, j)}}
+        rows = [known[self.kinds[a], self.kinds[b]] for a, b in _listed(i, j)]
+        share, owner = self.numbers([row[0] for row in rows]), torch.tensor([row[1] for row in rows], dtype=torch.bool)
+        side = torch.where(owner, self.size[j][:, [0, 2]].amin(1), self.size[i][:, [0, 2]].amin(1)).detach()
+        # chairs are tucked under their own table alone; a nightstand in its bed is moved off its wall later
+        strange = (self.anchor[i] != j) & (self.anchor[j] != i)
+        head = self.stands("head")
+        return i, j, torch.where(strange | head[i] | head[j], 0.0, share * side)
 
     @cached_property
     def anchor(self) -> Tensor:
@@ -257,6 +325,9 @@ def plan_of(
     relations: np.ndarray | Tensor | None = None,
     *,
     given: np.ndarray | None = None,
+    height: float | None = None,
+    rules: str = "strict",
+    stated: Sequence[Stated] = (),
     dtype: torch.dtype = torch.float64,
 ) -> Plan:
     """The plan of one room.
@@ -266,7 +337,8 @@ def plan_of(
             the way of others and obey no rule.
         floor: (k, 2) float, corners (x, z) in the frame of the boxes, None = unknown.
         openings: doors and windows in its edges. relations: (E, 3) int, [subject, predicate id, object].
-        given: (N,) bool, boxes that no rule blames.
+        given: (N,) bool, boxes that no term blames.
+        height: of the ceiling, metres. rules, stated: as in `Plan`.
     """
     corners = torch.full((1, 4, 2), torch.nan, dtype=dtype)
     if floor is not None and len(floor):
@@ -284,7 +356,14 @@ def plan_of(
         (tuple(openings),),
         torch.as_tensor(triplets, dtype=torch.int64).reshape(-1, 3),
         torch.as_tensor(none if given is None else np.asarray(given, bool)),
+        None if height is None else torch.tensor([height], dtype=dtype),
+        rules,
+        tuple(stated),
     )
+
+
+def _listed(i: Tensor, j: Tensor) -> list[tuple[int, int]]:
+    return list(zip(i.tolist(), j.tolist(), strict=True))
 
 
 def kind_of(word: str) -> Category:

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 
 from echomodel.floors import signed_distance
-from echomodel.rules.living.found import Found, found, nobody, worst
-from echomodel.rules.living.plan import CLEAR_HEIGHT, FAR, Plan
+from echomodel.objective.found import Found, found, nobody, worst
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
 
 BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them

@@ -1,0 +1,87 @@
+"""What each piece of furniture rests on, and which may share space because they belong together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from echomodel.vocabulary import Category, vocabulary
+
+ON_FLOOR, ON_CEILING, FREE = -1, -2, -3
+CARRIER_REACH = 0.5  # metres: a lamp or television further from every carrier stands on the floor
+LIFTED = 0.3  # metres: what begins higher and hangs by habit hangs
+
+
+def carriers(
+    kinds: Sequence[Category], size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray
+) -> np.ndarray:
+    """What each object stands on: as the relations say, else the nearest carrier for what rests on tables.
+
+    Arguments:
+        kinds: n rows of the vocabulary. size, position: (n, 3) float, metres; yaw: (n,) float, radians.
+        triplets: (e, 3) int, [subject, predicate id, object].
+
+    Returns: (n,) int, the carrier of each, `ON_FLOOR`, `ON_CEILING` or `FREE`; never a cycle.
+    """
+    n = len(kinds)
+    out = np.array([{"floor": ON_FLOOR, "ceiling": ON_CEILING}.get(kind.support, FREE) for kind in kinds], int)
+    resting = [predicate.id for predicate in vocabulary().predicates if predicate.rests]
+    for subject, _, target in triplets[np.isin(triplets[:, 1], resting)]:
+        if subject != target and not _reaches(out, int(target), int(subject)):
+            out[subject] = target
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    for i in range(n):
+        if kinds[i].support != "table" or out[i] >= 0:
+            continue
+        x, z = (position[i] - position)[:, [0, 2]].T
+        local = np.abs(np.stack([cos * x - sin * z, sin * x + cos * z], 1)) - 0.5 * size[:, [0, 2]]
+        distance = np.linalg.norm(np.maximum(local, 0.0), axis=1) + 1e-3 * np.hypot(x, z)
+        for k in range(n):
+            if k == i or not kinds[k].carries or _reaches(out, k, i):
+                distance[k] = np.inf
+        best = int(distance.argmin())
+        if distance[best] < CARRIER_REACH:
+            out[i] = best
+        else:
+            out[i] = FREE if position[i, 1] > LIFTED and kinds[i].hangs else ON_FLOOR
+    return out
+
+
+def _reaches(carrier: np.ndarray, start: int, goal: int) -> bool:
+    while start >= 0:
+        if start == goal:
+            return True
+        start = int(carrier[start])
+    return False
+
+
+def shared_fraction(first: Category, second: Category) -> tuple[float, int]:
+    """How far two categories may overlap, as (share, whose side it is a share of: 0 = first, 1 = second)."""
+    for guest, host, owner in ((first, second, 0), (second, first, 1)):
+        for word, share in host.admits:
+            if word in (guest.name, guest.role):
+                return share, owner
+    return 0.0, 0
+
+
+def allowed_overlap(categories: Sequence[str], size: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Depth in metres to which each pair may overlap because the two belong together (0 for pairs that do not).
+
+    Arguments:
+        categories: n category words.
+        size: (n, 3) float, extents in metres.
+        pairs: (p, 2) int, positions of the two objects.
+
+    Returns: (p,) float.
+
+    Raises `UnknownWord` for a category that the vocabulary does not hold.
+    """
+    if not len(pairs):
+        return np.zeros(0)
+    words = [(categories[i], categories[j]) for i, j in pairs.tolist()]
+    rows = {word: vocabulary().category(word) for word in {*categories}}
+    shares = {(one, other): shared_fraction(rows[one], rows[other]) for one, other in {*words}}
+    share, owner = (np.array(column) for column in zip(*(shares[pair] for pair in words), strict=True))
+    side = size[pairs[np.arange(len(pairs)), owner]]
+    return share * np.minimum(side[:, 0], side[:, 2])

@@ -1,0 +1,139 @@
+"""Every expectation of a room in one table: what is looked at, in which unit, its weight, what a person is told.
+
+In a conflict the kinds count in their order: relations, physics, living, composition. Whoever draws, moves, judges or
+explains a room asks this table and holds no distance of his own.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from echomodel.objective import access, company, crowding, groups, lamps, physics, relations, sight, sizes, walls, zones
+from echomodel.objective.found import Found
+from echomodel.objective.plan import Plan
+from echomodel.vocabulary import vocabulary
+
+KINDS = ("relations", "physics", "living", "composition")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One expectation.
+
+    Arguments:
+        name: how reports call it.
+        find: the boxes that it is about with their margins in its unit, >= 0 iff kept; its docstring is what it says.
+        says: sentences for a person, with {a} the box, {b} what it is about, {x} the number measured.
+        source: where its numbers come from.
+        kind: one of `KINDS`. unit: of the margin: `m`, `rad` or `share`.
+        slack: what a search and a loss ask for beyond the margin, in its unit.
+        weight: of a missed unit; none counts twice what breaking it at all does.
+    """
+
+    name: str
+    find: Callable[[Plan], Found]
+    says: tuple[str, ...]
+    source: str
+    kind: str = "living"
+    unit: str = "m"
+    slack: float = 0.01
+    weight: float = 1.0
+
+    @property
+    def means(self) -> str:
+        """What is expected, one sentence."""
+        if isinstance(self.find, relations.Told):
+            return self.find.means
+        return (inspect.getdoc(self.find) or "").partition("\n\n")[0].replace("\n", " ")
+
+
+RELATIONS = (
+    *(Term(name, relations.Told(name), (f"{{a}} is not {name} {{b}}",), "what the word means", "relations", unit)
+      for name, unit in relations.measured()),
+    Term("placed", relations.placed, tuple(f"{{a}} is not {row.name}" for row in vocabulary().placements),
+         "what the words mean", "relations"),
+)  # fmt: skip
+PHYSICS = (
+    Term("apart", physics.apart, ("{a} runs {x:.2f} m into {b}",), "solids; a chair under its table", "physics"),
+    Term("on_floor", physics.on_floor, ("{a} reaches {x:.2f} m through a wall",), "solids", "physics"),
+    Term("rests", physics.rests, ("{a} has {x:.2f} m of air below or above it", "{a} stands beside {b}, not on it"),
+         "gravity", "physics"),
+    Term("in_height", physics.in_height,
+         ("{a} lies {x:.2f} m below the floor", "{a} reaches {x:.2f} m through the ceiling"), "solids", "physics"),
+)  # fmt: skip
+REAL = "real rooms (statistics of 896, 300 measured): "
+LIVING = (
+    Term("parallel", walls.parallel, ("{a} is turned by {x:.0f} degrees against the walls",),
+         REAL + "98 to 100 % of such furniture within 5 degrees", unit="rad"),
+    Term("at_wall", walls.at_wall,
+         ("{a} has no wall behind it", "{a} stands {x:.2f} m off the wall behind it"),
+         REAL + "84 to 93 % within 0.15 m, gaps over 0.3 m are rare"),
+    Term("seat_faces", groups.seat_faces, ("{a} looks {x:.0f} degrees past {b}",),
+         REAL + "chairs at corners look at their table by up to 45 degrees", unit="rad"),
+    Term("seat_in_reach", groups.seat_in_reach, ("{a} stands {x:.2f} m from {b}",),
+         REAL + "99 % of dining chairs within 0.45 m"),
+    Term("lounger_faces", groups.lounger_faces, ("{a} turns its back on {b} ({x:.0f} degrees)",),
+         REAL + "armchairs take part in their group", unit="rad"),
+    Term("table_before_sofa", groups.table_before_sofa,
+         ("{a} leaves only {x:.2f} m before {b}", "{a} lies {x:.2f} m before {b}, out of reach",
+          "{a} lies {x:.2f} m beside the middle of {b}, not before it"),
+         REAL + "95th percentile of the gap, a leg's width; within the sofa's width"),
+    Term("nightstand_at_head", groups.nightstand_at_head,
+         ("{a} stands {x:.2f} m beside {b}", "{a} stands in {b}", "{a} stands {x:.2f} m from the head of {b}",
+          "{a} is turned by {x:.0f} degrees against {b}"),
+         REAL + "95 % within 0.34 m beside and 0.4 m along the bed"),
+    Term("nightstands_alike", groups.nightstands_alike,
+         ("{a} stands {x:.2f} m further from the bed than {b}",),
+         REAL + "98 % of pairs differ by less than 0.15 m"),
+    Term("screen_in_view", sight.screen_in_view,
+         ("{a} lies {x:.0f} degrees off where {b} looks", "{a} is turned by {x:.0f} degrees away from {b}",
+          "{a} is only {x:.1f} m from {b}, too near to watch", "{a} is {x:.1f} m from {b}, too far to watch"),
+         REAL + "98 % of sofas and 95 % of beds look within 25 and 30 degrees of it, 99 % from within 5.2 m"),
+    Term("screen_not_behind", sight.screen_not_behind, ("{a} turns its back on {b} ({x:.0f} degrees)",),
+         REAL + "95 % of armchairs are turned less from their group's screen", unit="rad"),
+    Term("pendant_over", lamps.pendant_over, ("{a} hangs {x:.2f} m beside a table",),
+         REAL + "half hang over the table itself, others over beds, sofas and the middle"),
+    Term("lamp_on_surface", lamps.lamp_on_surface, ("{a} stands on nothing that carries it",), "what the word means"),
+    Term("front_free", access.front_free,
+         ("the front of {a} has {x:.2f} m before {b}",), "access depths of the vocabulary, 60 % of them"),
+    Term("bed_side_free", access.bed_side_free, ("{a} cannot be got into: {x:.2f} m beside it",),
+         "a person needs 0.3 m to sit down on a bed"),
+    Term("door_free", access.door_free, ("{a} reaches {x:.2f} m into the way of a door",), "the leaf's quarter circle"),
+    Term("window_free", access.window_free, ("{a} covers a window",), "0.35 m before the glass, 0.3 m over the sill"),
+    Term("groups_apart", crowding.groups_apart, ("{a} leaves only {x:.2f} m to {b}, which is no part of its group",),
+         REAL + "2nd to 3rd percentile of the gap by role, 0.05 to 0.2 m"),
+    Term("chair_pulls_out", crowding.chair_pulls_out, ("{a} can be pulled back by only {x:.2f} m before {b}",),
+         REAL + "3rd percentile before furniture, 5th before a wall (0.1 m); at desks the 10th and 3rd (0.33, 0.19 m)"),
+    Term("table_amid", crowding.table_amid,
+         ("the chairs at one side of {a} have {x:.2f} m behind them to {b}, while those opposite have room to spare",),
+         REAL + "90 % of tables with chairs opposite each other"),
+    Term("knees_free", crowding.knees_free, ("{a} has {x:.2f} m before it, then {b}",),
+         REAL + "3rd percentile before sofas 0.58 m; armchairs look into the room"),
+    Term("seat_room", crowding.seat_room, ("one cannot sit down on {a}: {x:.2f} m before it stands {b}",),
+         REAL + "94 % of sofas and armchairs have 0.25 m before them"),
+    Term("bed_foot_free", crowding.bed_foot_free, ("the foot of {a} leaves {x:.2f} m to {b}",),
+         REAL + "90 % leave 0.38 m or more"),
+    Term("lamp_aside", crowding.lamp_aside, ("{a} stands {x:.2f} m before the front of {b}",),
+         REAL + "98 % of lamps and plants leave fronts free"),
+    Term("chairs_even", company.chairs_even, ("the chairs of {a} are uneven: their middle lies {x:.2f} m off",),
+         "one chair pulled out moves the middle of four by 0.1 m"),
+    Term("chairs_opposite", company.chairs_opposite,
+         ("the chairs at opposite sides of {a} are staggered by {x:.2f} m",),
+         REAL + "95 % of such tables within 0.12 m"),
+    Term("sofas_in_circle", company.sofas_in_circle, ("{a} turns its back on the group of {b} ({x:.0f} degrees)",),
+         "the same as for armchairs", unit="rad"),
+    Term("at_its_side", company.at_its_side, ("{a} stands before {b}, not beside it",),
+         REAL + "97 % of side tables and lamps, 93 % of armchairs leave their sofa's knees free"),
+    Term("not_alone", company.not_alone, ("{a} stands alone in the room, {x:.2f} m from everything",),
+         REAL + "side tables, lamps and plants stand at something"),
+    Term("sofa_ahead", zones.sofa_ahead, ("{b}, which is no part of its group, stands {x:.2f} m before {a}",),
+         REAL + "97 % of sofas have a metre before them to other groups"),
+    Term("floor_used", zones.floor_used, ("beside {a} a circle of {x:.1f} m of the floor is bare, others stand close",),
+         REAL + "98 % have no empty circle of 1.05 times the root of each piece's share of the floor"),
+    Term("view_free", sight.view_free, ("{b} stands between {a} and who watches it",), "a straight line"),
+    Term("scale", sizes.scale, ("{a} is {x:.2f} m wide", "{a} is {x:.2f} m high", "{a} is {x:.2f} m deep"),
+         "a fifth over the 95th percentile of the class, half of the 5th", unit="share", weight=0.3),
+)  # fmt: skip
+TERMS = (*RELATIONS, *PHYSICS, *LIVING)
