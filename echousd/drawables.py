@@ -11,16 +11,25 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from echomodel.triangles import area_normals
 from echousd.stage import values
-from echousd.stage.encoding import StageError
+from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.forms import forms, polygons
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.textures import TextureError, read_image
 
 
 @dataclass(frozen=True)
+class Texture:
+    """An image that a material reads: its resolved path, the prim of its shader, and the channel that counts."""
+
+    path: str
+    prim: str
+    channel: str = "r"
+
+
+@dataclass(frozen=True)
 class Paint:
     """A UsdPreviewSurface in short: linear colours; the colour's texture as resolved path, its shader's prim
-    path, what it is multiplied with, and the primvar that it is laid out by."""
+    path, what it is multiplied with, and the primvar that it is laid out by; images of roughness and normals."""
 
     name: str = "grey"
     color: tuple[float, float, float] = (0.55, 0.55, 0.55)
@@ -32,6 +41,13 @@ class Paint:
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
     opacity: float = 1.0
     st: str = "st"
+    rough: Texture | None = None
+    normal: Texture | None = None
+
+    @property
+    def textured(self) -> bool:
+        """Whether any image shows."""
+        return bool(self.texture or self.rough or self.normal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +62,7 @@ class Drawable:
         triangles, normals: (t, 3, 3) float corners and normals in the mesh's frame.
         st: (t, 3, 2) float texture coordinates, or None.
         paints: materials with the triangles that they colour; later entries win.
+        double_sided: whether its back is seen, too.
     """
 
     path: str
@@ -56,6 +73,15 @@ class Drawable:
     normals: np.ndarray
     st: np.ndarray | None
     paints: tuple[tuple[Paint, np.ndarray], ...]
+    double_sided: bool = False
+
+
+def world_frame(stage: Usd.Stage) -> np.ndarray:
+    """(4, 4) float: from the stage's world to y up and metres."""
+    frame = np.diag([metres_per_unit(stage)] * 3 + [1.0])
+    if up_axis(stage) == UsdGeom.Tokens.z:
+        frame[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ frame[:3]
+    return frame
 
 
 def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
@@ -63,9 +89,7 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
 
     Surfaces without polygons (curves, volumes ...) are left out with a warning.
     """
-    to_world = np.diag([metres_per_unit(stage)] * 3 + [1.0])
-    if up_axis(stage) == UsdGeom.Tokens.z:
-        to_world[:3] = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]) @ to_world[:3]
+    to_world = world_frame(stage)
     cache = UsdGeom.XformCache()
     known: dict[str, Paint] = {}
     shapes: dict[Usd.Prim, tuple | None] = {}  # of what an instancer places often
@@ -82,7 +106,10 @@ def read_drawables(stage: Usd.Stage) -> Iterator[Drawable]:
                 else f"{_component(form.above)}{form.path.partition('[')[2].partition(']')[0]}"
             )
             category = _category(prim) or (_category(form.above) if form.above else "")
-            yield Drawable(form.path, component, category, to_world @ form.world, triangles, normals, st, paints)
+            double = bool(values.given(UsdGeom.Gprim(prim).GetDoubleSidedAttr()))
+            yield Drawable(
+                form.path, component, category, to_world @ form.world, triangles, normals, st, paints, double
+            )
 
 
 def paint_image(paint: Paint) -> np.ndarray:
@@ -101,11 +128,15 @@ def _visible(prim: Usd.Prim) -> bool:
 
 def _category(prim: Usd.Prim) -> str:
     while prim and not prim.IsPseudoRoot():
-        words = values.texts(prim.GetAttribute("semantics:labels:category"))
-        if words:
-            return words[0]
+        if label := own_category(prim):
+            return label
         prim = prim.GetParent()
     return ""
+
+
+def own_category(prim: Usd.Prim) -> str:
+    """The category that a prim itself is labelled with, "" without one."""
+    return next(iter(values.texts(prim.GetAttribute(LABELS))), "")
 
 
 def _component(prim: Usd.Prim) -> str:
@@ -231,34 +262,37 @@ def _surface(material: UsdShade.Material) -> Paint:
     if not shader:
         return Paint()
     found: dict[str, Usd.Attribute] = {}
-    texture = shown = ""
-    tint, laid_out = (1.0, 1.0, 1.0), "st"
-    for name in ("diffuseColor", "emissiveColor", "roughness", "metallic", "opacity"):
+    images: dict[str, tuple[UsdShade.Shader, Texture]] = {}
+    for name in ("diffuseColor", "emissiveColor", "roughness", "metallic", "opacity", "normal"):
         source = shader.GetInput(name)
         if not source:
             continue
         connected = source.GetConnectedSources()[0] if source.HasConnectedSource() else []
-        if connected and name == "diffuseColor":
-            image = UsdShade.Shader(connected[0].source.GetPrim())
-            file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
-            texture = str(file.resolvedPath) if file else ""
-            shown = str(image.GetPath()) if texture else ""
-            laid_out = _primvar_of(image)
-            if texture and image.GetInput("scale"):
-                tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
-        elif not connected:
+        if not connected:
             found[name] = source.GetAttr()
+            continue
+        image = UsdShade.Shader(connected[0].source.GetPrim())
+        file = values.asset(image.GetInput("file").GetAttr()) if image and image.GetInput("file") else None
+        if file and file.resolvedPath:
+            images[name] = image, Texture(str(file.resolvedPath), str(image.GetPath()), str(connected[0].sourceName))
+    texture, tint, laid_out = Texture("", ""), (1.0, 1.0, 1.0), "st"
+    if "diffuseColor" in images:
+        image, texture = images["diffuseColor"]
+        laid_out = _primvar_of(image)
+        if image.GetInput("scale"):
+            tint = rgb(values.given(image.GetInput("scale").GetAttr()), tint)
     return Paint(
         material.GetPrim().GetName(),
         rgb(values.given(found.get("diffuseColor")), (0.18, 0.18, 0.18)),
         rgb(values.given(found.get("emissiveColor")), (0.0, 0.0, 0.0)),
         values.number(found.get("roughness"), 0.5),
         values.number(found.get("metallic"), 0.0),
-        texture,
-        shown,
+        texture.path,
+        texture.prim,
         tint,
         values.number(found.get("opacity"), 1.0),
         laid_out,
+        *(images[name][1] if name in images else None for name in ("roughness", "normal")),
     )
 
 

@@ -69,7 +69,7 @@ def test_no_circle(imports):
 
 
 def package_of(module):
-    """`echousd.room` of `echousd.room.dressing.floors`, `echousd.packing` of itself."""
+    """`echousd.room` of `echousd.room.dressing.floors`, `echousd.store` of itself."""
     return ".".join(module.split(".")[:2])
 
 

@@ -11,7 +11,7 @@ from pxr import Sdf, Tf, UsdShade
 
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading, specs
-from echousd.packing import Reach
+from echousd.exporting.packing import Reach
 from echousd.stage.encoding import StageError
 from echousd.stage.units import unit_faults
 from echousd.stage.values import asset

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from pxr import Sdf, Usd
 
-from echousd.flattening import flat_layer
-from echousd.packing import Package, Reach, images_beside
+from echousd.exporting.flattening import flat_layer
+from echousd.exporting.packing import Package, Reach, images_beside
 from echousd.room.lights import LIGHTS
 from echousd.room.materials import LOOKS
 from echousd.room.paths import DRESSING, OBJECTS

@@ -35,11 +35,11 @@ def bounds(room: Path) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return found
 
 
-def visible_meshes(stage: Usd.Stage) -> dict[str, UsdGeom.Mesh]:
-    """Visible meshes of furniture, small things and the shell by their paths."""
+def visible_meshes(stage: Usd.Stage, top: Usd.Prim | None = None) -> dict[str, UsdGeom.Mesh]:
+    """Visible meshes of furniture, small things and the shell by their paths, of all or at and below a prim."""
     meshes = (
         UsdGeom.Mesh(prim)
-        for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())
+        for prim in Usd.PrimRange(top or stage.GetPseudoRoot(), Usd.TraverseInstanceProxies())
         if prim.IsA(UsdGeom.Mesh)
     )
     return {str(mesh.GetPath()): mesh for mesh in meshes if mesh.ComputePurpose() != UsdGeom.Tokens.guide}
@@ -236,6 +236,41 @@ def test_three_turns_rooms_with_z_up(ending: str, z_room: Path, tmp_path: Path) 
     np.testing.assert_allclose(there["high"], [high[0], high[2], -low[1]], atol=0.25)
 
 
+def opened(room: Path, folder: Path) -> Path:
+    """A copy of a room whose doors stand open and whose drawers are pulled out."""
+    shutil.copytree(room.parent, folder)
+    stage = Usd.Stage.Open(str(folder / room.name))
+    for prim in stage.Traverse():
+        if prim.GetName().endswith("_door_hinge"):
+            turn = next(a for a in prim.GetAttributes() if a.GetName().startswith("xformOp:rotate"))
+            turn.Set(70.0)
+        elif "_drawer_" in prim.GetName() and prim.IsA(UsdGeom.Xform):
+            UsdGeom.Xformable(prim).AddTranslateOp(opSuffix="pulled").Set((0, 0, 0.2))
+    stage.GetRootLayer().Save()
+    return folder / room.name
+
+
+@pytest.mark.parametrize("state", ["closed", "opened"])
+def test_three_puts_every_component_of_a_glb_where_usd_has_it(state: str, rooms: list[Path], tmp_path: Path) -> None:
+    for number, room in enumerate(rooms):
+        room = room if state == "closed" else opened(room, tmp_path / str(number))
+        there = json.loads(run("node", HERE / "three_load.mjs", three(), export(room, tmp_path / f"{number}.glb")))
+        stage = Usd.Stage.Open(str(room))
+        checked = 0
+        for path, (low, high) in there["boxes"].items():
+            points = [np.zeros((0, 3))]
+            for mesh in visible_meshes(stage, stage.GetPrimAtPath(path)).values():
+                world = np.array(mesh.ComputeLocalToWorldTransform(0))
+                points.append(np.array(mesh.GetPointsAttr().Get()) @ world[:3, :3] + world[3, :3])
+            corners = np.concatenate(points)
+            np.testing.assert_allclose([low, high], [corners.min(0), corners.max(0)], atol=1e-4, err_msg=path)
+            checked += 1
+        assert checked > 15
+        assert {"map", "normalMap", "roughnessMap"} <= set(there["maps"])
+        assert set(there["cameras"]) >= {"top", "perspective"}
+        assert {"DirectionalLight", "PointLight", "SpotLight"} == set(there["lights"])
+
+
 def rests(lines: str, room: Path) -> None:
     """Whether every body of a room that a client simulated for two seconds stays where it was, with its own mass."""
     moved = json.loads(lines.splitlines()[-1])["moved"]
@@ -285,7 +320,8 @@ def test_khronos_finds_nothing_in_a_glb(rooms: list[Path], tmp_path: Path) -> No
     for number, room in enumerate(rooms):
         glb = export(room, tmp_path / f"{number}.glb")
         there = json.loads(run("node", HERE / "gltf_check.mjs", three(), glb))
-        assert (there["numErrors"], there["numWarnings"], there["numInfos"]) == (0, 0, 0), there["told"]
+        left = set(there["told"]) - {"MESH_PRIMITIVE_GENERATED_TANGENT_SPACE"}  # as every viewer does for normal maps
+        assert not left, there["told"]
 
 
 def test_usdchecker_finds_nothing_in_packages(rooms: list[Path], tmp_path: Path) -> None:

@@ -13,15 +13,29 @@ const [modules, ...files] = process.argv.slice(2);
 const load = (name) => import(pathToFileURL(path.resolve(modules, 'node_modules', 'three', name)).href);
 const THREE = await load('build/three.module.js');
 const { USDLoader } = await load('examples/jsm/loaders/USDLoader.js');
+const { GLTFLoader } = await load('examples/jsm/loaders/GLTFLoader.js');
+
+function read(buffer, file) {
+  if (!file.endsWith('.glb')) return new USDLoader().parse(buffer, path.dirname(file) + '/');
+  const loader = new GLTFLoader();
+  loader.register(() => ({ name: 'undecoded', loadTexture: async () => new THREE.Texture() }));
+  return new Promise((done, failed) => loader.parse(buffer, '', (gltf) => done(gltf.scene), failed));
+}
 
 for (const file of files) {
   const bytes = fs.readFileSync(file);
   const buffer = bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
-  const scene = new USDLoader().parse(buffer, path.dirname(file) + '/');
+  const scene = await read(buffer, file);
   scene.updateMatrixWorld(true);
-  const found = { file, meshes: 0, triangles: 0, withoutUv: [], materials: new Set(), maps: {}, objects: {} };
+  const found = { file, meshes: 0, triangles: 0, withoutUv: [], materials: new Set(), maps: {}, objects: {}, boxes: {}, cameras: [], lights: [] };
   scene.traverse((thing) => {
     if (thing.name) found.objects[thing.name] = true;
+    if (thing.isCamera) found.cameras.push(thing.name);
+    if (thing.isLight) found.lights.push(thing.type);
+    if (thing.userData.id) {
+      const own = new THREE.Box3().setFromObject(thing, true);
+      found.boxes[thing.userData.id] = [own.min.toArray(), own.max.toArray()];
+    }
     if (!thing.isMesh) return;
     const geometry = thing.geometry;
     found.meshes += 1;

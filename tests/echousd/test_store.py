@@ -14,8 +14,8 @@ from pxr import Usd, UsdLux
 
 from echousd.checks import check
 from echousd.exporting import export
+from echousd.exporting.packing import Reach
 from echousd.graph import load_graph
-from echousd.packing import Reach
 from echousd.room import RoomOptions, generate
 from echousd.room.edit import edit
 from echousd.room.reading import read_room

@@ -11,7 +11,7 @@ from pathlib import Path
 from pxr import Sdf, Tf, UsdUtils
 
 from echousd.assets.model_file import STAGES, ModelFile
-from echousd.packing import PACKED, LeftOut, asset_paths
+from echousd.exporting.packing import PACKED, LeftOut, asset_paths
 from echousd.textures import READABLE
 
 TAKEN = (*STAGES, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
 
-from echousd.bare import strip
+from echousd.exporting.strip_physics import strip
 
 OURS = "Echo"  # what the names of our types and schemas begin with
 PROPERTIES = "echo:"

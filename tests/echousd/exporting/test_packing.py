@@ -14,7 +14,7 @@ from pxr import Usd
 
 from echousd.drawables import read_drawables
 from echousd.exporting import export
-from echousd.packing import LeftOut
+from echousd.exporting.packing import LeftOut
 from echousd.textures import read_image
 
 SQUARE = """

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from echousd.bare import without_physics
 from echousd.drawables import rgb
-from echousd.packing import Package, take_assets
+from echousd.exporting.packing import Package, take_assets
+from echousd.exporting.strip_physics import without_physics
 from echousd.stage.files import source
 from echousd.stage.units import set_units
 from echousd.stage.values import check_types, given, targets

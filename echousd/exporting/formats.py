@@ -1,0 +1,125 @@
+"""The kinds of files that a room can be written as, a row each, and the writing of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Sdf, Usd
+
+from echousd.exporting.flattening import flat_layer
+from echousd.exporting.glb import glb
+from echousd.exporting.packing import Package, Reach, images_beside
+from echousd.exporting.usdz import usdz
+from echousd.stage import open_stage
+from echousd.stage.files import layer_bytes, write_all
+from echousd.stage.layouts import selected_layout, showing_layout
+from echousd.stage.values import reading
+
+
+@dataclass(frozen=True)
+class Export:
+    """What one file is to hold: see `export`, whose arguments these are."""
+
+    out: Path
+    reach: Reach
+    physics: bool
+    pictures: bool
+    arkit: bool
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file.
+
+    Arguments:
+        write: a stage and what is asked for -> path and content of every file, the first of them `Export.out`.
+        options: of `export`, those that it knows.
+        physics: whether it holds physics unless it is told.
+    """
+
+    write: Callable[[Usd.Stage, Export], Mapping[Path, bytes]]
+    options: frozenset[str] = frozenset()
+    physics: bool = False
+
+
+def _usdz(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
+    package = Package(asked.reach)
+    layer = flat_layer(stage, package=package if asked.pictures else None, physics=asked.physics)
+    return {asked.out: usdz(_marked(layer, stage), package, arkit=asked.arkit)}
+
+
+def _flat(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
+    package = Package(asked.reach, images_beside(asked.out))
+    layer = flat_layer(stage, package=package if asked.pictures else None, physics=asked.physics)
+    return {asked.out: layer_bytes(_marked(layer, stage), asked.out.suffix), **package.files(asked.out.parent)}
+
+
+def _glb(stage: Usd.Stage, asked: Export) -> Mapping[Path, bytes]:
+    return {asked.out: glb(stage, asked.reach)}
+
+
+FORMATS: Mapping[str, Format] = {
+    ".usdz": Format(_usdz, frozenset({"physics", "pictures", "arkit"})),
+    ".glb": Format(_glb),
+    ".usda": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
+    ".usdc": Format(_flat, frozenset({"physics", "pictures"}), physics=True),
+}
+
+
+def export(
+    room: str | Path,
+    out: str | Path,
+    *,
+    arkit: bool = False,
+    force: bool = False,
+    search: Sequence[str | Path] = (),
+    layout: int | None = None,
+    physics: bool | None = None,
+    pictures: bool = True,
+) -> Path:
+    """Write a room (any stage) as one file.
+
+    Arguments:
+        room: root layer of the room.
+        out: `.usdz` (one flat usda inside, which web viewers read), `.glb`, or a flat `.usda` or `.usdc`.
+        arkit: usdz as Apple's viewers want it: one usdc inside, Y up, without lights and scene graph.
+        force: replace a file that is in the way.
+        physics: keep bodies, colliders, joints and the scene, or none of it; None = in flat USD alone.
+        layout: number of the layout that the file holds; None = the one that the room shows. The file says which.
+        pictures: take images along; without them materials have plain colours, for importers that read none (MuJoCo
+            4.0 refuses JPEG).
+        search: folders besides the room's own whose layers and images may be taken along.
+
+    Raises ValueError for other endings, options that a kind of file does not know, a file in the way, a stage that does
+    not open, one that names files outside its folder and `search`, or a path that is not writable.
+    """
+    out = Path(out)
+    if out.suffix not in FORMATS:
+        raise ValueError(f"{out}: cannot export to {out.suffix or 'no ending'!r}, allowed: {', '.join(FORMATS)}")
+    kind = FORMATS[out.suffix]
+    asked = {"--arkit": arkit, "--physics": physics, "--no-pictures": not pictures}
+    for word, wanted in asked.items():
+        option = word.removeprefix("--").removeprefix("no-")
+        if wanted and option not in kind.options:
+            allowed = ", ".join(ending for ending, other in FORMATS.items() if option in other.options)
+            raise ValueError(f"{out}: {word} says nothing to a {out.suffix}, allowed: {allowed}")
+    if out.exists() and not force:
+        raise ValueError(f"{out}: exists; choose another file or use --force")
+    stage = open_stage(room)
+    reach = Reach.of(stage, search)
+    reach.check_layers(stage)
+    physics = kind.physics if physics is None else physics
+    with showing_layout(stage, layout), reading(stage):
+        files = kind.write(stage, Export(out, reach, physics, pictures, arkit))
+    write_all(files)
+    return out
+
+
+def _marked(layer: Sdf.Layer, stage: Usd.Stage) -> Sdf.Layer:
+    """The layer, which says the stage's layout that it holds where there are several."""
+    layout = selected_layout(stage)
+    if layout:
+        layer.customLayerData = {**layer.customLayerData, "layout": layout}
+    return layer
