@@ -12,12 +12,18 @@ import hashlib
 import os
 import re
 import shutil
+import tempfile
 import time
+import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import IO
 
 from echomodel.files import flush, read_json, write_json
+from echousd.pending import STAGING
 
 MARK = "echousd_store.json"
 VERSION = 1
@@ -25,8 +31,10 @@ KEY = re.compile(r"[0-9a-f]{32}")
 KEY_IN_PATH = re.compile(r"[\\/][0-9a-f]{32}[\\/]")
 NEW = ".new_"  # beginning of the name of a folder that is being written
 GRACE = 3600.0  # seconds for which a folder that nobody refers to stays: its room may be on its way
-NAMING = (".usda", ".json")  # texts of a room in which a key can be read as it is
+NAMING = (".usda", ".json", ".mtlx", ".yaml", ".yml")  # texts in which a key can be read as it is
 LAYERS = (".usd", ".usdc")
+ARCHIVES = (".zip", ".usdz")
+CRATE = b"PXR-USDC"
 LARGEST = 4 * 2**30  # bytes of one folder
 BLOCK = 2**20
 
@@ -142,7 +150,7 @@ class Store:
         """Remove what no file of a room below `users` names, and return the keys.
 
         Arguments:
-            users: folders with rooms; every layer and manifest below them is asked.
+            users: folders with rooms; all that may name a key below them is asked, see `keys_named`.
             grace: seconds since it was last put for which a folder stays in any case.
             dry: remove nothing.
         """
@@ -213,34 +221,95 @@ def store_above(real: Path) -> Store | None:
 
 
 def keys_named(folders: Iterable[Path]) -> set[str]:
-    """All words in the layers and manifests below some folders that may be keys."""
+    """All words in the layers and manifests below some folders that may be keys, links to further folders followed.
+
+    Archives of what edits replaced are asked as well, and what an interrupted run has not moved into place yet.
+
+    Raises OSError for a folder or file that cannot be read, as it might name any.
+    """
     found: set[str] = set()
-    for folder in folders:
-        for path in sorted(folder.rglob("*")):
-            if path.suffix in NAMING and path.is_file():
-                found.update(_words_in(path))
-            elif path.suffix in LAYERS and path.is_file() and store_of(path) is None:
-                found.update(word for name in _named_by(path) for word in KEY.findall(name))
+    for path in (path for folder in folders for path in _all_files(folder)):
+        if path.suffix not in (*NAMING, *LAYERS, *ARCHIVES) and path.parent.name != STAGING:
+            continue
+        if path.is_file() and store_of(path) is None:
+            with suppress(FileNotFoundError), path.open("rb") as file:  # gone meanwhile
+                found.update(_keys_in(file, path))
     return found
 
 
-def _words_in(path: Path) -> Iterator[str]:
+def _all_files(folder: Path) -> Iterator[Path]:
+    """All files below a folder, in order; of one that several links lead to, once."""
+
+    def fail(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError):  # gone meanwhile
+            raise error
+
+    seen = {os.path.realpath(folder)}
+    for place, folders, names in os.walk(folder, onerror=fail, followlinks=True):
+        real = {name: os.path.realpath(Path(place, name)) for name in sorted(folders)}
+        folders[:] = [name for name, path in real.items() if path not in seen]
+        seen.update(real.values())
+        yield from (Path(place, name) for name in sorted(names))
+
+
+def _keys_in(file: IO[bytes], path: Path) -> Iterator[str]:
+    """Words of a layer, manifest or archive that may be keys; what it is its first bytes say."""
+    head = file.read(8)
+    file.seek(0)
+    if head.startswith(b"PK"):
+        yield from _keys_in_archive(file)
+    elif head == CRATE:
+        yield from (word for name in _named_by(file, path) for word in KEY.findall(name))
+    else:
+        yield from _words_in(file)
+
+
+def _keys_in_archive(file: IO[bytes]) -> Iterator[str]:
+    try:
+        with zipfile.ZipFile(file) as archive:
+            for entry in archive.infolist():
+                if PurePosixPath(entry.filename).suffix in (*NAMING, *LAYERS, *ARCHIVES):
+                    with archive.open(entry) as inner, tempfile.SpooledTemporaryFile(BLOCK) as whole:
+                        _copy(inner, whole)
+                        yield from _keys_in(whole, Path(entry.filename))
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, NotImplementedError):
+        return  # nothing can be put back from it
+
+
+def _copy(source: IO[bytes], target: IO[bytes]) -> None:
+    """Have what can be read only forwards as a file; raises ValueError for more than a folder may have."""
+    total = 0
+    while block := source.read(BLOCK):
+        total += len(block)
+        if total > LARGEST:
+            raise zipfile.BadZipFile(f"more than {LARGEST} bytes")
+        target.write(block)
+    target.seek(0)
+
+
+def _words_in(file: IO[bytes]) -> Iterator[str]:
     """Words of a text that may be keys, block by block."""
-    with path.open("rb") as file:
-        rest = b""
-        while block := file.read(BLOCK):
-            rest += block
-            yield from (word.decode() for word in re.findall(rb"(?<![0-9a-f])[0-9a-f]{32}", rest))
-            rest = rest[-40:]  # a word across two blocks, and what stands before it
+    rest = b""
+    while block := file.read(BLOCK):
+        rest += block
+        yield from (word.decode() for word in re.findall(rb"(?<![0-9a-f])[0-9a-f]{32}", rest))
+        rest = rest[-40:]  # a word across two blocks, and what stands before it
 
 
-def _named_by(layer: Path) -> list[str]:
+def _named_by(file: IO[bytes], path: Path) -> list[str]:
+    """What a binary layer refers to; one without a name of its own is asked under another."""
     from pxr import Tf, UsdUtils
 
-    try:
-        return [name for names in UsdUtils.ExtractExternalReferences(str(layer)) for name in names]
-    except Tf.ErrorException:  # no layer that could refer to anything
-        return []
+    with ExitStack() as held:
+        if not (path.suffix in LAYERS and path.is_file()):
+            copy = held.enter_context(tempfile.NamedTemporaryFile(suffix=".usdc"))
+            shutil.copyfileobj(file, copy)
+            copy.flush()
+            path = Path(copy.name)
+        try:
+            return [name for names in UsdUtils.ExtractExternalReferences(str(path)) for name in names]
+        except Tf.ErrorException:  # no layer that could refer to anything
+            return []
 
 
 def _whole(place: Path, files: Mapping[str, bytes]) -> bool:

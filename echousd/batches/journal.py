@@ -11,7 +11,7 @@ from typing import Any
 
 from echousd.batches.plan import STATE, STORE
 from echousd.batches.rows import LONGEST, is_row
-from echousd.room.journal import STAGING
+from echousd.pending import STAGING
 from echousd.room.lock import LOCK
 from echousd.room.manifest import find_manifest
 from echousd.room.within import check_links, inside

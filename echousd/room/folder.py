@@ -15,8 +15,8 @@ from typing import Any
 
 from echomodel.files import flush
 from echousd.naming import free_name
+from echousd.pending import STAGING
 from echousd.room.journal import (
-    STAGING,
     Journal,
     Move,
     Removal,

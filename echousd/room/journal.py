@@ -11,11 +11,9 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echomodel.files import flush
+from echousd.pending import JOURNAL, STAGING
 from echousd.room.manifest import LARGEST, Digest
 from echousd.room.within import check_links, inside
-
-STAGING = ".echousd"
-JOURNAL = "journal.json"
 
 
 class Move(BaseModel):

@@ -30,7 +30,10 @@ FACES = 5000  # budget of each mesh where nobody says another
 
 
 class Step(BaseModel):
-    """One edit that can be taken back: what it said, the archive with what it replaced, and the files that it added."""
+    """One edit that can be taken back: what it said, the archive with what it replaced, and the files that it added.
+
+    `leaves` are the digests of what it wrote of files that are not ours alone, such as a root layer that it merged.
+    """
 
     model_config = ConfigDict(strict=True)
 
@@ -38,6 +41,7 @@ class Step(BaseModel):
     steps: list[str]
     restores: Annotated[str, Field(max_length=4096)]
     adds: list[str]
+    leaves: dict[str, Digest] = {}
 
 
 class Manifest(BaseModel):
@@ -121,7 +125,7 @@ def read_manifest(path: Path, raw: dict[str, Any]) -> dict[str, Any]:
     for name in manifest.files:
         inside(path.parent, name, f"{path}: files")
     for step in manifest.history:
-        for name in (step.restores, *step.adds):
+        for name in (step.restores, *step.adds, *step.leaves):
             inside(path.parent, name, f"{path}: history")
     return manifest.model_dump()
 

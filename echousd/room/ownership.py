@@ -8,8 +8,9 @@ from pathlib import Path, PurePosixPath
 from pxr import Sdf, Tf, Usd, UsdUtils
 
 from echousd.naming import free_name
+from echousd.pending import STAGING
 from echousd.room.folder import backup_name
-from echousd.room.journal import STAGING, digest, digest_of
+from echousd.room.journal import digest, digest_of
 from echousd.room.paths import coarse_file, component_file, payload_file
 from echousd.room.room import RoomData
 from echousd.room.within import inside
@@ -100,6 +101,12 @@ def merged_root(path: Path, current: bytes, fresh: bytes) -> bytes:
     theirs.subLayerPaths = present + [layer for layer in ours.subLayerPaths if layer not in present]
     theirs.customLayerData = {**theirs.customLayerData, **ours.customLayerData}
     return theirs.ExportToString().encode("utf-8")
+
+
+def loses_text(layer: bytes) -> bool:
+    """Whether a text layer that USD can read holds more than USD would write of it: remarks, an order of lines."""
+    read = Sdf.Layer.CreateAnonymous(".usda")
+    return read.ImportFromString(layer.decode("utf-8")) and read.ExportToString().encode("utf-8") != layer
 
 
 def _dependencies(layer: Path) -> list[str]:

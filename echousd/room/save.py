@@ -77,13 +77,15 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     current = ownership.read(folder, root)
     painted, unfit = paintings.refitted(folder, root, files, current, room.edited)
     owned = {path: folders.digest(content) for path, content in files.items()}
+    remarks = []
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
         files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
+        remarks = [root] if ownership.loses_text(current) else []
     for path in (path for files_of in room.carried.values() for path in files_of):
         if path in files and path in recorded and path in owned and ownership.read(folder, path) == files[path]:
             owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
     replaced = [path for path in files if path != root or root not in recorded] + ([] if old else [manifest])
-    kept = ownership.backups(folder, replaced, recorded, files)
+    kept = ownership.backups(folder, [*replaced, *remarks], recorded, files)
     files |= painted  # the user's own: not among what the manifest knows as ours
     files |= {name: ownership.read(folder, path) or b"" for path, name in kept.items() if name}
     gone = [path for path in recorded if path not in owned]
@@ -92,7 +94,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     history: list[dict[str, Any]] = []
     if room.edited and old:
         steps = SceneGraph.from_json(json.dumps(old["graph"])).diff(room.graph).lines() if "graph" in old else []
-        history, archive = remembered(folder, old, files, steps)
+        history, archive = remembered(folder, old, files, owned, list(kept.values()), steps)
         files |= archive
         kept_steps = {entry["restores"] for entry in history}
         owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}

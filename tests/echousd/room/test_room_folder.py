@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from stopped_disk import stopped_disk
 
-from echousd.room.folder import STAGING, check_writable, claim, recover, write_together
+from echousd.pending import STAGING
+from echousd.room.folder import check_writable, claim, recover, write_together
 from echousd.room.lock import LOCK
 
 OLD = {"assets/a.usda": b"a old", "layers/one.usda": b"one old", "room.usda": b"root old"}

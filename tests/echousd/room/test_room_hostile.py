@@ -7,7 +7,8 @@ import pytest
 from small_room import StandIn, small_graph
 
 import echousd
-from echousd.room.folder import STAGING, claim, recover
+from echousd.pending import STAGING
+from echousd.room.folder import claim, recover
 from echousd.room.manifest import find_manifest
 from echousd.room.reading import read_room
 from echousd.room.within import inside

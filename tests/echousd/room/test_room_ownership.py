@@ -10,9 +10,9 @@ from pxr import Sdf, Usd
 from small_room import StandIn, small_graph
 
 import echousd
+from echousd.pending import STAGING
 from echousd.room.edit import edit
 from echousd.room.folder import recover, write_together
-from echousd.room.journal import STAGING
 from echousd.room.manifest import MAX_SEED, find_manifest
 from echousd.room.save import save_room, write_preview
 

@@ -13,10 +13,10 @@ from stopped_disk import stopped_disk
 
 import echousd
 from echousd.naming import as_identifier
+from echousd.pending import STAGING
 from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.flat import save_flat
-from echousd.room.folder import STAGING
 from echousd.room.save import write_preview
 
 

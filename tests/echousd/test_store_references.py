@@ -1,0 +1,216 @@
+"""`store gc` leaves what may be opened or put back: every kind of reference, in every kind of file."""
+
+import shutil
+import warnings
+import zipfile
+
+import pytest
+from pxr import Sdf, Usd
+
+import echousd
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.room import folder as folders
+from echousd.room import history
+from echousd.room.edit import edit
+from echousd.room.reading import read_room
+from echousd.store import Store, keys_named
+
+
+def sublayer(layer, path):
+    layer.subLayerPaths = [path]
+
+
+def reference(layer, path):
+    Sdf.CreatePrimInLayer(layer, "/A").referenceList.prependedItems = [Sdf.Reference(path)]
+
+
+def payload(layer, path):
+    Sdf.CreatePrimInLayer(layer, "/A").payloadList.prependedItems = [Sdf.Payload(path)]
+
+
+def in_variant(layer, path):
+    stage = Usd.Stage.CreateInMemory()
+    variants = stage.DefinePrim("/A").GetVariantSets().AddVariantSet("looks")
+    variants.AddVariant("painted")
+    variants.SetVariantSelection("painted")
+    with variants.GetVariantEditContext():
+        stage.GetPrimAtPath("/A").CreateAttribute("file", Sdf.ValueTypeNames.Asset).Set(Sdf.AssetPath(path))
+    layer.TransferContent(stage.GetRootLayer())
+
+
+def inactive(layer, path):
+    reference(layer, path)
+    layer.GetPrimAtPath("/A").active = False
+
+
+def attribute(layer, path, kind=Sdf.ValueTypeNames.Asset, value=None, time=None):
+    prim = Sdf.CreatePrimInLayer(layer, "/A")
+    spec = Sdf.AttributeSpec(prim, "file", kind)
+    if time is None:
+        spec.default = value or Sdf.AssetPath(path)
+    else:
+        layer.SetTimeSample(spec.path, time, Sdf.AssetPath(path))
+
+
+def sampled(layer, path):
+    attribute(layer, path, time=1.0)
+
+
+def listed(layer, path):
+    attribute(layer, path, Sdf.ValueTypeNames.AssetArray, Sdf.AssetPathArray([Sdf.AssetPath(path)]))
+
+
+def clip(layer, path):
+    clips = {"default": {"assetPaths": Sdf.AssetPathArray([Sdf.AssetPath(path)]), "primPath": "/A"}}
+    Sdf.CreatePrimInLayer(layer, "/A").SetInfo("clips", clips)
+
+
+def metadata(layer, path):
+    Sdf.CreatePrimInLayer(layer, "/A").customData = {"made_of": Sdf.AssetPath(path)}
+
+
+def layer_data(layer, path):
+    layer.customLayerData = {"made_of": Sdf.AssetPath(path)}
+
+
+KINDS = (sublayer, reference, payload, in_variant, inactive, attribute, sampled, listed, clip, metadata, layer_data)
+
+
+@pytest.fixture
+def stored(tmp_path):
+    """A store with one folder, and the path of a file in it from a folder beside."""
+    store = Store.create(tmp_path / "store")
+    key = store.put({"bed.usda": b"#usda 1.0\n"})
+    (tmp_path / "room").mkdir()
+    return store, key, f"../store/{key[:2]}/{key}/bed.usda"
+
+
+def named(store, key, folder):
+    """Whether gc leaves the key; it must take it once the folder is gone."""
+    left = store.collect([folder], grace=0, dry=True) == []
+    shutil.rmtree(folder)
+    folder.mkdir()
+    assert store.collect([folder], grace=0, dry=True) == [key]
+    return left
+
+
+@pytest.mark.parametrize(
+    "place", ["a.usda", "a.usdc", "a.usd", "layers/a.usdc", "history/1.zip", ".redo/1.zip", "p.usdz"]
+)
+@pytest.mark.parametrize("refer", KINDS)
+def test_every_reference_in_every_layer_holds(stored, tmp_path, refer, place):
+    store, key, path = stored
+    target = tmp_path / "room" / place
+    target.parent.mkdir(exist_ok=True)
+    packed = target.suffix in (".zip", ".usdz")
+    for ending in (".usda", ".usdc") if packed else (target.suffix,):
+        file = tmp_path / "room" / f"made{ending}" if packed else target
+        layer = Sdf.Layer.CreateNew(str(file))
+        refer(layer, path)
+        layer.Save()
+        del layer
+        if packed:
+            content = file.read_bytes()
+            file.unlink()
+            with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED if place.endswith(".zip") else 0) as archive:
+                archive.writestr(f"layers/inner{ending}", content)
+            assert keys_named([tmp_path / "room"]) == {key}
+    assert named(store, key, tmp_path / "room")
+
+
+@pytest.mark.parametrize(
+    ("place", "text"),
+    [
+        ("room.json", '{{"stored": {{"originals/bed": "{key}"}}}}'),  # what lies in the store refers to it, nobody else
+        ("graph.yaml", "asset: {path}"),
+        ("wood.mtlx", '<input value="{path}"/>'),
+        ("deep/er/room.json", '["{key}"]'),
+        (".echousd/7", '{{"stored": {{"assets/bed": "{key}"}}}}'),  # a manifest that a run has not moved yet
+    ],
+)
+def test_every_text_holds(stored, tmp_path, place, text):
+    store, key, path = stored
+    (tmp_path / "room" / place).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / "room" / place).write_text(text.format(key=key, path=path))
+    assert named(store, key, tmp_path / "room")
+
+
+def test_rooms_behind_links_hold(stored, tmp_path):
+    store, key, _ = stored
+    (tmp_path / "elsewhere/room").mkdir(parents=True)
+    (tmp_path / "elsewhere/room/room.json").write_text(key)
+    (tmp_path / "room/linked").symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere/back").symlink_to(tmp_path / "room")  # a circle ends
+    assert store.collect([tmp_path / "room"], grace=0) == []
+
+
+def test_a_folder_that_cannot_be_read_ends_it(stored, tmp_path, monkeypatch, echousd_command):
+    import os
+
+    store, key, _ = stored
+    real = os.scandir
+
+    def refused(place):
+        if str(place).endswith("closed"):
+            raise PermissionError(13, "Permission denied", str(place))
+        return real(place)
+
+    (tmp_path / "room/closed").mkdir()
+    monkeypatch.setattr(os, "scandir", refused)
+    done = echousd_command("store", "gc", store.root, tmp_path / "room", "--older", 0)
+    assert (done.code, done.err) == (2, f"error: {tmp_path / 'room/closed'}: Permission denied\n")
+    assert list(store.keys()) == [key]
+
+
+def test_a_damaged_archive_or_layer_names_nothing(stored, tmp_path):
+    store, key, _ = stored
+    for place, content in (("1.zip", b"PK\3\4..."), ("a.usdc", b"PXR-USDC..."), ("b.usd", b"\xff\xfe")):
+        (tmp_path / "room" / place).write_bytes(content)
+    assert store.collect([tmp_path / "room"], grace=0) == [key]
+
+
+def two(*more):
+    nodes = [Node("bed", "double_bed"), Node("lamp", "floor_lamp"), *more]
+    places = {node.name: (1.5 * i - 1.5, 0.0, 0.0) for i, node in enumerate(nodes)}
+    nodes = [node.replaced(size=(0.5, 0.5, 0.5), position=places[node.name], yaw=0.0) for node in nodes]
+    return SceneGraph(room=RoomSpec("bedroom", size=(6.0, 4.0)), nodes=tuple(nodes))
+
+
+@pytest.mark.parametrize("crate", [False, True])
+def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
+    store = tmp_path / "store"
+    options = echousd.room.RoomOptions(crate=crate)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        made = echousd.generate(two(), model=None, shapes="boxes", drafts=1, steps=2, repair=False, options=options)
+        root = made.save(tmp_path / "room", preview=False, store=store)
+        states = [read_room(root).graph.names]
+        for graph in (two(Node("chair", "chair")), two().remove_node("lamp")):
+            edit(root, graph, shapes="boxes", drafts=1, steps=2, repair=False).save(root.parent, preview=False)
+            states.append(read_room(root).graph.names)
+    unused = Store.open(store).put({"nobody": b""})
+
+    def collected():
+        return echousd_command("store", "gc", store, "--older", 0).out
+
+    assert collected().startswith("removed  1 of ")
+    assert not Store.open(store).folder(unused).exists()
+    for step, seen in ((history.undo, states[1::-1]), (history.redo, states[1:]), (history.undo, states[1::-1])):
+        for names in seen:
+            step(root)
+            assert collected().startswith("removed  0 of ")
+            assert read_room(root).graph.names == names
+            assert echousd.stage.open_stage(root)
+
+
+def test_what_an_interrupted_run_has_not_moved_yet_holds(tmp_path, monkeypatch, echousd_command):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        made = echousd.generate(two(), shapes="boxes", drafts=1, steps=2, repair=False)
+        root = made.save(tmp_path / "room", preview=False, store=tmp_path / "store")
+        bigger = edit(root, two(Node("chair", "chair")), shapes="boxes", drafts=1, steps=2, repair=False)
+        with monkeypatch.context() as patch:
+            patch.setattr(folders, "recover", lambda folder: None)
+            bigger.save(root.parent, preview=False)
+        assert echousd_command("store", "gc", tmp_path / "store", "--older", 0).out.startswith("removed  0 of ")
+        assert read_room(root).graph.names == ("bed", "lamp", "chair")
