@@ -12,6 +12,7 @@ from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
 
 MAX_COUNT = 100
+DEALT = ("at", "head", "before", "foot")  # stances of what serves one anchor: no desk has two chairs, another none
 
 
 def starting_graph(
@@ -64,15 +65,24 @@ def _node(category: str, position: int, count: int) -> Node:
 
 
 def _related(habit: Habit, nodes: list[Node], anchors: list[Node]) -> list[Relation]:
-    """Objects are dealt to anchors in turn where each carries one (a lamp a nightstand), else all to the first."""
-    dealt = not habit.sides and not {"front", "close_by", "opposite"} & set(habit.predicates)
-    relations = []
+    """Objects are dealt to anchors in turn where each serves one (a lamp its nightstand, a chair its desk).
+
+    What keeps a sofa company or goes into a wall's row all goes to the first.
+    """
+    near = bool(habit.sides or {"front", "close_by", "opposite"} & set(habit.predicates))
+    relations: list[Relation] = []
+    sets: dict[str, list[Node]] = {}
     for i, node in enumerate(nodes):
-        anchor = anchors[i % len(anchors)] if dealt else anchors[0]
+        hosts = anchors[:1]
+        if not near or vocabulary().category(node.category).stands in DEALT:
+            hosts = [anchor for anchor in anchors if not near or anchor.category == anchors[0].category]
+        anchor = hosts[i % len(hosts)]
+        there = sets.setdefault(anchor.name, [])
         relations += [Relation(node.name, predicate, anchor.name) for predicate in habit.predicates]
         if habit.sides:
-            relations.append(Relation(node.name, habit.sides[i % len(habit.sides)], anchor.name))
-        if i and node.category == nodes[0].category:
-            among = [word for word in habit.among if i == 1 or vocabulary().predicate(word).transitive]
-            relations += [Relation(node.name, predicate, nodes[0].name) for predicate in among]
+            relations.append(Relation(node.name, habit.sides[len(there) % len(habit.sides)], anchor.name))
+        if there:
+            among = [word for word in habit.among if len(there) == 1 or vocabulary().predicate(word).transitive]
+            relations += [Relation(node.name, predicate, there[0].name) for predicate in among]
+        there.append(node)
     return relations

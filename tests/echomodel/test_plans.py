@@ -8,7 +8,7 @@ import shapely
 
 from echomodel.openingplaces import place_openings
 from echomodel.openings import Opening, check_openings, free_area, rectangle, signed_area, swing_area
-from echomodel.plans import floor_extents, floor_outline, footprint, used_area
+from echomodel.plans import filled_area, floor_extents, floor_outline, footprint, used_area
 
 BEDROOM = ["double_bed", "nightstand", "nightstand", "wardrobe", "pendant_lamp"]
 LOUNGE = ["multi_seat_sofa", "coffee_table", "tv_stand", "armchair"]
@@ -43,6 +43,16 @@ def test_more_furniture_gets_a_larger_floor_and_stated_openings_fit() -> None:
     assert np.prod(extents(40)) > 40 > np.prod(extents(2))
     wide = Opening("w", "window", 3, 4.0, 3.0, 1.3, 0.9)
     assert extents(2, (wide,))[1] >= 7.0
+
+
+def test_a_floor_is_no_hall_for_one_table() -> None:
+    words = ["dining_table", *["dining_chair"] * 4, "pendant_lamp"]
+    sizes = [(1.6, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 4, None]
+    filled = filled_area([size[0] for size in sizes[:5]], [size[2] for size in sizes[:5]])
+    assert filled == pytest.approx(2.6 * 1.9 + 4 * 1.45 * 1.5)
+    for seed in range(20):
+        x, z = floor_extents("living_dining_room", words, sizes, np.random.default_rng(seed))
+        assert x * z < filled / 0.8 * 1.05  # sides come in steps of 0.1 m
 
 
 def test_openings_lie_where_nothing_stands() -> None:

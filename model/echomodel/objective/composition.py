@@ -15,6 +15,7 @@ from echomodel.floors import signed_distance
 from echomodel.objective.found import Found, found, joined, nobody, worst
 from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
 from echomodel.objective.zones import _gaps
+from echomodel.plans import filled_area
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
@@ -30,10 +31,10 @@ AT_HEAD = 0.4  # metres between a bed and a nightstand that serves it
 def served_limit(area: float, width: Tensor, depth: Tensor) -> float:
     """Share of a floor (square metres) that may lie far from furniture of these widths and depths (n,), metres.
 
-    The emptier a room, the more: 84 % of real rooms stay below exp(0.8 - 2 f), f being the area that the pieces reach
-    half a metre beyond their footprints, over the floor's.
+    The emptier a room, the more: 84 % of real rooms stay below exp(0.8 - 2 f), f being the area that the pieces fill
+    (`filled_area`) over the floor's.
     """
-    return min(1.0, math.exp(0.8 - 2.0 * float(((width + 1.0) * (depth + 1.0)).sum()) / area))
+    return min(1.0, math.exp(0.8 - 2.0 * filled_area(width.tolist(), depth.tolist()) / area))
 
 
 def floor_served(plan: Plan) -> Found:

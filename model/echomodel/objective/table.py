@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echomodel.objective import access, company, crowding, groups, lamps, physics, relations, sight, sizes, walls, zones
+from echomodel.objective import access, company, composition, crowding, groups, lamps, physics, relations, sight, sizes, walls, zones
 from echomodel.objective.found import Found
 from echomodel.objective.plan import Plan
 from echomodel.vocabulary import vocabulary
@@ -136,4 +136,17 @@ LIVING = (
     Term("scale", sizes.scale, ("{a} is {x:.2f} m wide", "{a} is {x:.2f} m high", "{a} is {x:.2f} m deep"),
          "a fifth over the 95th percentile of the class, half of the 5th", unit="share", weight=0.3),
 )  # fmt: skip
-TERMS = (*RELATIONS, *PHYSICS, *LIVING)
+COMPOSITION = (
+    Term("floor_served", composition.floor_served,
+         ("{x:.0f} % of the floor lies more than a metre from everything, the most beyond {a}",),
+         REAL + "84 % leave less of their floor to nothing, for what stands in them", "composition", "share"),
+    Term("elbow_room", composition.elbow_room,
+         ("{x:.2f} m of {a} a seat: too little for the elbows", "two chairs at {a} have {x:.2f} m between them"),
+         REAL + "96 % leave 0.55 m of a table's edge a seat (DIN 68880: 0.6 m), 95 % 0.03 m between chairs",
+         "composition"),
+    Term("wardrobe_opens", composition.wardrobe_opens, ("{a} has {x:.2f} m before it, then {b}",),
+         "a leaf of half a metre and who stands aside of it; 65 % of real rooms", "composition"),
+    Term("each_served", composition.each_served, ("{a} has none of what {b} has twice",),
+         "a desk without its chair, a bed without its nightstand", "composition", "share"),
+)  # fmt: skip
+TERMS = (*RELATIONS, *PHYSICS, *LIVING, *COMPOSITION)

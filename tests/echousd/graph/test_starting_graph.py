@@ -84,3 +84,28 @@ def test_what_is_stated_wins_over_what_is_usual():
     assert "desk right double_bed" not in said
     with pytest.raises(GraphError, match="'sofa' is no object of this graph"):
         starting_graph("bedroom", {}, [Relation("double_bed", "left", "sofa")])
+
+
+@pytest.mark.parametrize(
+    ("room", "counts", "guest", "host"),
+    [
+        ("study", {"desk": 2, "office_chair": 2}, "office_chair", "desk"),
+        ("bedroom", {"single_bed": 2, "double_bed": 0, "nightstand": 2}, "nightstand", "single_bed"),
+        ("dining_room", {"dining_table": 2, "dining_chair": 8}, "dining_chair", "dining_table"),
+    ],
+)
+def test_what_serves_one_piece_is_dealt_to_all_of_its_kind(room, counts, guest, host):
+    graph = starting_graph(room, counts)
+    served = [r.object for r in graph.relations if r.predicate == "close_by" and r.subject.startswith(guest)]
+    assert served.count(f"{host}_1") == served.count(f"{host}_2") == counts[guest] // 2
+    if counts[guest] == 2:  # each is the first of its own, so all stand at the same side
+        mine = [r for r in graph.relations if r.subject.startswith(guest)]
+        sides = [r.predicate for r in mine if r.predicate in ("left", "right")]
+        assert len(set(sides)) <= 1
+
+
+def test_armchairs_keep_the_first_sofa_company():
+    graph = starting_graph("living_room", {"sofa": 0, "multi_seat_sofa": 2, "armchair": 2})
+    mine = [r for r in graph.relations if r.subject.startswith("armchair")]
+    beside = {r.object for r in mine if r.predicate in ("left", "right")}
+    assert beside == {"multi_seat_sofa_1"}
