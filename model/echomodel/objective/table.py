@@ -10,7 +10,20 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from echomodel.objective import access, company, composition, crowding, groups, lamps, physics, relations, sight, sizes, walls, zones
+from echomodel.objective import (
+    access,
+    company,
+    composition,
+    crowding,
+    groups,
+    lamps,
+    physics,
+    relations,
+    sight,
+    sizes,
+    walls,
+    zones,
+)
 from echomodel.objective.found import Found
 from echomodel.objective.plan import Plan
 from echomodel.vocabulary import vocabulary

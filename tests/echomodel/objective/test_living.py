@@ -323,7 +323,7 @@ def test_several_rooms_at_once_are_judged_as_one_by_one():
 def test_the_room_generator_rarely_breaks_them():
     rooms = generate_rooms(60, 3)
     found = [f for room in rooms for f in faults(room, room.categories, room.floor_polygon)]
-    assert len(found) < 0.13 * sum(len(room) for room in rooms)
+    assert len(found) < 0.16 * sum(len(room) for room in rooms)
 
 
 def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_size():
