@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.objective import plan_of
-from echomodel.objective.sizes import fitting_loads, hung_lamps, laid_tables, smaller_sizes, usual_sizes
+from echomodel.objective.sizes import (
+    fitting_loads,
+    has_proportions,
+    hung_lamps,
+    in_proportion,
+    laid_tables,
+    smaller_sizes,
+    usual_sizes,
+)
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
 from echousd.repair.arrange import BAD, arrange, setting_of
@@ -208,21 +216,23 @@ def repair_boxes(
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
     config = config or RepairConfig()
 
-    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> Posed:
+    sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
+    told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
+
+    def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Posed:
         return pose(
             categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
-            fixed=fixed, rigid=rigid, turned=turned, stated=stated, rules=rules,
+            fixed=fixed, rigid=kept, turned=turned, stated=stated, rules=rules,
         )  # fmt: skip
 
-    drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw)
+    drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw, rigid)
     if floor_polygon is not None and config.arrange:
-        sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
-        told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
         higher = [predicate.id for predicate in vocabulary().predicates if predicate.order == "height"]
         of_more = np.unique(triplets[np.isin(triplets[:, 1], list({*sizes} - {*higher}))][:, [0, 2]])
         lenient = np.isin(np.arange(n), of_more)[:, None] | (np.isin(np.arange(n), told)[:, None] & UPRIGHT)
         usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=lenient)
-        at = posed(np.where(rigid[:, None], size, usual), position, yaw)
+        kept = rigid | (has_proportions(drawn.problem.categories) & ~np.isin(np.arange(n), told))
+        at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         free = ~rigid & ~np.isin(np.arange(n), told)
 
@@ -239,7 +249,7 @@ def repair_boxes(
                 if other.total < chosen.total - WORTH:
                     at, chosen = less, other
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
-        at = posed(hung, chosen.position, chosen.yaw)
+        at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)
     if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
         plain = solve(drawn, config)
@@ -248,22 +258,23 @@ def repair_boxes(
     problem, turn, centre = at.problem, at.yaw, at.problem.centre
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
     hung = lamps_along(categories, at.position, found.position, triplets, fixed) if at is not drawn else found.position
-    end = stacked(found.size, hung, problem.carrier, None, fixed)
-    ends = torch.as_tensor(found.size), torch.as_tensor(end), torch.as_tensor(turn)
+    size_end = in_proportion(problem.categories, found.size, ~rigid)
+    end = stacked(size_end, hung, problem.carrier, None, fixed)
+    ends = torch.as_tensor(size_end), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)
     verdict = verdicts(boxes, torch.as_tensor(triplets), rules=rules, center=torch.as_tensor(centre), fronts=headed)
     margin, _ = relation_margins(
-        found.size, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts, slopes=False
+        size_end, end, turn, triplets, rules=rules, centre=centre, fronts=problem.fronts, slopes=False
     )
-    hit, beyond = collisions(problem, found.size, end, turn), outside(problem, found.size, end, turn)
+    hit, beyond = collisions(problem, size_end, end, turn), outside(problem, size_end, end, turn)
     failures = (
         set(np.flatnonzero(verdict.numpy() == 0).tolist()),
         {pair for pair, _ in hit},
         {number for number, _ in beyond},
     )
     return RepairedBoxes(
-        size=found.size,
+        size=size_end,
         position=end,
         yaw=turn,
         verdict=verdict.numpy(),
@@ -272,6 +283,6 @@ def repair_boxes(
         collisions=hit,
         outside=beyond,
         moved=np.linalg.norm(end - position, axis=1),
-        resized=np.abs(found.size / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
+        resized=np.abs(size_end / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
         seconds=time.perf_counter() - started,
     )

@@ -38,19 +38,25 @@ SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
 def assembled(
-    solids: Sequence[Solid], size: np.ndarray, *, faces: int, origin: Origin, description: tuple[float, ...] = ()
+    solids: Sequence[Solid],
+    size: np.ndarray,
+    *,
+    faces: int,
+    origin: Origin,
+    description: tuple[float, ...] = (),
+    round: bool = False,
 ) -> Geometry:
     """The geometry of one piece of furniture: a part for each role (legs, top, back), drawers and doors in bodies.
 
     Arguments:
         solids: of a furniture program.
-        size: (3,) float, metres; the geometry fills it.
+        size: (3,) float, metres; the geometry fills it, in width or in depth alone where it is `round`.
         faces: most triangles of all parts together; the finest detail that stays below is taken.
         origin: provenance. description: what the solids were made from.
     """
-    pieces = within_budget(solids, size, faces)
+    pieces = within_budget(solids, size, faces, round=round)
     used = [piece.solid for piece in pieces]
-    plain, low = pieces_of(used, size, 1), pieces_of(used, size, 0)
+    plain, low = pieces_of(used, size, 1, round=round), pieces_of(used, size, 0, round=round)
     fixed = FRAME if any(piece.joint for piece in pieces) else ""
     parts: list[Part] = []
     colliders: list[Collider] = []
@@ -93,10 +99,10 @@ def _parts(prefix: str, pieces: Sequence[Piece], body: str) -> list[Part]:
     return [part_of(f"{prefix}{role}", members, body) for role, members in groups.items()]
 
 
-def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list[Piece]:
+def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[Piece]:
     """The solids meshed as finely as `faces` triangles allow; where boxes are too many, the smallest are left out."""
     for detail in range(FINEST, -1, -1):
-        pieces = pieces_of(solids, size, detail)
+        pieces = pieces_of(solids, size, detail, round=round)
         if sum(len(piece.faces) for piece in pieces) <= faces:
             return pieces
     volume = [float(np.prod(np.ptp(piece.vertices, axis=0))) for piece in pieces]
@@ -105,7 +111,7 @@ def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int) -> list
         if total + len(pieces[number].faces) <= faces:
             kept.append(number)
             total += len(pieces[number].faces)
-    return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0)
+    return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0, round=round)
 
 
 def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:

@@ -9,7 +9,7 @@ import numpy as np
 
 from echomodel.data.rooms.statistics import quantile, room_type_statistics
 from echomodel.openings import Opening
-from echomodel.sizes import size_statistics
+from echomodel.sizes import size_statistics, usual_range
 from echomodel.vocabulary import Category, vocabulary
 
 FULL = 0.55  # of the floor at most in what is proposed: beyond it nobody can walk
@@ -193,8 +193,8 @@ def _pieces(categories: Sequence[str], sizes: Sequence[Sequence[float] | None], 
 
 def _usual(row: Category, least: bool) -> list[float]:
     """(3,) metres: the usual size of a class, or the least one."""
-    if row.usual:
-        return [low if least else float(np.sqrt(low * high)) for low, high in row.usual]
+    if usual := usual_range(row.name):
+        return [low if least else float(np.sqrt(low * high)) for low, high in usual]
     statistics = size_statistics(row.name)
     return (statistics.low if least else statistics.median).tolist()
 

@@ -39,9 +39,10 @@ class Category:
         stands: how it stands to them, one of `STANCES`.
         admits: (category or role, share): how far such a thing's box may reach into this one's, as a share of that
             thing's smaller horizontal side.
-        usual: (low, high) of x, y and z in metres of most such pieces, where the class's statistics mix several things.
+        usual: (low, high) of x, y and z in metres of most such pieces as sold, where the class's statistics mix several
+            things or say too little of what people need (seats, room for knees); () = those of what it is `like`.
         sizes: 5th percentile, median and 95th percentile of (x, y, z) as sold, metres, where real rooms tell none.
-        round: it is as wide as deep.
+        round: it is as wide as deep. aspect: least and greatest width over height, () = any.
         like: the category whose sizes and furniture it borrows where it has none of its own, and whose models in
             libraries may stand for it, "" = its SG-FRONT class.
         top: the category whose small things stand on its top (`echousd.room.dressing.tabletops.TOPS`), "" = none.
@@ -72,6 +73,7 @@ class Category:
     usual: tuple[tuple[float, float], ...] = ()
     sizes: tuple[tuple[float, ...], ...] = ()
     round: bool = False
+    aspect: tuple[float, ...] = ()
     like: str = ""
     top: str = ""
     invites: tuple[str, ...] = ()

@@ -49,6 +49,12 @@ def size_statistics(category: str) -> SizeStatistics:
     return SizeStatistics(low, median, high, _correlation(c["xy"], c["xz"], c["yz"]))
 
 
+def usual_range(category: str) -> tuple[tuple[float, ...], ...]:
+    """(low, high) of x, y and z in metres that most such pieces have: `Category.usual`, or that of what it is like."""
+    row = vocabulary().category(category)
+    return row.usual or (vocabulary().category(row.like).usual if row.like else ())
+
+
 def size_score(category: str, size: np.ndarray) -> np.ndarray:
     """Standard scores (n, 3) of sizes (n, 3) in metres within their class."""
     statistics = size_statistics(category)

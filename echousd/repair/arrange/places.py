@@ -73,7 +73,8 @@ def places(setting: Setting, state: State, i: int) -> Poses:
     afar = OFF_WALL if kind.wall else (AMID if at_edge else 1.0) + lonely
     if kind.role == "decor" and float(depth_inside(setting.floor, np.array([draft]))[0]) < EDGE:
         afar = lonely
-    rows = [*rows, *as_drawn(setting, i, draft, afar)]
+    if setting.carrier[i] < 0 or not rows:
+        rows = [*rows, *as_drawn(setting, i, draft, afar)]
     out = Poses.of([*rows, *as_stated(setting, state, i)], height)
     if kind.role == "decor":  # plants have no front
         oblong = setting.size[i, 0] != setting.size[i, 2]

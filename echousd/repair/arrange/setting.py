@@ -54,8 +54,8 @@ class Setting:
         triplets: (e, 3) int, what must hold; rules: their rule set; centre: (2,) float, x and z of the room's centre.
         fixed, turned: (n,) bool, boxes that must not move, must not turn.
         floor: the floor polygon; height: of the ceiling, metres.
-        carrier, behind: (n,) int and float, as in `Problem`, the latter spread. anchor: (n,) int, whom each attends,
-            -1 = nobody.
+        carrier, behind: (n,) int and float, as in `Problem`, the latter spread. anchor: (n,) int, what each stands on,
+            or whom it attends, -1 = nobody.
         stances: how each stands to that (`Plan.stance`). group: (n,) int, the box that its group is about.
         stated: where single objects must stand in the room; surroundings: the walls that this is measured to.
         openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
@@ -279,10 +279,11 @@ def setting_of(at: Posed, turned: np.ndarray, *, openings: Sequence[Opening], ou
     spread = kept_behind(problem.categories, at.size, np.full(len(at.size), np.nan))  # drawn ones are too alike
     told = np.isin(np.arange(len(spread)), [one.subject for one in problem.stated if not one.others])  # of walls
     behind = np.where(problem.fixed, problem.behind, np.where(told, np.minimum(spread, BEHIND[1]), spread))
+    anchor = np.where(problem.carrier >= 0, problem.carrier, plan.anchor.numpy())
     return Setting(
         problem.categories, at.size, at.position, at.yaw, problem.triplets, problem.rules, problem.centre,
         problem.fixed, turned, problem.floor, problem.height or top, problem.carrier, behind,
-        plan.anchor.numpy(), plan.stance, plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
+        anchor, plan.stance, plan.group.numpy(), openings, outline, problem.stated, problem.surroundings,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from echomodel.boxes import Boxes
 from echomodel.data.furniture import solids
 from echomodel.data.furniture.description import WIDTH, piece_of
 from echomodel.protocols import furnishes
+from echomodel.vocabulary import vocabulary
 from echousd.room.geometry import Geometry, Origin
 from echousd.room.joinery import assembled
 from echousd.room.reproducible import one_thread, rounded_descriptions
@@ -48,8 +49,11 @@ class AssembledParts:
         def make(row: int) -> Geometry:
             told = tuple(round(float(v), 4) for v in described[row])
             style, choices = piece_of(np.array(told))
-            parts = solids(request.graph.nodes[row].category, style, choices, size[row])
-            return assembled(parts, size[row], faces=request.faces, origin=ORIGIN, description=told)
+            kind = vocabulary().category(request.graph.nodes[row].category)
+            parts = solids(kind.name, style, choices, size[row])
+            return assembled(
+                parts, size[row], faces=request.faces, origin=ORIGIN, description=told, round=kind.round
+            )  # fmt: skip
 
         return per_asset(request, make)
 

@@ -10,7 +10,7 @@ import torch
 
 from echomodel.objective.found import Found, found
 from echomodel.objective.plan import Plan, kind_of
-from echomodel.sizes import size_statistics
+from echomodel.sizes import size_statistics, usual_range
 
 LARGEST, SMALLEST = 1.2, 0.5  # times the 95th and 5th percentile of the class: 97 % of real pieces lie between
 SHORTER = 0.85  # times the least usual side, where the row of a category names usual sizes
@@ -21,22 +21,23 @@ ELBOWS = 0.05  # metres between two chairs
 TUCKED = 0.15  # metres by which chairs at the ends of a table keep off those at its sides
 LEAST_DEPTH, MOST_DEPTH = 0.75, 1.05  # metres of a table at which people sit opposite each other
 PLACE, SPARE = 0.55, 0.8  # metres of a table's side for each chair there, and in all beside that, at most
-ALONE = 0.8  # metres, width of a lamp that hangs over nothing
+EDGE = 0.02  # metres of a top that stay free around what stands on it
+FEET = 0.18  # metres, depth of the feet on which a screen stands
 SHRUNK = 0.85  # of its width and depth: what a piece becomes at the least where the room is too full for it
 
 
 @cache
 def size_range(category: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Smallest and largest side lengths x, y, z in metres that a person takes for one of the category."""
-    table, usual = size_statistics(category), kind_of(category).usual
+    table, usual = size_statistics(category), usual_range(category)
     low, high = table.low * SMALLEST, table.high * LARGEST
-    if usual:  # a bed of 1.5 m is longer than half of what few beds have, and yet nobody sleeps in it
+    if usual and kind_of(category).role == "bed":  # one of 1.5 m is longer than half of few beds; nobody sleeps in it
         low = np.maximum(low, np.array([side[0] for side in usual]) * SHORTER)
     return tuple(low.tolist()), tuple(high.tolist())
 
 
 def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndarray) -> np.ndarray:
-    """(n, 3) float: sizes brought into what most of their kind have; words outside the vocabulary keep theirs.
+    """(n, 3) float: sizes and proportions that most of their kind have; words outside the vocabulary keep theirs.
 
     Arguments:
         categories: n words. size: (n, 3) float, metres.
@@ -46,15 +47,38 @@ def usual_sizes(categories: Sequence[str], size: np.ndarray, *, lenient: np.ndar
     for number, word in enumerate(categories):
         if not kind_of(word).name:
             continue
-        table, usual = size_statistics(word), kind_of(word).usual
+        table, usual = size_statistics(word), usual_range(word)
         low, high = (np.array(side) for side in size_range(word))
         if usual:  # no lamp becomes two metres wide because it is told to be larger than something
+            low = np.maximum(low, np.array([side[0] for side in usual]) * SHORTER)
             high = np.minimum(high, np.array([side[1] for side in usual]) * LARGER)
         ends = zip(*usual, strict=True) if usual else (table.low, table.high)
         middle = np.sqrt(np.prod(usual, 1)) if usual else table.median
         most = [middle * (np.array(end) / middle) ** (1.0 if usual else USUAL) for end in ends]
         out[number] = np.clip(size[number], *np.where(lenient[number], (low, high), most))
+    return in_proportion(categories, out, np.ones(len(out), bool))
+
+
+def in_proportion(categories: Sequence[str], size: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(n, 3) float: sizes in which what is round is as wide as deep, of the same volume, and screens are no portraits.
+
+    Arguments:
+        categories: n words. size: (n, 3) float, metres. free: (n,) bool, sizes that may change.
+    """
+    out = size.copy()
+    for i in np.flatnonzero(free).tolist():
+        kind = kind_of(categories[i])
+        if kind.round:
+            out[i, [0, 2]] = np.sqrt(size[i, 0] * size[i, 2])
+        if kind.aspect:
+            out[i, 1] = np.clip(size[i, 1], size[i, 0] / kind.aspect[1], size[i, 0] / kind.aspect[0])
     return out
+
+
+def has_proportions(categories: Sequence[str]) -> np.ndarray:
+    """(n,) bool: kinds whose sides go together (`in_proportion`)."""
+    kinds = [kind_of(word) for word in categories]
+    return np.array([kind.round or bool(kind.aspect) for kind in kinds], bool)
 
 
 def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -67,8 +91,8 @@ def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray)
     for i in np.flatnonzero(free).tolist():
         kind = kind_of(categories[i])
         if kind.name and kind.support == "floor":
-            table = size_statistics(kind.name)
-            least = np.array([side[0] for side in kind.usual]) if kind.usual else np.sqrt(table.low * table.median)
+            table, usual = size_statistics(kind.name), usual_range(kind.name)
+            least = np.array([side[0] for side in usual]) if usual else np.sqrt(table.low * table.median)
             out[i] = np.minimum(size[i], np.maximum(SHRUNK * size[i], least))
     out[:, 1] = size[:, 1]
     return out
@@ -102,7 +126,7 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
 
 
 def fitting_loads(categories: Sequence[str], size: np.ndarray, carrier: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(n, 3) float: sizes in which nothing is larger in plan than what carries it, where its kind allows.
+    """(n, 3) float: sizes in which nothing reaches over the edge of what carries it, where its kind allows.
 
     Arguments:
         categories: n words. size: (n, 3) float, metres.
@@ -112,9 +136,11 @@ def fitting_loads(categories: Sequence[str], size: np.ndarray, carrier: np.ndarr
     for load in np.flatnonzero((carrier >= 0) & free).tolist():
         if kind_of(categories[load]).name:
             low = np.array(size_range(categories[load])[0])
-            plan = np.minimum(out[load], np.maximum(out[carrier[load]], low))[[0, 2]]
-            out[load, [0, 2]] = plan
-    return out
+            plan = np.minimum(out[load], np.maximum(out[carrier[load]] - 2 * EDGE, low))[[0, 2]]
+            if kind_of(categories[load]).aspect:
+                plan[1] = np.clip(FEET, plan[1], max(plan[1], out[carrier[load], 2] - 2 * EDGE))
+            out[load, [0, 2]] = plan.min() if kind_of(categories[load]).round else plan
+    return in_proportion(categories, out, free & (carrier >= 0))
 
 
 def hung_lamps(
@@ -132,8 +158,8 @@ def hung_lamps(
         x, z = (position[lamp] - position)[:, [0, 2]].T
         local = np.stack([np.cos(yaw) * x - np.sin(yaw) * z, np.sin(yaw) * x + np.cos(yaw) * z], 1)
         under = lit & (np.abs(local) <= size[:, [0, 2]] / 2).all(1)
-        most = size[under][:, [0, 2]].min() if under.any() else ALONE
-        out[lamp, [0, 2]] *= min(1.0, most / size[lamp, [0, 2]].max())
+        if under.any():
+            out[lamp, [0, 2]] *= min(1.0, size[under][:, [0, 2]].min() / size[lamp, [0, 2]].max())
     return out
 
 

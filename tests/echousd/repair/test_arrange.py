@@ -208,14 +208,12 @@ def test_a_pendant_follows_its_table_and_a_flush_lamp_hangs_in_the_middle():
     np.testing.assert_allclose(lamp[[0, 2]], 0.0, atol=0.05)
 
 
-@pytest.mark.parametrize(("below", "most"), [("kids_bed", 0.9), ("wardrobe", 0.8)])
-def test_no_lamp_is_wider_than_what_it_hangs_over(below, most):
-    words, size = [below, "pendant_lamp"], np.array([(0.9, 0.8, 1.7), (1.06, 0.9, 0.8)])
+def test_no_lamp_is_wider_than_what_it_hangs_over():
+    words, size = ["side_table", "pendant_lamp"], np.array([(0.45, 0.5, 0.5), (1.06, 0.9, 0.8)])
     drawn = np.array([(0.3, 0, -1.2), (0.3, 1.7, -1.2)]), np.zeros(2)
-    told = np.array([(1, ID["above"], 0)])[: below == "kids_bed"]
+    told = np.array([(1, ID["above"], 0)])
     done = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7)
-    assert done.size[1, 0] == pytest.approx(most, abs=0.01)
-    assert done.size[1, 2] / done.size[1, 0] == pytest.approx(0.8 / 1.06, abs=0.01)
+    assert done.size[1, 0] == done.size[1, 2] == pytest.approx(0.45, abs=0.01)
     kept = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7, rigid=np.ones(2, bool))
     assert kept.size[1, 0] == 1.06
 
@@ -282,3 +280,23 @@ def test_a_lamp_along_a_bed_follows_it_untold_and_one_beyond_it_does_not():
     hung = lamps_along(words, before, after, none, np.zeros(3, bool))
     assert hung[1] == pytest.approx((0.3, 1.8, 0.4))
     assert np.array_equal(hung[2], before[2])
+
+
+@pytest.mark.parametrize("carrier", ["dresser", "tv_stand", "sideboard"])
+@pytest.mark.parametrize("turn", [0.0, 1.57, 3.1])
+def test_a_screen_stands_on_its_carrier_as_that_does(carrier, turn):
+    kinds = ["double_bed", carrier, "tv"]
+    size = np.array([(1.7, 1.0, 2.1), (0.9, 0.8, 0.42), (1.2, 0.9, 0.1)])
+    position = np.array([(-0.5, 0, 0.2), (1.2, 0, 0.9), (1.5, 0.8, 0.4)])
+    done = repair_boxes(
+        kinds, size, position, np.array([1.4, 2.7, turn]), np.array([(2, ID["standing_on"], 1)]), floor_polygon=FLOOR,
+        height=2.7,
+    )  # fmt: skip
+    assert np.cos(done.yaw[2] - done.yaw[1]) == pytest.approx(1.0)
+    assert done.position[2, 1] == pytest.approx(done.size[1, 1], abs=1e-3)
+    x, _, z = done.position[2] - done.position[1]
+    c, s = np.cos(done.yaw[1]), np.sin(done.yaw[1])
+    off = np.abs([c * x - s * z, s * x + c * z]) + done.size[2, [0, 2]] / 2
+    assert (off <= done.size[1, [0, 2]] / 2 + 1e-3).all()
+    low, high = vocabulary().category("tv").aspect
+    assert low - 1e-6 <= done.size[2, 0] / done.size[2, 1] <= high + 1e-6

@@ -58,12 +58,13 @@ def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> l
 def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
     """One piece of furniture as a watertight mesh in the object frame (+Y up, +Z front, standing on y = 0), metres.
 
-    Arguments as for `solids`; `rng` draws the choices and, where it is None, the size. The mesh fills `size` exactly.
-    Part numbers, materials and texture coordinates are face attributes, see `mesh_of`.
+    Arguments as for `solids`; `rng` draws the choices and, where it is None, the size. The mesh fills `size`, what is
+    round at least in width or in depth. Part numbers, materials and texture coordinates are face attributes, see
+    `mesh_of`.
     """
     if size is None:
         size = sample_size(category, rng, style)
-    return mesh_of(solids(category, style, Choices.draw(rng), size), size)
+    return mesh_of(solids(category, style, Choices.draw(rng), size), size, round=vocabulary().category(category).round)
 
 
 def _named(parts: list[Solid]) -> list[Solid]:

@@ -30,12 +30,15 @@ class Piece:
     joint: Joint | None
 
 
-def pieces_of(solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST) -> list[Piece]:
+def pieces_of(
+    solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST, *, round: bool = False
+) -> list[Piece]:
     """Every solid meshed, all of them stretched together to fill `size`, standing on y = 0, centred in x and z.
 
     Arguments:
         solids: parts in the object's frame, metres.
         size: (3,) float, the box to fill, metres; None keeps the parts' own extents.
+        round: fill it in width or in depth, so that what is round stays round.
         detail: 0 (boxes and hexagons) to 3.
     """
     seen = [solid for solid in solids if not solid.core]
@@ -43,6 +46,8 @@ def pieces_of(solids: Sequence[Solid], size: np.ndarray | None = None, detail: i
     lower = np.min([vertices.min(0) for vertices, _ in meshes], axis=0)
     upper = np.max([vertices.max(0) for vertices, _ in meshes], axis=0)
     stretch = np.ones(3) if size is None else np.asarray(size, float) / np.maximum(upper - lower, 1e-9)
+    if round:
+        stretch[[0, 2]] = stretch[[0, 2]].min()
     origin = np.array([(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2])
     return [
         Piece(solid, (vertices - origin) * stretch, faces, _stretched(solid.joint, origin, stretch))
@@ -59,13 +64,13 @@ def _stretched(joint: Joint | None, origin: np.ndarray, stretch: np.ndarray) -> 
     return replace(joint, anchor=(x, y, z), reach=joint.reach * longer)
 
 
-def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None) -> trimesh.Trimesh:
+def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: bool = False) -> trimesh.Trimesh:
     """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`.
 
     `face_attributes["part"]` (m,) int numbers the solids, `face_attributes["material"]` (m,) int indexes `MATERIALS`,
     `face_attributes["uv"]` (m, 3, 2) float holds texture coordinates per corner, box-projected, in metres.
     """
-    pieces = pieces_of(solids, size)
+    pieces = pieces_of(solids, size, round=round)
     offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     faces = [piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)]
     counts = [len(piece.faces) for piece in pieces]

@@ -10,6 +10,8 @@ from echomodel.data.furniture.lathe import Blade
 from echomodel.data.furniture.solids import Ball, Solid, Tube, Turned, rotation
 from echomodel.data.furniture.style import Style
 
+PANEL = (16 / 9, 21 / 9)  # width over height of a screen with its bezel
+
 
 def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A pot, perhaps on a stand, with a tree crown, arching blades, broad leaves on stems or a cactus."""
@@ -153,8 +155,11 @@ def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A thin panel with a bezel, its electronics in a lower box behind, on two feet, a foot plate, or none."""
     w, h, d = size
     kinds, odds = ["feet", "plate", "arc", "wall"], [0.4, 0.25, 0.15, 0.2]
-    kind = choices.pick("kind", kinds, odds) if d < 0.1 else choices.pick("kind", kinds[:3], odds[:3])
+    hung = d < 0.1 and w / h >= PANEL[0]
+    kind = choices.pick("kind", kinds, odds) if hung else choices.pick("kind", kinds[:3], odds[:3])
     low = 0.0 if kind == "wall" else float(np.clip(0.08 * h, 0.03, 0.09))
+    low = max(low, h - w / PANEL[0])  # a box that is too high has higher feet, no higher screen
+    w = min(w, PANEL[1] * (h - low))
     back, face = (-d / 2, d / 2) if kind == "wall" else (-min(d, 0.07) / 2, min(d, 0.07) / 2)
     thin = max(face - 0.022, (back + face) / 2)  # the panel; what is behind it is lower and narrower
     edge, chin = 0.012, 0.02 + 0.02 * style.contrast

@@ -31,8 +31,8 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     """
     place = np.array([x, y, z])
     if kind == "sphere":
-        globe = Ball(centre=np.array([x, y + h / 2, z]), half=np.array([a, h / 2, b]), material="shade", role="shade")
-        return [globe]
+        half = np.minimum([a, min(a, b), b], h / 2)
+        return [Ball(centre=np.array([x, y + h - half[1], z]), half=half, material="shade", role="shade")]
     thick, squash = min(0.006, 0.1 * a), b / a
     if kind == "dome":
         turn = np.linspace(0, np.pi / 2, 8)
@@ -63,6 +63,12 @@ def _kind(style: Style, *without: str) -> str:
     return style.shade if style.shade not in ("ring", "arms", *without) else "drum"
 
 
+def _one_shade(style: Style, wide: float, tall: float, most: float) -> tuple[str, float]:
+    """Kind and height of a single shade of this width: a globe is as high as wide, where there is so much height."""
+    kind = _kind(style, *(("sphere",) if wide > most else ()))
+    return kind, wide if kind == "sphere" else tall
+
+
 def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A canopy, a cord and a shade; a row of shades; a ring; or a chandelier with arms. The top is the ceiling."""
     w, h, d = size
@@ -80,9 +86,7 @@ def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.shade == "ring" and w > 0.4:
         return parts + _rings(size, style)
     tall = min(h * 0.55, max(w * (0.4 + 0.4 * style.taper), h * 0.22))
-    kind = _kind(style)
-    if kind == "sphere":
-        tall = min(h * 0.7, w)
+    kind, tall = _one_shade(style, min(w, d), tall, 0.75 * h)
     r = max(0.006, 0.012 * w)
     parts.append(Tube(points=np.array([[0, tall * 0.9, 0], [0, h, 0]]), radius=r, material="metal", role="cord"))
     if kind == "drum" and style.tufting > 0.6:
@@ -113,8 +117,9 @@ def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
     stagger = h * 0.15 * (style.tufting > 0.6)
     for i, x in enumerate(xs):
         y = stagger * (i % 2)
-        parts += shade(_kind(style), x, y, 0, each, d / 2, tall, style)
-        parts.append(Tube(points=np.array([[x, y + tall * 0.9, 0], [x, h - 0.01, 0]]), radius=0.006, material="metal"))
+        kind, high = _one_shade(style, 2 * each, tall, 0.7 * h)
+        parts += shade(kind, x, y, 0, each, each, high, style)
+        parts.append(Tube(points=np.array([[x, y + high * 0.9, 0], [x, h - 0.01, 0]]), radius=0.006, material="metal"))
     return parts
 
 
@@ -181,15 +186,16 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             count = choices.pick("count", [3, 4, 6])
             parts: list[Solid] = [stem, _disc(0, h - 0.03, 0, w * 0.14, d * 0.14, 0.03)]
             r = min(0.09, w * 0.14, h * 0.25)
+            kind, tall = _one_shade(replace(style, shade=_kind(style, "cylinder")), 2 * r, h * 0.45, h)
             for a in np.arange(count) * 2 * np.pi / count:
                 x, z = np.cos(a) * (w / 2 - r), np.sin(a) * (d / 2 - r)
-                parts.append(Tube(points=np.array([[0, h * 0.5, 0], [x, h * 0.45, z]]), radius=0.011, material="metal"))
-                parts += shade(_kind(style, "cylinder"), x, 0.0, z, r, r, h * 0.45, style)
+                parts.append(Tube(points=np.array([[0, h * 0.5, 0], [x, tall, z]]), radius=0.011, material="metal"))
+                parts += shade(kind, x, 0.0, z, r, r, tall, style)
             return parts
         return [
             stem,
             _disc(0, h - 0.03, 0, w * 0.18, d * 0.18, 0.03),
-            *shade(_kind(style), 0, 0, 0, w / 2, d / 2, h * 0.55, style),
+            *shade(_kind(style, "sphere"), 0, 0, 0, w / 2, d / 2, h * 0.55, style),
         ]
     kind = choices.pick("kind", ["panel", "bowl", "drum", "ring"], [0.3, 0.3, 0.25, 0.15])
     if not alike or (style.profile == "square" and kind == "panel"):
@@ -226,9 +232,8 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     r = 0.012 * (0.8 + 0.4 * style.bulk)
     if max(w, d) / min(w, d) > 1.6 or w > 0.8:  # the shade of another would be a long oval
         return _arc(size, style, r)
-    tall = h * (0.16 + 0.12 * style.taper)
     a, b = w / 2, d / 2
-    kind = _kind(style)
+    kind, tall = _one_shade(style, min(w, d), h * (0.16 + 0.12 * style.taper), 0.4 * h)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
     if style.legs in ("splayed", "trestle", "tapered") and choices.chance("form", 0.6):
         hub = (h - tall) * 0.93
@@ -275,8 +280,7 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             Tube(points=arm, radius=r, material="metal"),
             *shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style),
         ]
-    tall = h * (0.36 + 0.12 * style.taper)
-    kind = _kind(style)
+    kind, tall = _one_shade(style, min(w, d), h * (0.36 + 0.12 * style.taper), 0.6 * h)
     parts = shade(kind, 0, h - tall, 0, a, b, tall, style)
     stem = h - tall
     body = choices.pick("kind", ["vase", "column", "balls", "cone"])

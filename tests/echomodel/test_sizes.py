@@ -1,0 +1,104 @@
+"""Sizes and proportions of furniture as people know it, from the rows of the vocabulary."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from echomodel.data.furniture import Choices, solids
+from echomodel.data.furniture.assembly import pieces_of
+from echomodel.data.furniture.decor import PANEL
+from echomodel.data.furniture.solids import Ball
+from echomodel.data.furniture.style import Style
+from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, size_range, usual_sizes
+from echomodel.sizes import usual_range
+from echomodel.vocabulary import vocabulary
+
+ROUND = [row.name for row in vocabulary().categories if row.round]
+WITHIN = np.zeros((1, 3), bool)
+SIDE = st.floats(0.05, 4.0)
+
+
+@given(st.sampled_from([row.name for row in vocabulary().categories]), st.tuples(SIDE, SIDE, SIDE))
+def test_usual_sizes_are_in_range_and_in_proportion(word, size):
+    (found,) = usual_sizes([word], np.array([size]), lenient=WITHIN)
+    row, low, high = vocabulary().category(word), *np.array(size_range(word))
+    assert (found >= low - 1e-9).all()
+    assert (found <= high + 1e-9).all()
+    if row.round:
+        assert found[0] == pytest.approx(found[2])
+    if row.aspect:
+        assert row.aspect[0] - 1e-9 <= found[0] / found[1] <= row.aspect[1] + 1e-9
+    for side, limits in zip(found, usual_range(word), strict=False):
+        assert limits[0] - 1e-9 <= side <= limits[1] + 1e-9 or row.aspect
+
+
+def test_what_people_need_of_sizes():
+    told = {"pendant_lamp": (0.25, 0.7, 0), "dining_chair": (0.78, 0.95, 1), "chair": (0.78, 0.95, 1)}
+    told |= {"stool": (0.42, 0.48, 1), "dining_table": (0.72, 0.78, 1), "table": (0.72, 0.78, 1)}
+    for word, (low, high, side) in told.items():
+        assert usual_range(word)[side] == (low, high)
+
+
+def test_round_things_keep_their_volume_and_stated_ones_their_size():
+    size = np.array([(1.05, 0.8, 0.76), (1.05, 0.8, 0.76), (0.5, 0.8, 0.5)])
+    found = in_proportion(["pendant_lamp", "pendant_lamp", "dresser"], size, np.array([True, False, True]))
+    assert found[0, 0] == found[0, 2]
+    assert found[0].prod() == pytest.approx(size[0].prod())
+    assert np.array_equal(found[1:], size[1:])
+
+
+def test_a_screen_fits_its_stand_and_stays_a_screen():
+    size = np.array([(0.8, 0.9, 0.4), (1.3, 0.8, 0.05), (0.35, 0.5, 0.2), (0.5, 0.5, 0.5)])
+    words = ["dresser", "tv", "nightstand", "table_lamp"]
+    found = fitting_loads(words, size, np.array([-1, 0, -1, 2]), np.ones(4, bool))
+    assert found[1, 0] == pytest.approx(0.8 - 2 * EDGE)
+    assert found[1, 0] / found[1, 1] == pytest.approx(vocabulary().category("tv").aspect[0])
+    assert found[1, 2] == FEET
+    assert found[3, 0] == found[3, 2] == pytest.approx(0.2 - 2 * EDGE)
+
+
+@given(st.integers(0, 300), st.floats(0.5, 1.7), st.floats(0.4, 1.2), st.floats(0.04, 0.25))
+def test_screens_are_16_to_9_or_wider_in_any_box(seed, w, h, d):
+    rng = np.random.default_rng(seed)
+    parts = solids("tv", Style.draw(rng), Choices.draw(rng), np.array([w, h, d]))
+    panel = np.concatenate([p.mesh()[0] for p in parts if p.role in ("housing", "screen")])
+    wide, high, _ = np.ptp(panel, axis=0)
+    assert PANEL[0] - 0.01 <= wide / high <= PANEL[1] + 0.01
+    assert panel[:, 1].max() == pytest.approx(h, abs=0.01)
+
+
+@pytest.mark.parametrize("word", ROUND)
+def test_what_is_round_is_stretched_alike_in_plan(word):
+    """Every solid that its program turns round a vertical axis is a circle in the finished piece."""
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        size = np.array([0.6, 0.9, 0.6]) * rng.uniform(0.7, 1.2)
+        size[2] = size[0]
+        parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
+        seen = [part for part in parts if not part.core]
+        for piece in pieces_of(parts, size, round=True):
+            before = np.ptp(piece.solid.mesh()[0], axis=0)
+            after = np.ptp(piece.vertices, axis=0)
+            if piece.solid.role in ("shade", "pot", "seat", "top", "bulb") and before[0] == pytest.approx(before[2]):
+                assert after[0] == pytest.approx(after[2], rel=1e-3), (word, piece.solid.role)
+        assert seen
+
+
+@pytest.mark.parametrize("word", ["pendant_lamp", "floor_lamp", "table_lamp", "ceiling_lamp"])
+def test_globes_are_spheres(word):
+    rng, globes = np.random.default_rng(3), 0
+    for _ in range(60):
+        low, high = np.array(size_range(word))
+        (size,) = usual_sizes([word], rng.uniform(low, high)[None], lenient=WITHIN)
+        style = replace(Style.draw(rng), shade="sphere")
+        for piece in pieces_of(solids(word, style, Choices.draw(rng), size), size, round=True):
+            if isinstance(piece.solid, Ball) and piece.solid.role == "shade":
+                globes += 1
+                extent = np.ptp(piece.vertices, axis=0)
+                assert extent.max() < 1.2 * extent.min(), (word, size, extent)
+    assert globes
