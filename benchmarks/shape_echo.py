@@ -64,7 +64,7 @@ def denoising_loss(model: EchoModel, shapes: HeldOut) -> float:
 def likeness(model: EchoModel, shapes: HeldOut) -> float:
     """Distance of two pieces of one class told to be of one style, over that of pieces of different suites."""
     generator = torch.Generator().manual_seed(2)
-    classes = model.config.categories
+    classes = len(model.config.categories)
     category = torch.randint(classes, (SUITES,), generator=generator)
     style = shapes.styles[torch.randint(len(shapes.styles), (SUITES,), generator=generator)]
     number = (style * classes + category).repeat_interleave(2)

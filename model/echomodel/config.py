@@ -6,6 +6,8 @@ import json
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
+from echomodel.vocabulary import vocabulary
+
 Objective = Literal["noise", "velocity", "flow"]
 Prediction = Literal["output", "sample"]
 Sampler = Literal["ddim", "ancestral", "dpm2m"]
@@ -145,18 +147,23 @@ class FurnitureConfig:
     sampler: Sampler = "ancestral"
 
 
+def names_of(kind: str) -> tuple[str, ...]:
+    """Names of the `categories`, `room_types` or `predicates` that new networks learn: of relations SG-FRONT's."""
+    return tuple(row.name for row in getattr(vocabulary(), kind) if kind != "predicates" or row.sgfront is not None)
+
+
 @dataclass(frozen=True)
 class CompactConfig:
     """The compact echo model: sizes of its parts and of its vocabulary.
 
     Arguments:
-        categories, predicates, room_types: how many of the vocabulary's words, from the first on, the networks know.
+        categories, predicates, room_types: the words that the networks know, by name, in the order of their rows.
         rules: names of the rule sets that relations may be meant in.
     """
 
-    categories: int = 46
-    predicates: int = 16
-    room_types: int = 5
+    categories: tuple[str, ...] = field(default_factory=lambda: names_of("categories"))
+    predicates: tuple[str, ...] = field(default_factory=lambda: names_of("predicates"))
+    room_types: tuple[str, ...] = field(default_factory=lambda: names_of("room_types"))
     rules: tuple[str, ...] = ("sgfront", "strict")
     latent: LatentConfig = field(default_factory=LatentConfig)
     layout: LayoutConfig = field(default_factory=LayoutConfig)

@@ -15,7 +15,7 @@ from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
 from echomodel.compact.given import Sampling, known_values, repeated, starting_noise
 from echomodel.compact.joined import equal_furniture, joined
 from echomodel.compact.layouts import LayoutSampling, sample_boxes
-from echomodel.compact.learned import in_learned_words, unlearned
+from echomodel.compact.learned import unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, shape_predictor
@@ -145,15 +145,13 @@ class EchoModel:
     @torch.no_grad()
     def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
         """Latent nodes (N, latent width) that both branches read; `edit` routes them through the manipulator's edit."""
-        now = in_learned_words(graph, self.config)
-        pairs = pairs_of(now, self.config.predicates)
+        pairs = pairs_of(graph, self.config.predicates)
         if edit is None:
-            return self.model.latent(now.category, pairs)
-        before = in_learned_words(graph.with_triplets(edit.before.to(self.device)), self.config)
-        old = pairs_of(before, self.config.predicates)
+            return self.model.latent(graph.category, pairs)
+        old = pairs_of(graph.with_triplets(edit.before.to(self.device)), self.config.predicates)
         added = edit.added.to(self.device)
         return self.model.latent(
-            now.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
+            graph.category, pairs, before=old.without(~added, old.told), added=added, touched=touched_nodes(graph, edit)
         )
 
     def unlearned(self, graph: GraphBatch) -> tuple[str, ...]:
@@ -278,7 +276,7 @@ class EchoModel:
         graph = with_whole_styles(graph, joined(graph, styles))
         bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
-            self.model, in_learned_words(graph, self.config), boxes.size, self.graph_latent(graph, edit), equal,
+            self.model, graph, boxes.size, self.graph_latent(graph, edit), equal,
             settings.temperature * start[equal] if noise is None else start,
             Sampling(generator, steps, sampler, known, known_mask, guidance, progress),
             bare_latent=None if guidance == 1.0 else self.graph_latent(bare),
@@ -290,7 +288,7 @@ class EchoModel:
         """The denoiser of `count` draws behind one another, each of all objects of the graph."""
 
         def of(one: GraphBatch, latent: Tensor) -> Predict:
-            many = GraphBatch.pack([in_learned_words(one, self.config)] * count)
+            many = GraphBatch.pack([one] * count)
             pairs = pairs_of(many, self.config.predicates)
             return shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
 

@@ -43,8 +43,8 @@ class Category:
             things or say too little of what people need (seats, room for knees); () = those of what it is `like`.
         sizes: 5th percentile, median and 95th percentile of (x, y, z) as sold, metres, where real rooms tell none.
         round: it is as wide as deep. aspect: least and greatest width over height, () = any.
-        like: the category whose sizes and furniture it borrows where it has none of its own, and whose models in
-            libraries may stand for it, "" = its SG-FRONT class.
+        like: the category that weights take it for which do not know it, whose sizes and furniture it borrows where it
+            has none of its own, and whose models in libraries may stand for it, "" = its SG-FRONT class.
         top: the category whose small things stand on its top (`echousd.room.dressing.tabletops.TOPS`), "" = none.
         invites: small things that go with it, of `INVITES`.
         aliases: what people call it.
@@ -85,7 +85,7 @@ class Predicate:
     """Everything that the product knows of a relation, but for the code of its rule (`echomodel.rules`).
 
     Arguments:
-        id: its position; SG-FRONT's own id where SG-FRONT has it.
+        id: its number in graphs and room sets: SG-FRONT's own where SG-FRONT has it, the next free one elsewhere.
         sgfront: SG-FRONT's spelling, None where SG-FRONT lacks it.
         inverse: what says the same of the swapped pair, None where nothing does.
         order, rank: the order that it belongs to (left and right share one), and 1 where the subject comes after the

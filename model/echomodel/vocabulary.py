@@ -39,6 +39,7 @@ __all__ = [
     "vocabulary",
 ]
 
+ONE_OF = {"categories": "category", "predicates": "predicate", "room_types": "room type"}
 TYPO = 0.72  # likeness from which a word is taken for another one with a slip: carpet is no cabinet
 
 
@@ -48,10 +49,12 @@ class UnknownWord(ValueError):
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """All words in a fixed order; the position of a category, predicate or room type is its id in `GraphBatch`.
+    """All words; the position of a category or room type and the id of a predicate are its numbers in `GraphBatch`.
+
+    The order of rows means nothing: predicates stand by their ids, and what outlives a process names its words.
 
     Raises:
-        ValueError: a row names something that does not exist, or ids that are no positions.
+        ValueError: a row names something that does not exist, or ids of predicates are not 0, 1, 2 ... each once.
     """
 
     categories: tuple[Category, ...]
@@ -68,6 +71,7 @@ class Vocabulary:
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "predicates", tuple(sorted(self.predicates, key=lambda row: row.id)))
         for kind, entries in self._rows.items():
             index = {word: i for i, entry in enumerate(entries) for word in entry.aliases}
             index.update({entry.name: i for i, entry in enumerate(entries)})
@@ -92,6 +96,11 @@ class Vocabulary:
         """As `category`, but None for a word that the vocabulary does not hold, without looking for one like it."""
         found = self._known("category", word)
         return None if found is None else self.categories[found]
+
+    def name_of(self, kind: str, word: str) -> str:
+        """The name that a word of `categories`, `predicates` or `room_types` has today; itself where it is unknown."""
+        found = self._known(ONE_OF[kind], word)
+        return word if found is None else getattr(self, kind)[found].name
 
     def predicate(self, word: str) -> Predicate:
         """The predicate called `word` (name, alias or SG-FRONT spelling); raises `UnknownWord`."""
@@ -138,7 +147,7 @@ class Vocabulary:
         return self._find("category", word)
 
     def predicate_id(self, word: str) -> int:
-        """Position of a predicate, which is SG-FRONT's id where SG-FRONT has it."""
+        """Id of a predicate, which is SG-FRONT's where SG-FRONT has it."""
         return self.predicates[self._find("predicate", word)].id
 
     def room_type_id(self, word: str) -> int:
@@ -160,7 +169,7 @@ class Vocabulary:
         for position, relation in enumerate(self.predicates):
             where = f"predicate {relation.name}"
             if relation.id != position:
-                raise ValueError(f"{where}: id is {relation.id}, expected its position {position}")
+                raise ValueError(f"{where}: id is {relation.id}, expected {position}: ids are 0, 1, 2 ... each once")
             _known(where, "kind", (relation.kind,), kinds)
             _known(where, "measures", (relation.measures,), MEASURES)
             for what in ("inverse", "mirror_x", "mirror_z"):

@@ -67,7 +67,7 @@ def packed(rooms):
 @pytest.fixture
 def model(packed):
     torch.manual_seed(0)
-    made = CompactModel(CONFIG, BoxStatistics.from_boxes(packed.boxes, packed.category, CONFIG.categories))
+    made = CompactModel(CONFIG, BoxStatistics.from_boxes(packed.boxes, packed.category, len(CONFIG.categories)))
     with torch.no_grad():
         for parameter in made.parameters():
             parameter.add_(0.02 * torch.randn_like(parameter))
@@ -125,9 +125,9 @@ def _few_styles(monkeypatch):
 
 
 def stages(packed: PackedRooms, model: CompactModel) -> dict:
-    latents = torch.randn(3 * CONFIG.categories, 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()
+    latents = torch.randn(3 * len(CONFIG.categories), 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()
     sizes = torch.ones(len(latents), 3)
-    shapes = EncodedShapes(latents, sizes, CONFIG.categories, torch.tensor([0, 1]), torch.tensor([2]))
+    shapes = EncodedShapes(latents, sizes, len(CONFIG.categories), torch.tensor([0, 1]), torch.tensor([2]))
     layout, shape = LayoutStage(packed, packed, 40, 0.5, (), 0.3), ShapeStage(packed, shapes, 24)
     return {
         "layout": layout,

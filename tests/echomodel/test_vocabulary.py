@@ -40,40 +40,53 @@ REAL_ROOM_CATEGORIES = (
 )  # fmt: skip
 
 
-def test_predicates_are_sgfronts_by_id():
-    assert tuple(predicate.sgfront for predicate in WORDS.predicates[:16]) == SGFRONT_RELATIONS
-    assert [predicate.id for predicate in WORDS.predicates] == list(range(20))
-    assert not any(predicate.sgfront for predicate in WORDS.predicates[16:])
+def test_sgfronts_predicates_have_its_ids():
+    assert {row.id: row.sgfront for row in WORDS.predicates if row.sgfront} == dict(enumerate(SGFRONT_RELATIONS))
+    assert [row.id for row in WORDS.predicates] == list(range(len(WORDS.predicates)))
+    assert all(WORDS.predicates[row.id] is row for row in WORDS.predicates)
 
 
-def test_the_first_34_categories_are_sgfronts_and_twelve_more_follow():
-    assert tuple(category.name for category in WORDS.categories[:34]) == SGFRONT_FINE
-    assert tuple(category.sgfront for category in WORDS.categories[:34]) == SGFRONT_FINE
-    assert {category.name for category in WORDS.categories[34:]} == {
-        "floor_lamp", "table_lamp", "wall_lamp", "plant", "ottoman", "sideboard", "dresser", "side_table",
-        "office_chair", "bar_stool", "bench", "tv",
-    }  # fmt: skip
-    assert len(WORDS.categories) == 46
+def test_every_class_of_sgfront_is_a_category_of_its_own():
+    for name in SGFRONT_FINE:
+        assert WORDS.category(name).name == WORDS.category(name).sgfront == name
+    assert set(WORDS.coarse_categories) == set(SGFRONT_COARSE)
+    assert set(SGFRONT_COARSE) == {category.coarse for category in WORDS.categories} | {"_scene_", "floor"}
 
 
 def test_every_category_has_a_coarse_class_and_a_nearest_sgfront_class():
-    assert WORDS.coarse_categories == SGFRONT_COARSE
-    fine = {category.name: category for category in WORDS.categories[:34]}
     for category in WORDS.categories:
         assert category.coarse in SGFRONT_COARSE
         assert category.sgfront in SGFRONT_FINE
         assert category.support in ("floor", "table", "wall", "ceiling")
-    assert fine["round_end_table"].coarse == "table"
-    assert fine["pendant_lamp"].coarse == "lamp"
+    assert WORDS.category("round_end_table").coarse == "table"
+    assert WORDS.category("pendant_lamp").coarse == "lamp"
     # "no stool" mapping of the published results: stools count as chairs
-    assert fine["stool"].coarse == "chair"
-    assert set(SGFRONT_COARSE) == {category.coarse for category in WORDS.categories} | {"_scene_", "floor"}
+    assert WORDS.category("stool").coarse == "chair"
+
+
+def test_the_order_of_rows_means_nothing():
+    turned = replace(
+        WORDS, categories=WORDS.categories[::-1], predicates=WORDS.predicates[::-1], room_types=WORDS.room_types[::-1]
+    )
+    assert turned.predicates == WORDS.predicates
+    for kind in ("categories", "predicates", "room_types"):
+        for row in getattr(WORDS, kind):
+            for word in (row.name, *row.aliases):
+                assert turned.name_of(kind, word) == row.name
+    assert turned.categories[turned.category_id("couch")] is WORDS.category("sofa")
+    assert WORDS.name_of("categories", "moon") == "moon"
+
+
+def test_ids_of_predicates_are_each_there_once():
+    twice = tuple(replace(row, id=3) if row.name == "left" else row for row in WORDS.predicates)
+    with pytest.raises(ValueError, match=r"predicate right: id is 2, expected 1: ids are 0, 1, 2 \.\.\. each once"):
+        replace(WORDS, predicates=twice)
 
 
 def test_rows_say_what_a_category_is_for():
     roles = {role: {entry.name for entry in WORDS.categories if entry.role == role} for role in ROLES}
-    assert roles["bed"] == {"double_bed", "kids_bed", "single_bed"}
-    assert roles["light"] == {"ceiling_lamp", "floor_lamp", "pendant_lamp", "table_lamp", "wall_lamp"}
+    assert {"double_bed", "kids_bed", "single_bed"} <= roles["bed"]
+    assert {"ceiling_lamp", "floor_lamp", "pendant_lamp", "table_lamp", "wall_lamp"} <= roles["light"]
     assert {"desk", "dining_table", "coffee_table"} <= roles["board"]
     assert {"chair", "stool", "armchair"} <= roles["seat"]
     assert "sofa" not in roles["seat"]
@@ -136,9 +149,9 @@ def test_what_people_type(word, name):
 
 
 def test_sgfront_spelling_of_a_predicate_is_understood():
-    for predicate in WORDS.predicates[:16]:
-        assert WORDS.predicate(predicate.sgfront) is predicate
-        assert WORDS.predicate_id(predicate.sgfront) == predicate.id
+    for number, spelling in enumerate(SGFRONT_RELATIONS):
+        assert WORDS.predicate_id(spelling) == number
+        assert WORDS.predicate(spelling).sgfront == spelling
 
 
 def test_coarse_classes_are_understood_as_categories():
@@ -165,7 +178,7 @@ def test_room_types_of_real_rooms():
     assert [WORDS.room_type(word).name for word in ("living", "dining", "living_dining", "bedroom", "Home Office")] == [
         "living_room", "dining_room", "living_dining_room", "bedroom", "study",
     ]  # fmt: skip
-    assert WORDS.room_type_id("study") == 4
+    assert WORDS.room_types[WORDS.room_type_id("study")].name == "study"
 
 
 @pytest.mark.parametrize(
@@ -176,8 +189,8 @@ def test_room_types_of_real_rooms():
         (WORDS.predicate, "standing_no", "unknown predicate 'standing_no': did you mean standing_on?"),
         (WORDS.predicate, "below", "unknown predicate 'below': swap the two objects and say above"),
         (WORDS.room_type, "bedrom", "unknown room type 'bedrom': did you mean bedroom?"),
-        (WORDS.room_type, "garage", "unknown room type 'garage' (not supported): allowed: bedroom, living_room, "
-         "dining_room, living_dining_room, study"),
+        (WORDS.room_type, "garage", "unknown room type 'garage' (not supported): allowed: "
+         + ", ".join(row.name for row in WORDS.room_types)),
     ],
 )  # fmt: skip
 def test_unknown_words_name_the_nearest(ask, word, text):

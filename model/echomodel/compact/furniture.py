@@ -12,6 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.compact.echo import EchoLayer, level_features
+from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
@@ -39,14 +40,14 @@ class FurnitureDenoiser(nn.Module):
         super().__init__()
         self.kinds, self.numbers = own.kinds, own.numbers
         self.values = sum(own.kinds) + own.numbers
-        self.category = nn.Embedding(config.categories, width)
-        self.room_type = nn.Embedding(config.room_types, width)
+        self.category = WordTable("categories", config.categories, width)
+        self.room_type = WordTable("room_types", config.room_types, width)
         self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
         self.latent = nn.Linear(config.latent.width, width)
         self.own = nn.Linear(self.values, width)
         self.level = nn.Sequential(nn.Linear(64, 128), nn.SiLU())
         self.modulation = nn.Linear(128, 2 * width * own.layers)
-        told = 2 * config.predicates
+        told = 2 * len(config.predicates)
         self.trust = nn.Sequential(nn.Linear(told, 32), nn.SiLU(), nn.Linear(32, own.voices)) if own.echo else None
         self.heard = nn.Linear(own.voices * (self.values + 1), width) if own.echo else None
         self.layers = nn.ModuleList(

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.compact.echo import EchoLayer
+from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
 
@@ -23,11 +24,11 @@ class LatentGraph(nn.Module):
     def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         width, layers = config.latent.width, config.latent.layers
-        self.category = nn.Embedding(config.categories, width)
+        self.category = WordTable("categories", config.categories, width)
         self.touched = nn.Parameter(torch.randn(width) * 0.1)
-        self.encoder = nn.ModuleList(EchoLayer(width, 2 * config.predicates) for _ in range(layers))
+        self.encoder = nn.ModuleList(EchoLayer(width, 2 * len(config.predicates)) for _ in range(layers))
         self.mix = nn.Linear(2 * width, width)
-        self.manipulator = nn.ModuleList(EchoLayer(width, 2 * config.predicates) for _ in range(layers))
+        self.manipulator = nn.ModuleList(EchoLayer(width, 2 * len(config.predicates)) for _ in range(layers))
         self.norm = nn.LayerNorm(width)
 
     def forward(

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pair_features, wall_features
 from echomodel.compact.echo import EchoLayer, level_features
+from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
 from echomodel.floors import GRID, plan_features
@@ -60,8 +61,8 @@ class LayoutDenoiser(nn.Module):
         each, rest = divmod(layout.layers, max(layout.drafts, 0) + 1)
         if layout.drafts < 0 or not each:
             raise ValueError(f"layout.layers {layout.layers} are too few for layout.drafts {layout.drafts}")
-        self.category = nn.Embedding(config.categories, width)
-        self.room_type = nn.Embedding(config.room_types, width)
+        self.category = WordTable("categories", config.categories, width)
+        self.room_type = WordTable("room_types", config.room_types, width)
         self.rules = nn.Embedding(len(config.rules), width)
         self.floor = nn.Sequential(nn.Linear(6 + GRID**2, width), nn.SiLU(), nn.Linear(width, width))
         self.opening = nn.Sequential(nn.Linear(PLAN, width), nn.SiLU(), nn.Linear(width, width))
@@ -73,7 +74,7 @@ class LayoutDenoiser(nn.Module):
         self.modulation = nn.Linear(128, 2 * width * layout.layers)
         measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES + OPENING_FEATURES
         self.rounds = nn.ModuleList(
-            nn.ModuleList(EchoLayer(width, 2 * config.predicates + PAIR_FEATURES * (n > 0)) for _ in range(layers))
+            nn.ModuleList(EchoLayer(width, 2 * len(config.predicates) + PAIR_FEATURES * (n > 0)) for _ in range(layers))
             for n, layers in enumerate([each + rest] + [each] * layout.drafts)
         )
         self.measured = nn.ModuleList(nn.Linear(measured, width) for _ in range(layout.drafts))

@@ -10,7 +10,6 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.given import Sampling, starting_noise
-from echomodel.compact.learned import in_learned_words
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor
@@ -91,7 +90,7 @@ def _denoised(
     model: CompactModel, latent: Latent, graph: GraphBatch, how: LayoutSampling, draft: Boxes | None, start: float
 ) -> Boxes:
     config, by = model.config.layout, how.by
-    scale = model.statistics.scale(in_learned_words(graph, model.config).category)
+    scale = model.scale(graph.category)
     given = None if how.known is None else how.known.encode(scale)
     conditional = _predictor(model, graph, latent(graph, how.edit), how.rules)
     if by.guidance != 1.0:
@@ -124,8 +123,8 @@ def _in_the_way(graph: GraphBatch) -> Tensor | None:
 
 
 def _predictor(model: CompactModel, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
-    config, now = model.config, in_learned_words(graph, model.config)
+    config = model.config
     if rules not in config.rules:
         raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
     chosen = torch.full_like(graph.room_type, config.rules.index(rules))
-    return layout_predictor(model, now, pairs_of(now, config.predicates), latent, chosen)
+    return layout_predictor(model, graph, pairs_of(graph, config.predicates), latent, chosen)

@@ -1,57 +1,99 @@
-"""What weights have learned of the vocabulary: its first words. A graph in newer words becomes one in theirs."""
+"""What weights know of the vocabulary: the words that they name, wherever those stand in it today."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Collection
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
 
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import Vocabulary, vocabulary
+
+Names = tuple[str, ...]
+_PLACES: dict[tuple[str, Names], tuple[Vocabulary, Tensor]] = {}
 
 
-def in_learned_words(graph: GraphBatch, config: CompactConfig) -> GraphBatch:
-    """The graph as the networks take it: newer categories and room types as what their rows say they are like (a
-    category's `sgfront`, a room type's `like`), relations of newer predicates left out.
+class WordTable(nn.Embedding):
+    """Vectors of words, one row for each that the weights name.
+
+    Arguments:
+        kind: `categories` or `room_types`. names: of the rows. width: of the vectors.
+
+    Shapes:
+        (...) int64, positions in today's vocabulary -> (..., width)
+    """
+
+    def __init__(self, kind: str, names: Names, width: int) -> None:
+        super().__init__(len(names), width)
+        self.kind, self.names = kind, names
+
+    def forward(self, input: Tensor) -> Tensor:
+        return super().forward(places(self.kind, self.names, input))
+
+
+def places(kind: str, names: Names, words: Tensor) -> Tensor:
+    """Row of each of some words among those that weights name; an unknown word has that of what its row is `like`.
+
+    Arguments:
+        kind: `categories` or `room_types`. names: of the weights' rows.
+        words: (...) int64, positions in the vocabulary.
 
     Raises:
-        ValueError: a row that names nothing the weights know.
+        ValueError: a word that the weights do not know, like nothing that they know.
     """
-    triplets = graph.triplets[graph.triplets[:, 1] < config.predicates]
+    found = table_of(kind, names).to(words.device)[words]
+    if bool((table_of(kind, names) < 0).any()) and bool((found < 0).any()):
+        row = getattr(vocabulary(), kind)[int(words[found < 0][0])]
+        like = _like(row)
+        raise ValueError(f"these weights know neither {row.name!r} nor {like!r}, which its row names as the nearest")
+    return found
+
+
+def table_of(kind: str, names: Names) -> Tensor:
+    """(W,) int64: for every word of the vocabulary the row of weights that name `names`, -1 where there is none."""
     words = vocabulary()
-    category = _nearest(graph.category, config.categories, [(row.name, row.sgfront) for row in words.categories])
-    room_type = _nearest(graph.room_type, config.room_types, [(row.name, row.like) for row in words.room_types])
-    return replace(graph, category=category, room_type=room_type, triplets=triplets)
+    spoken, table = _PLACES.get((kind, names), (None, None))
+    if spoken is not words or table is None:
+        row_of = {words.name_of(kind, name): row for row, name in enumerate(names)}
+        nearest = [_nearest(kind, row.name, row_of) for row in getattr(words, kind)]
+        table = torch.tensor([-1 if name is None else row_of[name] for name in nearest])
+        _PLACES[kind, names] = words, table
+    return table
 
 
 def unlearned(graph: GraphBatch, config: CompactConfig) -> tuple[str, ...]:
     """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
-    words = vocabulary()
-    said = [
-        f"the weights do not know the category {row.name}: generated as {row.sgfront}"
-        for number, row in enumerate(words.categories)
-        if number >= config.categories and bool((graph.category == number).any())
-    ]
-    said += [
-        f"the weights do not know the room type {row.name}: generated as {row.like}"
-        for number, row in enumerate(words.room_types)
-        if number >= config.room_types and bool((graph.room_type == number).any())
-    ]
-    return tuple(said) + tuple(
-        f"the weights do not know the relation {row.name}: guided, repaired and checked, not generated"
-        for row in words.predicates[config.predicates :]
-        if bool((graph.triplets[:, 1] == row.id).any())
-    )
+    said = []
+    for kind, text, held in (
+        ("categories", "category", graph.category),
+        ("room_types", "room type", graph.room_type),
+        ("predicates", "relation", graph.triplets[:, 1]),
+    ):
+        known = {vocabulary().name_of(kind, name) for name in getattr(config, kind)}
+        for row in (getattr(vocabulary(), kind)[number] for number in sorted(set(held.tolist()))):
+            if row.name not in known:
+                becomes = (
+                    "guided, repaired and checked, not generated"
+                    if kind == "predicates"
+                    else f"generated as {_nearest(kind, row.name, known)}"
+                )
+                said.append(f"the weights do not know the {text} {row.name}: {becomes}")
+    return tuple(said)
 
 
-def _nearest(number: Tensor, known: int, rows: list[tuple[str, str]]) -> Tensor:
-    """Numbers of words with those from `known` on replaced by that of the word that they are like."""
-    place = {name: k for k, (name, _) in enumerate(rows)}
-    out = number.clone()
-    for new in number[number >= known].unique().tolist():
-        name, like = rows[new]
-        if place.get(like, known) >= known:
-            raise ValueError(f"these weights know neither {name!r} nor {like!r}, which its row names as the nearest")
-        out[number == new] = place[like]
-    return out
+def _nearest(kind: str, word: str, known: Collection[str]) -> str | None:
+    """The first of `known` on the way from a word to what its row is like, and so on; relations are like no other."""
+    rows = {row.name: row for row in getattr(vocabulary(), kind)}
+    passed: set[str] = set()
+    while word not in known:
+        if kind == "predicates" or word in passed or word not in rows:
+            return None
+        passed.add(word)
+        word = _like(rows[word])
+    return word
+
+
+def _like(row: object) -> str:
+    return getattr(row, "like", "") or getattr(row, "sgfront", "")

@@ -16,19 +16,20 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 from torch.overrides import TorchFunctionMode
 
-from echomodel.boxes import BoxStatistics
+from echomodel.boxes import BoxScale, BoxStatistics
 from echomodel.compact.autoencoder import Autoencoder
 from echomodel.compact.branches import PARTS
 from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
+from echomodel.compact.learned import places
 from echomodel.compact.rounding import restored, rounded
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
 from echomodel.files import whole_file
-from echomodel.vocabulary import vocabulary
 
-_SHARED = ("categories", "predicates", "room_types", "rules")
+WORDS = ("categories", "predicates", "room_types")
+_SHARED = (*WORDS, "rules")
 FORMAT = "echousd-compact-1"
 
 
@@ -57,6 +58,10 @@ class CompactModel(nn.Module):
     autoencoder: Autoencoder
     shape: ShapeDenoiser
     furniture: FurnitureDenoiser
+
+    def scale(self, category: Tensor) -> BoxScale:
+        """What the normalised numbers of boxes of `category` (N,) int64 stand for."""
+        return self.statistics.scale(places("categories", self.config.categories, category))
 
     @property
     def device(self) -> torch.device:
@@ -88,7 +93,6 @@ def save_weights(path: Path, model: CompactModel, parts: Sequence[str], *, half:
         "format": FORMAT,
         "config": to_json(model.config),
         "statistics": json.dumps(model.statistics.to_json()),
-        "vocabulary": json.dumps(_words(model.config)),
         "parts": json.dumps(list(parts)),
     }
     with whole_file(path) as beside:
@@ -106,6 +110,15 @@ class _Undrawn(TorchFunctionMode):
         return (args[0] if args else given["tensor"]) if drawn else func(*args, **given)
 
 
+def read_weights(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
+    """Metadata and tensors of a safetensors file as they are; raises WeightsError where it cannot be read."""
+    try:
+        with safe_open(path, "pt") as handle:
+            return handle.metadata() or {}, {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
+    except (OSError, SafetensorError) as error:
+        raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+
+
 def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:
     """Build the model that the files hold together and return it with a short hash of their contents.
 
@@ -117,13 +130,8 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
         raise WeightsError("no weights files found: install the package with its weights or name a file")
     metadata, tensors, digest = {}, {}, hashlib.sha256()
     for path in sorted(paths):
-        try:
-            with safe_open(path, "pt") as handle:
-                header = handle.metadata() or {}
-                held = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
-            digest.update(path.read_bytes())
-        except (OSError, SafetensorError) as error:
-            raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+        header, held = read_weights(path)
+        digest.update(path.read_bytes())
         try:
             tensors.update(restored(held))
         except ValueError as error:
@@ -166,9 +174,8 @@ def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:
         for part in parts:
             if reason := PARTS[part].outdated(raw[part]):
                 raise WeightsError(f"{path}: is of an earlier version, {reason}")
-        own = from_dict(CompactConfig, {key: raw[key] for key in (*_SHARED, *parts)})
-        if json.loads(header.get("vocabulary", "{}")) != _words(own):
-            raise WeightsError(f"{path}: was trained with other words than the first of this version's vocabulary")
+        named = words_of(path, header)
+        own = from_dict(CompactConfig, {**{key: raw[key] for key in ("rules", *parts)}, **named})
         for other in (set(PARTS) - set(parts)) & set(raw):
             # settings of a part that lies in another file; an older version's may hold fields that are gone
             with suppress(ValueError):
@@ -196,11 +203,14 @@ def _check_fit(wanted: Mapping[str, Tensor], tensors: dict[str, Tensor], where: 
         raise WeightsError(f"{where}: tensors do not fit the configuration: {'; '.join(problems)}")
 
 
-def _words(config: CompactConfig) -> dict[str, list[str]]:
-    """The first words of the vocabulary, as many as the networks know; new rows stand behind them."""
-    words = vocabulary()
-    return {
-        "categories": [entry.name for entry in words.categories[: config.categories]],
-        "predicates": [entry.name for entry in words.predicates[: config.predicates]],
-        "room_types": [entry.name for entry in words.room_types[: config.room_types]],
-    }
+def words_of(path: Path, header: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """The words that a weights file names, of every kind in `WORDS`; files of before counted them in their
+    configuration and named them beside. Raises WeightsError for a wrong count or a name that is there twice."""
+    raw, beside = json.loads(header["config"]), json.loads(header.get("vocabulary", "{}"))
+    named = {kind: tuple(beside[kind] if isinstance(raw[kind], int) else raw[kind]) for kind in WORDS}
+    for kind, names in named.items():
+        if isinstance(raw[kind], int) and raw[kind] != len(names):
+            raise WeightsError(f"{path}: names {len(names)} {kind}, its configuration counts {raw[kind]}")
+        if twice := [name for number, name in enumerate(names) if name in names[:number]]:
+            raise WeightsError(f"{path}: names {twice[0]!r} twice among its {kind}")
+    return named

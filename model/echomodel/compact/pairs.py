@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from echomodel.config import CompactConfig
+from echomodel.compact.learned import table_of
+from echomodel.config import names_of
 from echomodel.graph import GraphBatch
 from echomodel.vocabulary import vocabulary
 
@@ -54,18 +55,20 @@ def ordered_pairs(counts: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     return receiver[different], sender[different], scale
 
 
-def pairs_of(graph: GraphBatch, predicates: int = CompactConfig.predicates) -> Pairs:
-    """The pairs of a graph, told its predicates below R = `predicates`, as the weights know them.
+def pairs_of(graph: GraphBatch, predicates: tuple[str, ...] | None = None) -> Pairs:
+    """The pairs of a graph, told those of its relations that are among R `predicates`, None = all that networks learn.
 
     Parallel triplets merge, repeated ones count once, inverses are filled in.
     """
+    predicates = names_of("predicates") if predicates is None else predicates
     counts = graph.node_counts
     receiver, sender, scale = ordered_pairs(counts)
+    row = table_of("predicates", predicates).to(receiver.device)[graph.triplets[:, 1]]
+    graph, predicate = graph.with_triplets(graph.triplets[row >= 0]), row[row >= 0]
     index = pair_index(graph, counts)
     # an inverse relation says the same the other way round: left(a, b) = right(b, a)
-    forward = torch.zeros(len(receiver), predicates, device=receiver.device)
+    forward = torch.zeros(len(receiver), len(predicates), device=receiver.device)
     inverse = inverse_predicates(predicates).to(receiver.device)
-    predicate = graph.triplets[:, 1]
     forward[index[0], predicate] = 1
     told_back = inverse[predicate] >= 0
     forward[index[1][told_back], inverse[predicate][told_back]] = 1
@@ -92,11 +95,8 @@ def _pair_number(receiver: Tensor, sender: Tensor, scene: Tensor, counts: Tensor
     return before[of] + row * (counts[of] - 1) + column - (column > row).long()
 
 
-def inverse_predicates(predicates: int = CompactConfig.predicates) -> Tensor:
-    """(R,) int64, the predicate below R that holds from object to subject, -1 where none follows."""
-    out = torch.full((predicates,), -1)
-    for predicate in vocabulary().predicates[:predicates]:
-        if predicate.inverse is not None:
-            inverse = vocabulary().predicate_id(predicate.inverse)
-            out[predicate.id] = inverse if inverse < predicates else -1
-    return out
+def inverse_predicates(predicates: tuple[str, ...]) -> Tensor:
+    """(R,) int64, which of R predicates holds from object to subject where one holds, -1 where none follows."""
+    words, names = vocabulary(), [vocabulary().name_of("predicates", name) for name in predicates]
+    inverses = [words.predicate(name).inverse for name in names]
+    return torch.tensor([names.index(name) if name in names else -1 for name in inverses])

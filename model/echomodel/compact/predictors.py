@@ -15,7 +15,7 @@ from echomodel.samplers import Predict
 
 def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> Predict:
     """Clean boxes (N, 8) of tidy rooms in noisy ones; arguments as for `LayoutDenoiser.context`."""
-    context = model.layout.context(graph, pairs, latent, rules, model.statistics.scale(graph.category))
+    context = model.layout.context(graph, pairs, latent, rules, model.scale(graph.category))
 
     def predict(x: Tensor, level: Tensor) -> Tensor:
         return clean_from(model.layout(x, level, context), x, level, model.config.layout.objective)

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from echomodel.compact.autoencoder import GRID
 from echomodel.compact.echo import EchoLayer, level_features
+from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
@@ -45,7 +46,7 @@ class ShapeDenoiser(nn.Module):
         self.register_buffer("basis", torch.zeros(shape.components, channels * cells**3))
         self.register_buffer("scale", torch.ones(shape.components))
         values = shape.components // shape.tokens
-        self.category = nn.Embedding(config.categories, width)
+        self.category = WordTable("categories", config.categories, width)
         self.size = nn.Sequential(nn.Linear(3, width), nn.SiLU(), nn.Linear(width, width))
         self.latent = nn.Linear(config.latent.width, width)
         self.level = nn.Sequential(nn.Linear(64, width), nn.SiLU(), nn.Linear(width, width))
@@ -55,7 +56,7 @@ class ShapeDenoiser(nn.Module):
         self.echo_node = nn.Linear(width, echo)
         self.echo_code = nn.Linear(shape.components, echo)
         self.echo_level = nn.Linear(64, echo) if shape.echo_time else None
-        self.echo_layers = nn.ModuleList(EchoLayer(echo, 2 * config.predicates) for _ in range(shape.echo_layers))
+        self.echo_layers = nn.ModuleList(EchoLayer(echo, 2 * len(config.predicates)) for _ in range(shape.echo_layers))
         self.echo_out = nn.Sequential(nn.LayerNorm(echo), nn.Linear(echo, width))
         self.concat = nn.Linear(2 * width, width) if shape.conditioning == "concat" else None
         self.blocks = nn.ModuleList(

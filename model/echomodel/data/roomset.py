@@ -8,7 +8,7 @@ set.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,7 +79,7 @@ def build_rooms(
     folder.mkdir(parents=True, exist_ok=True)
     words = [category.name for category in vocabulary().categories]
     plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
-    plan["untidy"] = untidy
+    plan["untidy"], plan["room_types"] = untidy, [room_type.name for room_type in vocabulary().room_types]
     if halls:
         plan["halls"] = halls
     claim(folder, plan)
@@ -172,7 +172,16 @@ class RoomSet:
             hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no rooms.json"
             raise ValueError(f"{self.directory}: not a room set ({hint})")
         self.info: dict = read_note(index, rooms=int)
-        self._shards = [_tables(path) for path in sorted(self.directory.glob("rooms-*.bin"))]
+        words = vocabulary()
+        # sets of before named their categories alone
+        here = {kind: [row.name for row in getattr(words, kind)] for kind in ("categories", "room_types")}
+        self._names: dict[str, list[str]] = {kind: self.info.get(kind, here[kind]) for kind in here}
+        self._today = {
+            "categories": np.array([words.category_id(name) for name in self._names["categories"]]),
+            "room_types": np.array([words.room_type_id(name) for name in self._names["room_types"]]),
+        }
+        most = {kind: len(names) for kind, names in self._names.items()}
+        self._shards = [_tables(path, most) for path in sorted(self.directory.glob("rooms-*.bin"))]
         rooms = [shard["rooms"] for shard in self._shards]
         count = sum(map(len, rooms))
         if count != self.info["rooms"]:
@@ -197,12 +206,12 @@ class RoomSet:
 
     def room(self, number: int, *, rules: str = "strict") -> RoomBoxes:
         """One room with all its relations by the given rules."""
-        words, entry, objects = vocabulary(), self._table[number], self._part("objects", number)
-        names = tuple(words.categories[k].name for k in objects["category"])
+        entry, objects = self._table[number], self._part("objects", number)
+        names = tuple(self._names["categories"][k] for k in objects["category"])
         styles = tuple(int(style) for style in objects["style"])
         return RoomBoxes(
             id=f"room_{self.info['seed']}_{number:06d}",
-            room_type=words.room_types[entry["type"]].name,
+            room_type=self._names["room_types"][entry["type"]],
             floor_polygon=np.round(self._part("corners", number).astype(float), DIGITS),
             height=round(float(entry["height"]), DIGITS),
             categories=names,
@@ -243,10 +252,10 @@ class RoomSet:
         counts = self.counts[rooms]
         triplets = _triplets(bits, counts, None if drop == 0.0 else (drop, rng or np.random.default_rng()))
         graph = GraphBatch(
-            category=torch.from_numpy(objects["category"].astype(np.int64)),
+            category=torch.from_numpy(self._today["categories"][objects["category"]]),
             triplets=torch.from_numpy(triplets),
             scene=torch.from_numpy(np.repeat(np.arange(len(rooms)), counts)),
-            room_type=torch.from_numpy(self._table["type"][rooms].astype(np.int64)),
+            room_type=torch.from_numpy(self._today["room_types"][self._table["type"][rooms]]),
             floor=padded([centred(c)[None] for c in corners]),
             openings=padded_rows([opening_rows(o, c)[None] for o, c in zip(openings, corners, strict=True)]),
         )
@@ -318,7 +327,7 @@ def _column(rules: str) -> int:
     return RULES.index(rules)
 
 
-def _tables(path: Path) -> dict[str, np.ndarray]:
+def _tables(path: Path, most: Mapping[str, int]) -> dict[str, np.ndarray]:
     raw = np.memmap(path, np.uint8, mode="r")
     if bytes(raw[:8]) not in (MAGIC, MAGIC_OF_16):
         raise ValueError(f"{path}: not a shard of rooms (begins with {bytes(raw[:8])!r}, expected {MAGIC!r})")
@@ -332,11 +341,11 @@ def _tables(path: Path) -> dict[str, np.ndarray]:
         out[name] = np.frombuffer(raw, dtype.base, int(number) * int(np.prod(dtype.shape)), start)
         out[name] = out[name].reshape(int(number), *dtype.shape)
         start += int(number) * dtype.itemsize
-    rooms, words = out["rooms"], vocabulary()
+    rooms = out["rooms"]
     wrong = [name for name in list(out)[1:] if rooms[name].sum(dtype=np.uint64) != len(out[name])]
     wrong += [] if (rooms["pairs"] == rooms["objects"].astype(np.uint64) ** 2).all() else ["pairs"]
-    wrong += [] if out["objects"]["category"].max(initial=0) < len(words.categories) else ["categories"]
-    wrong += [] if rooms["type"].max(initial=0) < len(words.room_types) else ["room types"]
+    wrong += [] if out["objects"]["category"].max(initial=0) < most["categories"] else ["categories"]
+    wrong += [] if rooms["type"].max(initial=0) < most["room_types"] else ["room types"]
     if wrong:
         raise ValueError(f"{path}: damaged shard, its {wrong[0]} are not those of its rooms; remove it and build again")
     return out

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import measurable, pair_features, wall_features
+from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import layout_predictor
 from echomodel.objectives import add_noise, clean_from, draw_levels, target
@@ -53,7 +54,7 @@ def layout_loss(
         The loss, and the parts that the log names.
     """
     objective = model.config.layout.objective
-    scale = model.statistics.scale(batch.graph.category)
+    scale = model.scale(batch.graph.category)
     clean = batch.boxes.encode(scale)
     known = draw_known(batch.graph.scene, batch.graph.num_scenes, generator)
     level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
@@ -149,7 +150,9 @@ class LayoutStage:
         """The stage of a recipe; new layouts are normalised by its rooms."""
         recipe, (rooms, held) = start.recipe, (start.rooms(held=held) for held in (False, True))
         if "layout" not in start.given:
-            start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rooms.category, recipe.model.categories)
+            names = start.model.config.categories
+            rows = places("categories", names, rooms.category)
+            start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rows, len(names))
         weights = recipe.measure_weight, recipe.living_weight, recipe.own_weight, recipe.own_kept
         return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights)
 
@@ -199,4 +202,4 @@ def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Gener
     predict = layout_predictor(model, batch.graph, batch.pairs, latent, batch.rules)
     noise = normal((batch.graph.num_nodes, 8), generator, model.device)
     vectors = sample(layout.sampler, predict, noise, layout.steps, layout.objective, generator=generator)
-    return Boxes.decode(vectors, model.statistics.scale(batch.graph.category))
+    return Boxes.decode(vectors, model.scale(batch.graph.category))

@@ -67,7 +67,7 @@ def own_rooms(model: CompactModel, batch: LayoutBatch, generator: torch.Generato
     for number, (start, end) in enumerate(pairwise(levels)):
         with torch.set_grad_enabled(number >= first):
             x = _steadied(step(x, predict(x, torch.full_like(x[:, 0], start)), start, end))
-    return Boxes.decode(x, model.statistics.scale(batch.graph.category))
+    return Boxes.decode(x, model.scale(batch.graph.category))
 
 
 def _steadied(x: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.pairs import Pairs, inverse_predicates, ordered_pairs, reverse_pairs
-from echomodel.config import CompactConfig
+from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
 from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
@@ -20,7 +20,7 @@ from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
 from echomodel.vocabulary import vocabulary
 
-PREDICATES = CompactConfig.predicates  # that the network is told; rules may measure more
+PREDICATES = names_of("predicates")  # that networks are told, by their ids from 0 on; rules may measure more
 DENSE = 0.4  # share of the training rooms whose graphs tell 30 to 100 % of all relations
 UNKNOWN_FLOOR, UNKNOWN_OPENINGS = 0.25, 0.2
 
@@ -144,7 +144,7 @@ def make_batch(
     pair_counts = all_pairs[picked]
     bits = rooms.bits[_ranges(all_pairs.cumsum(0)[picked] - pair_counts, pair_counts)]
     scene = torch.arange(len(picked)).repeat_interleave(counts)
-    holds = (bits[:, None] >> torch.arange(PREDICATES)) & 1 == 1
+    holds = (bits[:, None] >> torch.arange(len(PREDICATES))) & 1 == 1
     position, yaw = rooms.position[nodes].clone(), rooms.yaw[nodes].clone()
     floor, openings = trimmed(rooms.floor[picked]).clone(), rooms.openings[picked].clone()
     pair_scene = torch.arange(len(picked)).repeat_interleave(pair_counts)
@@ -174,10 +174,10 @@ def _bits(graph: GraphBatch) -> Tensor:
     receiver, sender, _ = ordered_pairs(counts)
     number = torch.full((graph.num_nodes, graph.num_nodes), -1)
     number[receiver, sender] = torch.arange(len(receiver))
-    hot = torch.zeros(len(receiver), PREDICATES, dtype=torch.int32)
-    told = graph.triplets[graph.triplets[:, 1] < PREDICATES]
+    hot = torch.zeros(len(receiver), len(PREDICATES), dtype=torch.int32)
+    told = graph.triplets[graph.triplets[:, 1] < len(PREDICATES)]
     hot[number[told[:, 0], told[:, 2]], told[:, 1]] = 1
-    return (hot << torch.arange(PREDICATES, dtype=torch.int32)).sum(1, dtype=torch.int32)
+    return (hot << torch.arange(len(PREDICATES), dtype=torch.int32)).sum(1, dtype=torch.int32)
 
 
 def _ranges(starts: Tensor, counts: Tensor) -> Tensor:
@@ -203,7 +203,7 @@ def _mirror(
     yaw.copy_(torch.where(along_z[scene], torch.remainder(turned + torch.pi, 2 * torch.pi) - torch.pi, yaw))
     words = vocabulary()
     for mask, axis in ((along_x[pair_scene], "mirror_x"), (along_z[pair_scene], "mirror_z")):
-        order = [words.predicate_id(getattr(row, axis) or row.name) for row in words.predicates[:PREDICATES]]
+        order = [words.predicate_id(getattr(row, axis) or row.name) for row in words.predicates[: len(PREDICATES)]]
         holds = torch.where(mask[:, None], holds[:, order], holds)
     return holds
 
@@ -261,7 +261,7 @@ def _pseudo_edit(
     changed = changed[(choice == 2) & (counts > 1)]
     touched[pairs.receiver[changed]] = True
     touched[pairs.sender[changed]] = True
-    wrong = torch.zeros(len(changed), PREDICATES)
+    wrong = torch.zeros(len(changed), len(PREDICATES))
     wrong[torch.arange(len(changed)), torch.randint(1, 12, (len(changed),), generator=generator)] = 1
     pseudo = predicates.float()
     back = reverse_pairs(pairs.receiver, pairs.sender, counts)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import CompactModel, load_weights
+from echomodel.compact.model import WORDS, CompactModel, load_weights, read_weights, words_of
 from echomodel.compact.shape import ShapeDenoiser
+from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.training.recipe import Recipe
@@ -73,7 +74,7 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
 
     Raises ValueError where a part that the stage needs is in none of the files.
     """
-    model = CompactModel(recipe.model, _NO_BOXES, kind.parts).to(device)
+    model = CompactModel(_in_words(recipe), _NO_BOXES, kind.parts).to(device)
     found: tuple[str, ...] = ()
     components = None
     for path in recipe.start:
@@ -90,6 +91,22 @@ def started(kind: type[CompactStage], recipe: Recipe, device: torch.device, *, r
     if missing:
         raise ValueError(f"recipe field 'start': stage {recipe.stage!r} needs weights with {' and '.join(missing)}")
     return Start(recipe, model, found, resume, components)
+
+
+def _in_words(recipe: Recipe) -> CompactConfig:
+    """The recipe's model in the words of the file that it begins with; to a warm one's come those it does not know."""
+    config = recipe.model
+    if recipe.start:
+        given = load_weights([Path(recipe.start[0])])[0].config
+        return replace(config, **{kind: getattr(given, kind) for kind in WORDS})
+    if not recipe.warm:
+        return config
+    named = words_of(Path(recipe.warm[0]), read_weights(Path(recipe.warm[0]))[0])
+    new = {kind: tuple(name for name in getattr(config, kind) if name not in named[kind]) for kind in WORDS}
+    if new["predicates"]:
+        raise ValueError(f"{recipe.warm[0]}: knows no relation {new['predicates'][0]!r}, which networks learn today")
+    grown: dict[str, Any] = {kind: named[kind] + new[kind] for kind in WORDS}
+    return replace(config, **grown)
 
 
 def data_folder(recipe: Recipe, part: str) -> Path:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
-from torch import Tensor
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import CompactModel
+from echomodel.compact.learned import places
+from echomodel.compact.model import CompactModel, read_weights, words_of
+from echomodel.vocabulary import vocabulary
 
 
 def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
@@ -22,12 +23,7 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
     Raises:
         ValueError: the file cannot be read, or a tensor of it is larger than the model's.
     """
-    try:
-        with safe_open(path, "pt") as handle:
-            header = handle.metadata() or {}
-            given: dict[str, Tensor] = {key: handle.get_tensor(key) for key in handle.keys()}  # noqa: SIM118
-    except (OSError, SafetensorError) as error:
-        raise ValueError(f"{path}: not a readable safetensors file ({error})") from None
+    header, given = read_weights(path)
     own = model.state_dict()
     for key, value in given.items():
         if key not in own:
@@ -41,5 +37,15 @@ def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:
             wanted[tuple(slice(0, size) for size in value.shape)] = value.to(wanted.dtype)
     parts = tuple(part for part in json.loads(header.get("parts", "[]")) if part in model.parts)
     if "layout" in parts:
-        model.statistics = BoxStatistics.from_json(json.loads(header["statistics"]))
+        statistics = BoxStatistics.from_json(json.loads(header["statistics"]))
+        model.statistics = replace(statistics, classes=_grown(statistics.classes, model, path, header))
     return parts
+
+
+def _grown(
+    classes: tuple[tuple[float, ...], ...], model: CompactModel, path: Path, header: dict[str, str]
+) -> tuple[tuple[float, ...], ...]:
+    """Statistics of the model's categories from those of a file's; what is new has those of what it is like."""
+    names, words = model.config.categories, vocabulary()
+    numbers = torch.tensor([words.category_id(name) for name in names])
+    return classes and tuple(classes[k] for k in places("categories", words_of(path, header)["categories"], numbers))

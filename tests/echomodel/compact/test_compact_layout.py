@@ -10,7 +10,7 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.echo import EchoLayer, pair_messages
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, inverse_predicates, pairs_of
-from echomodel.config import CompactConfig, from_dict
+from echomodel.config import CompactConfig, from_dict, names_of
 from echomodel.graph import GraphBatch
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
@@ -45,7 +45,7 @@ def run(model: CompactModel, graph: GraphBatch, boxes: Tensor, level: Tensor) ->
 
 def test_pairs_against_loops() -> None:
     graph = GraphBatch.pack([random_graph(4, 9, 0), random_graph(1, 0, 1), random_graph(3, 5, 2)])
-    pairs, inverse = pairs_of(graph), inverse_predicates()
+    pairs, inverse = pairs_of(graph), inverse_predicates(names_of("predicates"))
     expected = []
     for i in range(graph.num_nodes):
         for j in range(graph.num_nodes):

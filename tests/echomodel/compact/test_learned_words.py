@@ -1,0 +1,165 @@
+"""Weights name their words: where those stand in the vocabulary means nothing, and what they do not know is said."""
+
+import json
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+from echomodel.boxes import BoxStatistics
+from echomodel.compact.learned import WordTable, places
+from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
+from echomodel.config import CompactConfig, from_dict
+from echomodel.data.rooms import generate_rooms
+from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.echo import EchoModel
+from echomodel.graph import GraphBatch
+from echomodel.training.parts_stage import PartsStage
+from echomodel.training.recipe import Recipe
+from echomodel.training.start import started
+from echomodel.vocabulary import speaking, vocabulary
+
+WORDS = vocabulary()
+SIZES = {"latent": {"width": 8, "layers": 1}, "furniture": {"width": 8, "layers": 1}}
+
+
+def shuffled(seed=3):
+    """The vocabulary with all its rows elsewhere."""
+    dice = random.Random(seed)
+    rows = {kind: getattr(WORDS, kind) for kind in ("categories", "predicates", "room_types")}
+    return replace(WORDS, **{kind: tuple(dice.sample(of, len(of))) for kind, of in rows.items()})
+
+
+def rooms_of(model, rooms):
+    """Boxes and descriptions of rooms, by the words that are spoken."""
+    graph = GraphBatch.pack([GraphBatch.from_room(room) for room in rooms])
+    boxes = model.sample_layout(graph, generator=torch.Generator().manual_seed(1), steps=3)
+    found = model.sample_furniture(graph, boxes, generator=torch.Generator().manual_seed(2), steps=3)
+    return boxes.size, boxes.position, boxes.yaw, found
+
+
+def test_rows_may_stand_anywhere():
+    model, rooms = EchoModel.load(), generate_rooms(3, 5)
+    before = rooms_of(model, rooms)
+    with speaking(shuffled()):
+        after = rooms_of(model, rooms)
+    assert all(torch.equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+def test_a_new_row_changes_nothing_wherever_it_stands():
+    model, rooms = EchoModel.load(), generate_rooms(2, 7)
+    before = rooms_of(model, rooms)
+    cooker = replace(WORDS.category("cabinet"), name="a_cooker", like="dresser", aliases=())
+    kitchen = replace(WORDS.room_type("study"), name="a_kitchen", like="dining_room", aliases=())
+    first = replace(WORDS, categories=(cooker, *WORDS.categories), room_types=(kitchen, *WORDS.room_types))
+    with speaking(first):
+        after = rooms_of(model, rooms)
+        graph = GraphBatch.single([first.category_id("a_cooker")], room_type=first.room_type_id("a_kitchen"))
+        assert model.unlearned(graph) == (
+            "the weights do not know the category a_cooker: generated as dresser",
+            "the weights do not know the room type a_kitchen: generated as dining_room",
+        )
+        known = GraphBatch.single([first.category_id("dresser")], room_type=first.room_type_id("dining_room"))
+        assert model.unlearned(known) == ()
+        layouts = [model.sample_layout(g, generator=torch.Generator().manual_seed(1), steps=2) for g in (graph, known)]
+    assert all(torch.equal(a, b) for a, b in zip(before, after, strict=True))
+    # what guides the last steps are rules about the room, which ask for the word itself; sizes are the network's
+    assert torch.equal(layouts[0].size, layouts[1].size)
+
+
+def test_likeness_is_followed_and_its_end_is_named():
+    spinet = replace(WORDS.category("cabinet"), name="spinet", like="harp", aliases=())
+    harp = replace(spinet, name="harp", like="bookshelf")
+    with speaking(replace(WORDS, categories=(spinet, harp, *WORDS.categories))):
+        found = places("categories", ("sofa", "bookshelf"), torch.tensor([0, 1]))
+        assert found.tolist() == [1, 1]
+        with pytest.raises(ValueError, match="these weights know neither 'spinet' nor 'harp', which its row names as"):
+            places("categories", ("sofa",), torch.tensor([0]))
+        harp = replace(harp, like="spinet")
+    circle = replace(WORDS, categories=(spinet, harp, *WORDS.categories))
+    with speaking(circle), pytest.raises(ValueError, match="neither 'spinet' nor 'harp'"):
+        WordTable("categories", ("sofa", "bookshelf"), 4)(torch.tensor([0]))
+
+
+def test_a_word_that_was_renamed_keeps_its_row():
+    rows = [replace(r, name="couch", aliases=("sofa",)) if r.name == "sofa" else r for r in WORDS.categories]
+    likes = [replace(r, like="couch") if r.like == "sofa" else r for r in rows]
+    likes = [replace(r, belongs_to=tuple("couch" if w == "sofa" else w for w in r.belongs_to)) for r in likes]
+    likes = [replace(r, admits=tuple(("couch" if w == "sofa" else w, s) for w, s in r.admits)) for r in likes]
+    number = WORDS.category_id("sofa")
+    with speaking(replace(WORDS, categories=tuple(likes), room_types=(), habits=())):
+        assert places("categories", ("chair", "sofa"), torch.tensor([number])).tolist() == [1]
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A small model's weights file, which knows the vocabulary of today."""
+    torch.manual_seed(0)
+    boxes = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3)
+    model = CompactModel(from_dict(CompactConfig, SIZES), boxes, ("latent", "furniture"))
+    save_weights(tmp_path / "small.safetensors", model, model.parts, half=False)
+    return tmp_path / "small.safetensors"
+
+
+def bent(path, **config):
+    with safe_open(path, "pt") as file:
+        metadata, tensors = file.metadata(), {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    metadata["config"] = json.dumps({**json.loads(metadata["config"]), **config})
+    save_file(tensors, path, metadata=metadata)
+    return path
+
+
+def test_files_name_their_words(small):
+    with speaking(shuffled()):
+        model, _ = load_weights([small])
+        assert model.config.categories == tuple(row.name for row in WORDS.categories)
+        assert model.config.predicates == tuple(row.name for row in WORDS.predicates if row.sgfront)
+
+
+def test_words_that_do_not_fit_are_refused_by_name(small):
+    names = [row.name for row in WORDS.categories]
+    with pytest.raises(WeightsError, match=r"small\.safetensors: names 'armchair' twice among its categories"):
+        load_weights([bent(small, categories=[*names, names[0]])])
+    with pytest.raises(WeightsError, match=r"misshapen .*category\.weight"):
+        load_weights([bent(small, categories=names[1:])])
+
+
+def test_a_training_goes_on_in_the_words_of_its_start(small):
+    recipe = Recipe("parts", 1, start=(str(small),), model=from_small())
+    with speaking(shuffled()):
+        assert started(PartsStage, recipe, torch.device("cpu"), resume=False).model.config.categories == tuple(
+            row.name for row in WORDS.categories
+        )
+
+
+def test_a_warm_start_adds_the_words_that_are_new(small):
+    harp = replace(WORDS.category("cabinet"), name="a_harp", like="dresser", aliases=())
+    recipe = replace(Recipe("parts", 1), warm=(str(small),))
+    given, _ = load_weights([small])
+    with speaking(replace(WORDS, categories=(harp, *WORDS.categories))):
+        recipe = replace(recipe, model=from_small())
+        model = started(PartsStage, recipe, torch.device("cpu"), resume=False).model
+        assert model.config.categories == (*given.config.categories, "a_harp")
+        sofa = vocabulary().category_id("sofa")
+        assert torch.equal(model.furniture.category(torch.tensor([sofa])), given.furniture.category.weight[[sofa - 1]])
+
+
+def from_small():
+    return from_dict(CompactConfig, SIZES)
+
+
+def test_a_room_set_names_its_words(tmp_path):
+    build_rooms(tmp_path, 4, 3, styles=5)
+    before = [RoomSet(tmp_path).room(k) for k in range(4)]
+    with speaking(shuffled()):
+        after = RoomSet(tmp_path)
+        for old, new in zip(before, (after.room(k) for k in range(4)), strict=True):
+            assert (old.categories, old.room_type) == (new.categories, new.room_type)
+            assert np.array_equal(old.relations, new.relations)
+        graph = after.batch([0]).graph
+        assert [vocabulary().categories[k].name for k in graph.category.tolist()] == list(before[0].categories)
+        assert vocabulary().room_types[int(graph.room_type[0])].name == before[0].room_type
