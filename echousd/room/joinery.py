@@ -10,21 +10,12 @@ from scipy.spatial import ConvexHull, QhullError
 
 from echomodel.data.furniture.assembly import Piece, pieces_of
 from echomodel.data.furniture.solids import FINEST, Solid
-from echomodel.triangles import area_normals, cross
+from echomodel.triangles import area_normals
 from echousd.room.ballast import ballasted
 from echousd.room.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
+from echousd.room.matter import weighed
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
-# kg/m³ of what a solid stands for: tubes and shades are hollow, upholstery is foam on a light frame.
-DENSITY = {
-    "wood": 600.0, "accent": 650.0, "fabric": 70.0, "metal": 2600.0, "glass": 2500.0, "ceramic": 900.0, "leaf": 120.0,
-    "soil": 900.0, "shade": 150.0, "screen": 900.0, "cushion": 50.0, "linen": 60.0, "blanket": 60.0, "mirror": 2500.0,
-    "book": 650.0, "stem": 500.0, "rug": 250.0, "curtain": 120.0, "accent_cloth": 60.0, "picture_0": 300.0,
-    "picture_1": 300.0, "picture_2": 300.0, "rug_striped": 250.0, "rug_lattice": 250.0, "accent_plain": 60.0,
-    "frame": 600.0,
-    "paper": 700.0, "book_a": 650.0, "book_b": 650.0, "book_c": 650.0, "book_d": 650.0, "petal": 120.0, "fruit": 800.0,
-    "wax": 900.0, "wicker": 150.0, "leather": 300.0,
-}  # fmt: skip
 # role of a solid -> name of the part that all of its kind are in, where they differ
 GROUPS = {
     "leg": "legs", "rail": "rails", "arm": "arms", "side": "case", "bottom": "case", "shelf": "shelves",
@@ -68,13 +59,13 @@ def assembled(
         hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
         colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
-        masses[body] = mass_of(own)
+        masses[body] = weighed(own)
     joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
     fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
     coarse: list[Part] = []
     for body, members in _bodies(low, fixed).items() if fewer else ():
         coarse += _parts(f"{body}_" if body != fixed else "", members, body)
-    whole = ballasted(mass_of(plain), [piece.vertices for piece in plain])
+    whole = ballasted(weighed(plain), [piece.vertices for piece in plain])
     return Geometry(
         tuple(parts), tuple(colliders), origin, mass=whole, joints=tuple(joints.values()),
         masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
@@ -172,30 +163,3 @@ def _hull(points: np.ndarray) -> trimesh.Trimesh:
     faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
     used, index = np.unique(faces, return_inverse=True)
     return trimesh.Trimesh(points[used], index.reshape(-1, 3), process=False)
-
-
-def _enclosed(piece: Piece) -> float:
-    """The volume inside a closed mesh, m³."""
-    one, two, three = (piece.vertices - piece.vertices[0])[piece.faces].transpose(1, 0, 2)
-    return float((one * cross(two, three)).sum() / 6)
-
-
-def mass_of(pieces: Sequence[Piece]) -> Mass:
-    """Mass, centre of mass and moments of inertia from volumes and densities; overlaps count twice."""
-    weight, centre, inertia = [], [], []
-    for piece in pieces:
-        volume, extent = abs(_enclosed(piece)), np.ptp(piece.vertices, axis=0)
-        kg = max(volume, 1e-7) * DENSITY[piece.solid.material]
-        weight.append(kg)
-        centre.append((piece.vertices.max(0) + piece.vertices.min(0)) / 2)
-        inertia.append(kg / 12 * np.diag((extent**2).sum() - extent**2))
-    total, places = float(np.sum(weight)), np.array(centre)
-    middle = (np.array(weight)[:, None] * places).sum(0) / total
-    away = places - middle
-    tensor = np.sum(inertia, axis=0) + sum(
-        kg * ((r @ r) * np.eye(3) - np.outer(r, r)) for kg, r in zip(weight, away, strict=True)
-    )
-    values, axes = np.linalg.eigh(tensor)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    return Mass(total, middle, values, axes)

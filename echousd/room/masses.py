@@ -23,12 +23,13 @@ def mass_of(geometry: Geometry, category: str) -> Mass:
     Arguments:
         geometry: of the piece. category: its word, which has a density of the piece's whole box.
 
-    An estimate takes the matter to fill the convex hulls of the colliders evenly; it weighs 0.2 kg at least.
+    An estimate takes the matter to fill the convex hulls of the colliders evenly; it is within what real ones weigh.
     """
     if geometry.mass is not None:
         return geometry.mass
     size = np.ptp(geometry.mesh.bounds, axis=0)
-    kilograms = round(max(0.2, float(np.prod(size)) * density(category)), 2)
+    low, high = (0.2, np.inf) if category == OBSTACLE else vocabulary().category(category).kg
+    kilograms = round(float(np.clip(np.prod(size) * density(category), low, high)), 2)
     middle, tensor = _spread(geometry.colliders)
     moments, axes = np.linalg.eigh(kilograms * tensor)
     mass = Mass(kilograms, middle, np.maximum(moments, LEAST_INERTIA), axes)

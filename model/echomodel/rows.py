@@ -25,6 +25,8 @@ class Category:
         role: what people use it for, one of `ROLES`.
         look: how its materials are laid out (`echousd.room.looks.BANDS`).
         density: mass over the volume of the whole box, kg/m³ (furniture is mostly hollow).
+        kg: (lightest, heaviest) of real ones, with what belongs to them (mattress, books, soil); docs/MASSES.md says
+            who weighed them.
         ade20k: its name among the 150 classes of ADE20K.
         colour: of its boxes in pictures of graphs, `#rrggbb`.
         front: one side of it is its front; what has none may stand at any heading.
@@ -58,6 +60,7 @@ class Category:
     look: str
     density: float
     ade20k: str
+    kg: tuple[float, float] = (0.2, 500.0)
     colour: str = "#eeeeee"
     front: bool = True
     wall: bool = False

@@ -94,7 +94,8 @@ def test_rows_say_what_a_category_is_for():
     assert WORDS.category("wardrobe").wall
     assert WORDS.category("wardrobe").access > 0.5
     for entry in WORDS.categories:
-        assert 5 < entry.density < 200
+        assert 5 < entry.density < 250
+        assert 0 < entry.kg[0] < entry.kg[1] <= 300
         assert entry.access >= 0
         assert entry.support == "floor" or not entry.wall
 

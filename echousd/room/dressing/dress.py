@@ -16,7 +16,8 @@ from echousd.room.dressing import bareness, corners, floors, hangings, tabletops
 from echousd.room.dressing.nodes import graph_of
 from echousd.room.dressing.setting import Setting, Thing, standing
 from echousd.room.geometry import Geometry, Origin
-from echousd.room.joinery import mass_of, part_of, within_budget
+from echousd.room.joinery import part_of, within_budget
+from echousd.room.matter import weighed
 from echousd.room.room import RoomData
 from echousd.sight import Furniture
 
@@ -144,4 +145,4 @@ def geometry_of(found: Thing) -> Geometry:
     solids = solids_of(found.kind, found.size, np.random.default_rng(found.variant))
     pieces = within_budget(solids, found.size, kind.faces)
     part = part_of("mesh", pieces)
-    return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, mass_of(pieces))
+    return Geometry((part,), (standing_hull(part.mesh),), ORIGIN, weighed(pieces))

@@ -96,6 +96,7 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
 
     import echousd
     from echousd.checks.mesh_rules import extents
+    from echousd.checks.reading import Reading
     from echousd.graph import Node, RoomSpec, SceneGraph
 
     graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("chest", "dresser", size=(0.9, 1.0, 0.45)),), ())
@@ -127,7 +128,7 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     drawer.AddTranslateOp().Set((0.0, 0.0, 0.4))
     for state in ("articulated", "static"):  # pulled out, it is as good
         chest.GetVariantSet("articulation").SetVariantSelection(state)
-        assert [str(found.path) for found in extents(stage)] == []
+        assert [str(found.path) for found in extents(Reading(stage))] == []
 
 
 def test_the_benchmark_weighs_what_a_room_writes(tmp_path):

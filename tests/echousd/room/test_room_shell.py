@@ -13,6 +13,7 @@ import echousd
 from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
 from echousd.checks import check
 from echousd.checks.mesh_rules import extents
+from echousd.checks.reading import Reading
 from echousd.graph import RoomSpec
 from echousd.room.room import RoomOptions
 from echousd.room.walls import WALL, ceiling, outline, walls
@@ -148,4 +149,4 @@ def test_doors_articulate(tmp_path) -> None:
         for state in ("articulated", "static"):  # opened, it is as good
             door.GetVariantSets().SetSelection("articulation", state)
             leaf.GetAttribute("xformOp:rotateY").Set(90.0)
-            assert [one.message for one in extents(stage)] == []
+            assert [one.message for one in extents(Reading(stage))] == []
