@@ -6,15 +6,22 @@ import io
 import stat
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Ar
+
+from echomodel.files import within_memory
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 MAX_BYTES = 256 * 2**20
 MAX_PIXELS = 8192 * 8192
 # Pillow would also run Ghostscript for EPS; these it decodes itself.
 FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "WEBP", "GIF", "AVIF")
 READABLE = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff", ".webp", ".gif", ".avif")
+STRIP = 256  # rows
 GREY = 188  # sRGB of what is not there
 
 
@@ -63,13 +70,16 @@ def decoded(content: bytes, path: str) -> np.ndarray:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # our own limit is below
         try:
-            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
+            with (
+                within_memory(Path(path), path, size=len(content)),
+                Image.open(io.BytesIO(content), formats=FORMATS) as image,
+            ):
                 width, height = image.size
                 if width * height > MAX_PIXELS:
                     raise TextureError(
                         f"{path}: an image of {width} x {height} pixels, allowed: {MAX_PIXELS} (8192 x 8192)"
                     )
-                return np.asarray(image.convert("RGB"))
+                return _rgb(image)
         except TextureError:
             raise
         except Image.DecompressionBombError:
@@ -77,3 +87,13 @@ def decoded(content: bytes, path: str) -> np.ndarray:
         except Exception as error:  # decoders fail on damaged files in every way there is
             reason = str(error) if not isinstance(error, Image.UnidentifiedImageError) else "of no known format"
             raise TextureError(f"{path}: not an image that can be read ({reason or type(error).__name__})") from None
+
+
+def _rgb(image: Image) -> np.ndarray:
+    """(h, w, 3) uint8 of an image, converted a strip at a time: a second copy of a large one is not held."""
+    image.load()
+    out = np.empty((image.height, image.width, 3), np.uint8)
+    for top in range(0, image.height, STRIP):
+        strip = image.crop((0, top, image.width, min(top + STRIP, image.height)))
+        out[top : top + STRIP] = np.asarray(strip.convert("RGB"))
+    return out

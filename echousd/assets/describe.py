@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues.entry import Entry
 from echousd.assets.colors import dominant
@@ -45,7 +46,8 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
         tags=entry.tags,
     )
     try:
-        record = replace(record, sha256=digest_of(entry.file))
+        with within_memory(entry.file.path, str(entry.file)):
+            record = replace(record, sha256=digest_of(entry.file))
         return _read(record, entry, measure(entry.file, painted=full), full, encoder)
     except ValueError as error:
         return replace(record, fault=str(error))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from echomodel.files import within_memory
 from echousd.assets.colors import Coat, flat, pixels
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import STAGES, ModelFile
@@ -24,12 +25,8 @@ def measure(model: ModelFile, *, painted: bool = False) -> Measured:
     Raises ValueError that names the file for one that cannot be read or has no surface.
     """
     try:
-        if model.suffix in STAGES:
-            with model.opened():
-                pass
-            found = measured_stage(model.path, model.prim, painted=painted)
-        else:
-            found = _mesh(model, painted)
+        with within_memory(model.path, str(model)):
+            found = _measured(model, painted)
     except ImportError:
         raise
     except Exception as error:  # readers fail on damaged files in every way there is
@@ -50,6 +47,14 @@ def measure(model: ModelFile, *, painted: bool = False) -> Measured:
     if np.ptp(found.points, axis=0).max() <= 0:
         raise ValueError(f"{model}: all points of its triangles are one")
     return found
+
+
+def _measured(model: ModelFile, painted: bool) -> Measured:
+    if model.suffix not in STAGES:
+        return _mesh(model, painted)
+    with model.opened():
+        pass
+    return measured_stage(model.path, model.prim, painted=painted)
 
 
 def _mesh(model: ModelFile, painted: bool) -> Measured:

@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from echomodel.files import whole_file
+from echomodel.files import whole_file, within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.colors import MOST
 from echousd.assets.model_file import check_reach
@@ -118,11 +118,16 @@ def _read(file: Path, changed: int) -> Library:
         size = unpacked(pa.parquet.read_metadata(file))
         if size > LARGEST:
             raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
-        table = pa.parquet.read_table(file)
-        about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
-    except (pa.ArrowException, OSError, ValueError) as error:
+        with within_memory(file):
+            return _library(file, pa.parquet.read_table(file))
+    except (pa.ArrowException, OSError, ValueError) as error:  # words that are no UTF-8, too
         reason = str(error).splitlines()[0]
-        raise ValueError(f"{file}: cannot be read as an index ({reason:.120})") from None
+        told = reason if reason.startswith(f"{file}: ") else f"{file}: cannot be read as an index ({reason:.120})"
+        raise ValueError(told) from None
+
+
+def _library(file: Path, table: Any) -> Library:
+    about = json.loads((table.schema.metadata or {}).get(KEY, b"null"))
     version = about.get("version") if isinstance(about, dict) else None
     absent = () if version == VERSION else OLDER.get(version) if isinstance(version, int) else None
     if absent is None:
@@ -133,11 +138,7 @@ def _read(file: Path, changed: int) -> Library:
     if wrong:
         raise ValueError(f"{file}: columns {', '.join(wrong)} are missing or of another type; index the folder again")
     records: dict[str, AssetRecord] = {}
-    try:
-        rows = table.select([column.name for column in wanted]).to_pylist()
-    except ValueError as error:  # words that are no UTF-8
-        raise ValueError(f"{file}: cannot be read as an index ({error})") from None
-    for row in rows:
+    for row in table.select([column.name for column in wanted]).to_pylist():
         empty = [name for name, value in row.items() if value is None or (isinstance(value, list) and None in value)]
         if empty:
             raise ValueError(f"{file}: row {len(records) + 1} has no {empty[0]}; index the folder again")

@@ -33,12 +33,13 @@ HERE = (
 )  # fmt: skip
 ELSEWHERE = "a URL of another machine, such as s3://bucket/night"
 PACK, LEAST = 32, 4  # rooms whose layouts are sampled together; part of the plan, as sums round by what is packed
+MOST = 1_000_000  # rooms of a run: a plan is held in memory
 SHELF = 1000  # rooms in one folder
 
 Item = TypeVar("Item")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """One room of the plan.
 
@@ -130,6 +131,8 @@ def make_plan(request: BatchRequest, weights: str, to: str = "", outside: Sequen
 
     def add(name: str, origin: str, digest: str, copy: int, draw: Any = None, error: str = "") -> None:
         number = len(entries)
+        if number == MOST:
+            raise ValueError(f"{origin}: more than {MOST} rooms, allowed in one run: that many")
         chosen = sets.setdefault(request.chosen(copy), len(sets))
         seed = request.seed + copy
         origin, error = (text.encode("utf-8", "replace").decode() for text in (origin, error))  # of odd file names

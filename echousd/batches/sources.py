@@ -8,11 +8,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from echomodel.files import within_memory
 from echousd.assets.table import LARGEST, unpacked
 from echousd.graph import GraphError, SceneGraph
 from echousd.graph.files import MAX_BYTES, STAGE_FORMS, TEXT_FORMS, load_graph
 
 MANY = (".jsonl", ".parquet")
+AT_ONCE = 64  # graphs of a table that are held in memory
 FORMS = (*TEXT_FORMS, *STAGE_FORMS)
 
 
@@ -149,7 +151,7 @@ def _lines(path: Path) -> Iterator[Found]:
                 if len(line) > MAX_BYTES:
                     raise ValueError(f"{path}:{number}: more than {MAX_BYTES} characters, allowed for a scene graph")
                 if line.strip():
-                    yield _text(line, f"{path.as_posix()}:{number}", path.stem)
+                    yield _text(path, number, line)
     except OSError as error:
         raise ValueError(f"{path}: {(error.strerror or str(error)).lower()}") from None
 
@@ -165,19 +167,29 @@ def _rows(path: Path) -> Iterator[Found]:
             size = unpacked(file.metadata)
             if size > LARGEST:
                 raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
-            texts = file.read(columns=["graph"]).column("graph").to_pylist()
+            if "graph" not in file.schema_arrow.names:
+                raise ValueError("it has none")
+            number, packs = 0, file.iter_batches(AT_ONCE, columns=["graph"])
+            while True:
+                with within_memory(path):
+                    pack = next(packs, None)
+                    texts = () if pack is None else pack.column(0).to_pylist()
+                if pack is None:
+                    return
+                for number, text in enumerate(texts, number + 1):
+                    yield _text(path, number, text if isinstance(text, str) else "")
     except (ArrowException, OSError, ValueError, KeyError) as error:
         raise ValueError(f"{path}: no Parquet file with a column 'graph' ({str(error).splitlines()[0]:.160})") from None
-    for number, text in enumerate(texts, 1):
-        yield _text(text if isinstance(text, str) else "", f"{path.as_posix()}:{number}", path.stem)
 
 
-def _text(text: str, origin: str, name: str) -> Found:
+def _text(path: Path, number: int, text: str) -> Found:
+    origin = f"{path.as_posix()}:{number}"
     try:
-        raw = json.loads(text)
-        inner = raw.get("graph") if isinstance(raw, dict) else None
-        if isinstance(inner, dict | str):  # a record around the graph, such as a room's manifest
-            text = inner if isinstance(inner, str) else json.dumps(inner)
-        return Found(origin, name, SceneGraph.from_json(text).to_json())
+        with within_memory(path, "it", size=len(text)):
+            raw = json.loads(text)
+            inner = raw.get("graph") if isinstance(raw, dict) else None
+            if isinstance(inner, dict | str):  # a record around the graph, such as a room's manifest
+                text = inner if isinstance(inner, str) else json.dumps(inner)
+            return Found(origin, path.stem, SceneGraph.from_json(text).to_json())
     except (GraphError, ValueError, RecursionError) as error:
-        return Found(origin, name, error=f"{origin}: {error}")
+        return Found(origin, path.stem, error=f"{origin}: {error}")

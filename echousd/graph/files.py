@@ -8,7 +8,7 @@ import stat
 from pathlib import Path
 from typing import Literal
 
-from echomodel.files import whole_file
+from echomodel.files import whole_file, within_memory
 from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph
 from echousd.graph.text import graph_from_text
@@ -41,12 +41,16 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
         if found.st_size > MAX_BYTES:
             size = math.ceil(found.st_size / 2**20 * 10) / 10  # up, so that it never says what is allowed
             raise GraphError(f"{path}: {size:g} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
-        text = path.read_text("utf-8-sig")
+        with within_memory(path):
+            return graph_from_text(SceneGraph, path.read_text("utf-8-sig"), TEXT_FORMS[path.suffix.lower()], str(path))
     except UnicodeDecodeError as error:
         raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None
     except OSError as error:
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
-    return graph_from_text(SceneGraph, text, TEXT_FORMS[path.suffix.lower()], str(path))
+    except GraphError:
+        raise
+    except ValueError as error:
+        raise GraphError(str(error)) from None
 
 
 def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:

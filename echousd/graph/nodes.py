@@ -35,10 +35,13 @@ class PlainModel(BaseModel, metaclass=_Plain):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     def __init__(self, **fields: Any) -> None:
+        fault = None
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise self._explained(fields, error) from None
+            fault = self._explained(fields, error)
+        if fault is not None:  # raised above, the two would hold each other, which pydantic's has no way to tell
+            raise fault
 
     @classmethod
     def _explained(cls, fields: dict[str, Any], error: ValidationError) -> GraphError:

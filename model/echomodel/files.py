@@ -6,6 +6,8 @@ import json
 import os
 import shutil
 import stat
+import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +15,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+
+HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
+EACH = 16  # and for each of its bytes: plain data takes more than its text
 
 
 @contextmanager
@@ -85,6 +90,37 @@ def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
         if found.st_size > most:
             raise ValueError(f"{path}: {found.st_size} bytes, allowed: at most {most}")
         return opened.read(most)
+
+
+@contextmanager
+def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Iterator[None]:
+    """Keep the process from holding much more than a file of somebody's has bytes while the block reads it.
+
+    Arguments:
+        path: of the file. name: what the error calls it, "" = its path. size: its bytes, None = as on the disk.
+
+    Raises ValueError that names the file where the block takes more than `HELD` and `EACH` times its bytes besides
+    what the process held before. Linux keeps count of that; on other systems nothing is limited here.
+    """
+    size = (path.stat().st_size if path.is_file() else 0) if size is None else size
+    most = HELD + EACH * size
+    if sys.platform != "linux":
+        yield
+        return
+    import resource  # no module of other systems
+
+    held = int(next(line for line in Path("/proc/self/status").open() if line.startswith("VmData")).split()[1]) << 10
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    limits = [held + most, *(limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY)]
+    resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))
+    try:
+        yield
+    except MemoryError as error:
+        traceback.clear_frames(error.__traceback__)  # what it had read by then
+        told = f"{name or path}: takes more memory to read than {most >> 20} MiB, allowed: that much for {size} bytes"
+        raise ValueError(told) from None
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
 def bounded_lines(file: BinaryIO, most: int, name: str | os.PathLike[str]) -> Iterator[bytes]:

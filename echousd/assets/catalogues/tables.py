@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from echomodel.files import read_bounded
+from echomodel.files import read_bounded, within_memory
 
 MAX_TEXT = 2**30  # bytes of one table, unpacked
 
@@ -19,10 +19,11 @@ MAX_TEXT = 2**30  # bytes of one table, unpacked
 def text_of(path: Path) -> str:
     """The text of a file, unpacked where it ends in `.gz`; raises ValueError that names it."""
     try:
-        content = read_bounded(path, MAX_TEXT)
-        if path.suffix == ".gz":
-            with gzip.open(io.BytesIO(content)) as file:
-                content = file.read(MAX_TEXT + 1)
+        with within_memory(path):
+            content = read_bounded(path, MAX_TEXT)
+            if path.suffix == ".gz":
+                with gzip.open(io.BytesIO(content)) as file:
+                    content = file.read(MAX_TEXT + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise ValueError(f"{path}: cannot be read ({error})") from None
     if len(content) > MAX_TEXT:
@@ -33,7 +34,8 @@ def text_of(path: Path) -> str:
 def json_of(path: Path) -> Any:
     """The plain data of a JSON file; raises ValueError that names it."""
     try:
-        return json.loads(text_of(path))
+        with within_memory(path):
+            return json.loads(text_of(path))
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{path}: cannot be read as JSON ({error})") from None
 
@@ -52,8 +54,9 @@ def json_lines(path: Path) -> Iterator[Mapping[str, Any]]:
 def rows_of(path: Path) -> list[dict[str, str]]:
     """The rows of a CSV table, its column names in lower case; raises ValueError that names it."""
     try:
-        reader = csv.DictReader(io.StringIO(text_of(path)))
-        return [{str(k).strip().lower(): v or "" for k, v in row.items() if isinstance(v, str)} for row in reader]
+        with within_memory(path):
+            reader = csv.DictReader(io.StringIO(text_of(path)))
+            return [{str(k).strip().lower(): v or "" for k, v in row.items() if isinstance(v, str)} for row in reader]
     except csv.Error as error:
         raise ValueError(f"{path}: cannot be read as a table ({error})") from None
 

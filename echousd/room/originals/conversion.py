@@ -15,6 +15,7 @@ import numpy as np
 import trimesh
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, Vt
 
+from echomodel.files import within_memory
 from echousd.assets.model_file import Beside, ModelFile, checked_image
 from echousd.room.assets import new_stage
 from echousd.room.originals.original import CONVERTED
@@ -58,14 +59,14 @@ def converted(model: ModelFile) -> Mapping[str, bytes]:
     """
     beside = model.beside()
     try:
-        with model.opened() as file, warnings.catch_warnings():
+        with within_memory(model.path, str(model)), model.opened() as file, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scene = trimesh.load_scene(file, file_type=model.suffix[1:], resolver=beside, process=False)
-        parts = list(_parts(scene))
-        if not parts:
-            raise ValueError(f"{model}: holds no triangles")
-        images = Images(beside)
-        layer = _layer(parts, images)
+            parts = list(_parts(scene))
+            if not parts:
+                raise ValueError(f"{model}: holds no triangles")
+            images = Images(beside)
+            layer = _layer(parts, images)
     except (ValueError, ImportError) as error:
         raise ValueError(str(error) if str(error).startswith(str(model)) else f"{model}: {error}") from None
     except Exception as error:  # readers fail on damaged files in every way there is

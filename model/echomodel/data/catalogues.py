@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from echomodel.files import within_memory
+
 MESH_FILES = (".obj", ".glb", ".gltf", ".ply", ".stl")
 CATALOGUE = "PluginFurnitureCatalog.properties"
 NOTICE = "LICENSE.TXT"
@@ -44,19 +46,24 @@ def read_library(path: Path) -> list[MeshEntry]:
     if not path.is_file():
         raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)")
     try:
-        with zipfile.ZipFile(path) as archive:
-            names = set(archive.namelist())
-            if CATALOGUE not in names:
-                raise ValueError(f"{path}: not a furniture library, it holds no {CATALOGUE}")
-            for name in names & {CATALOGUE, NOTICE}:
-                if archive.getinfo(name).file_size > MAX_TEXT:
-                    raise ValueError(f"{path}: {name} of {archive.getinfo(name).file_size} bytes, allowed: {MAX_TEXT}")
-            text = archive.read(CATALOGUE).decode("latin-1")
-            notice = archive.read(NOTICE).decode("latin-1") if NOTICE in names else ""
+        with within_memory(path):
+            return _library(path)
     except zipfile.BadZipFile:
         raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)") from None
     except (zlib.error, EOFError, RuntimeError) as error:  # damaged, encrypted, or packed in a way that nobody knows
         raise ValueError(f"{path}: cannot be unpacked ({error})") from None
+
+
+def _library(path: Path) -> list[MeshEntry]:
+    with zipfile.ZipFile(path) as archive:
+        names = set(archive.namelist())
+        if CATALOGUE not in names:
+            raise ValueError(f"{path}: not a furniture library, it holds no {CATALOGUE}")
+        for name in names & {CATALOGUE, NOTICE}:
+            if archive.getinfo(name).file_size > MAX_TEXT:
+                raise ValueError(f"{path}: {name} of {archive.getinfo(name).file_size} bytes, allowed: {MAX_TEXT}")
+        text = archive.read(CATALOGUE).decode("latin-1")
+        notice = archive.read(NOTICE).decode("latin-1") if NOTICE in names else ""
     head, items = _properties(text)
     licence = _plain(head.get("license", "")) or _licence_in(notice)
     entries = []
@@ -109,16 +116,8 @@ def load_mesh(entry: MeshEntry, loaders: Mapping[str, Loader] | None = None) -> 
     where = f"{entry.source}{'!' + entry.member if entry.member else ''}"
     suffix = Path(entry.member or entry.source).suffix.lower()
     try:
-        if entry.member:
-            with zipfile.ZipFile(entry.source) as archive:
-                data = archive.read(entry.member)
-            mesh = trimesh.load(
-                io.BytesIO(data), file_type=suffix[1:], force="mesh", process=False, skip_materials=True
-            )
-        elif loaders and suffix in loaders:
-            mesh = loaders[suffix](entry.source)
-        else:
-            mesh = trimesh.load(entry.source, force="mesh", process=False)
+        with within_memory(entry.source, where):
+            mesh = _loaded(entry, suffix, loaders or {})
     except Exception as error:  # a reader may fail with anything on a broken file
         raise ValueError(f"{where}: cannot be read ({type(error).__name__}: {error})") from None
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
@@ -135,6 +134,16 @@ def load_mesh(entry: MeshEntry, loaders: Mapping[str, Loader] | None = None) -> 
         lower, upper = plain.bounds
     plain.apply_translation([-(lower[0] + upper[0]) / 2, -lower[1], -(lower[2] + upper[2]) / 2])
     return plain
+
+
+def _loaded(entry: MeshEntry, suffix: str, loaders: Mapping[str, Loader]) -> object:
+    if entry.member:
+        with zipfile.ZipFile(entry.source) as archive:
+            data = io.BytesIO(archive.read(entry.member))
+        return trimesh.load(data, file_type=suffix[1:], force="mesh", process=False, skip_materials=True)
+    if suffix in loaders:
+        return loaders[suffix](entry.source)
+    return trimesh.load(entry.source, force="mesh", process=False)
 
 
 def _properties(text: str) -> tuple[dict[str, str], list[dict[str, str]]]:
