@@ -169,15 +169,16 @@ def _rows(path: Path) -> Iterator[Found]:
                 raise ValueError(f"{size} bytes when unpacked, allowed: {LARGEST}")
             if "graph" not in file.schema_arrow.names:
                 raise ValueError("it has none")
-            number, packs = 0, file.iter_batches(AT_ONCE, columns=["graph"])
+            before, packs = 0, file.iter_batches(AT_ONCE, columns=["graph"])
             while True:
                 with within_memory(path):
                     pack = next(packs, None)
                     texts = () if pack is None else pack.column(0).to_pylist()
                 if pack is None:
                     return
-                for number, text in enumerate(texts, number + 1):
+                for number, text in enumerate(texts, before + 1):
                     yield _text(path, number, text if isinstance(text, str) else "")
+                before += len(texts)
     except (ArrowException, OSError, ValueError, KeyError) as error:
         raise ValueError(f"{path}: no Parquet file with a column 'graph' ({str(error).splitlines()[0]:.160})") from None
 

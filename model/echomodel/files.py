@@ -89,7 +89,7 @@ def read_bounded(path: str | os.PathLike[str], most: int) -> bytes:
             raise ValueError(f"{path}: not a regular file, allowed: a file of at most {most} bytes")
         if found.st_size > most:
             raise ValueError(f"{path}: {found.st_size} bytes, allowed: at most {most}")
-        return opened.read(most)
+        return opened.read(found.st_size + 1)[:most]  # a reader makes room for all that it is asked for
 
 
 @contextmanager
@@ -109,7 +109,8 @@ def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Ite
         return
     import resource  # no module of other systems
 
-    held = int(next(line for line in Path("/proc/self/status").open() if line.startswith("VmData")).split()[1]) << 10
+    status = Path("/proc/self/status").read_text().split()
+    held = int(status[status.index("VmData:") + 1]) << 10
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     limits = [held + most, *(limit for limit in (soft, hard) if limit != resource.RLIM_INFINITY)]
     resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))

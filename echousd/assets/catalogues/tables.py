@@ -8,11 +8,13 @@ import io
 import json
 import zlib
 from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from echomodel.files import read_bounded, within_memory
 
+BLOCK = 2**16  # a reader makes room for all that it is asked for
 MAX_TEXT = 2**30  # bytes of one table, unpacked
 
 
@@ -23,7 +25,8 @@ def text_of(path: Path) -> str:
             content = read_bounded(path, MAX_TEXT)
             if path.suffix == ".gz":
                 with gzip.open(io.BytesIO(content)) as file:
-                    content = file.read(MAX_TEXT + 1)
+                    blocks = islice(iter(lambda: file.read(BLOCK), b""), MAX_TEXT // BLOCK + 1)
+                    content = b"".join(blocks)
     except (OSError, EOFError, zlib.error) as error:
         raise ValueError(f"{path}: cannot be read ({error})") from None
     if len(content) > MAX_TEXT:
