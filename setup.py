@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: three source folders make up the two packages.
+"""What pyproject.toml cannot say: three source folders make up the three packages.
 
 And how an editable install finds them.
 """
@@ -49,9 +49,9 @@ class Editable(editable_wheel):
 setup(
     packages=[
         *find_packages(".", include=["echousd", "echousd.*"]),
-        *find_packages("model", include=["echomodel", "echomodel.*"]),
+        *find_packages("model", include=["echomodel", "echomodel.*", "echoscene"]),
         "echousd.schemas",
     ],
-    package_dir={"echomodel": "model/echomodel", "echousd.schemas": "schemas"},
+    package_dir={"echomodel": "model/echomodel", "echoscene": "model/echoscene", "echousd.schemas": "schemas"},
     cmdclass={"editable_wheel": Editable},
 )

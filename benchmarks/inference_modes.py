@@ -30,10 +30,10 @@ from echomodel.compact.model import load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.released.compiled_shape import CompiledShape
-from echomodel.released.config import shape_unet
-from echomodel.released.packed import pack_linear_maps
-from echomodel.released.shape import ShapeUNet
+from echomodel.packed import pack_linear_maps
+from echoscene.compiled_shape import CompiledShape
+from echoscene.config import shape_unet
+from echoscene.shape import ShapeUNet
 
 Run = Callable[[], Tensor]
 LAST = torch.channels_last_3d

@@ -19,9 +19,9 @@ import machine
 from literal_networks import literal_layout
 from machine import alternate, report_machine, scene_graph, tally
 
-from echomodel.released.compiled_layout import CompiledLayout
-from echomodel.released.config import UNetConfig
-from echomodel.released.layout import LayoutNet
+from echoscene.compiled_layout import CompiledLayout
+from echoscene.config import UNetConfig
+from echoscene.layout import LayoutNet
 
 
 def main() -> int:

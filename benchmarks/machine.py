@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import torch
 
-from echomodel.released.packed import PackedLinear
+from echomodel.packed import PackedLinear
 
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 clock = "wall"  # "cpu" with one thread counts this process alone, whatever else runs on the machine

@@ -21,9 +21,9 @@ import machine
 from literal_networks import literal_shape
 from machine import alternate, report_machine
 
-from echomodel.released.compiled_shape import CompiledShape
-from echomodel.released.config import shape_unet
-from echomodel.released.shape import ShapeUNet
+from echoscene.compiled_shape import CompiledShape
+from echoscene.config import shape_unet
+from echoscene.shape import ShapeUNet
 
 
 def main() -> int:

@@ -30,15 +30,15 @@ def measure(tree: Path) -> None:
     import torch
 
     import echousd
-    from echomodel.released.config import UNetConfig
-    from echomodel.released.layout import LayoutNet
+    from echoscene.config import UNetConfig
+    from echoscene.layout import LayoutNet
     from echousd.graph import load_graph
     from echousd.stage import graph_layer, read_graph, save_layer
 
     try:
-        from echomodel.released.compiled_layout import CompiledLayout
+        from echoscene.compiled_layout import CompiledLayout
     except ImportError:  # as it was called once
-        from echomodel.released.frozen_layout import FrozenLayout as CompiledLayout  # type: ignore[no-redef]
+        from echoscene.frozen_layout import FrozenLayout as CompiledLayout  # type: ignore[no-redef]
     warnings.simplefilter("ignore")
     torch.set_num_threads(1)
     folder = Path(tempfile.mkdtemp())

@@ -54,7 +54,7 @@ def wheel(script):
     return {f"{package}/{name}" for package, _, _, names in build.data_files for name in names}
 
 
-@pytest.mark.parametrize("package", ["echousd", "echomodel"])
+@pytest.mark.parametrize("package", ["echousd", "echomodel", "echoscene"])
 def test_types_are_told_in_every_package(wheel, package):
     assert f"{package}/py.typed" in wheel
-    assert (ROOT / {"echousd": ".", "echomodel": "model"}[package] / package / "py.typed").is_file()
+    assert (ROOT / ("." if package == "echousd" else "model") / package / "py.typed").is_file()

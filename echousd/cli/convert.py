@@ -45,8 +45,8 @@ def convert(
         raise ValueError(f"{output}: the output's name must end by .safetensors")
     if output.exists() and not force:
         raise ValueError(f"{output}: exists already (--force replaces it)")
-    from echomodel import checkpoint
-    from echomodel.released.bounds import read_bounds
+    from echoscene import checkpoint
+    from echoscene.bounds import read_bounds
 
     statistics = read_bounds(bounds) if bounds else None
     names = classes.read_text("utf-8").split("\n") if classes else None

@@ -22,10 +22,10 @@ from echomodel.compact.predictors import agreeing, shape_predictor
 from echomodel.compact.wholeness import group_means, merit
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
+from echomodel.packed import pack_linear_maps
 from echomodel.progress import StepListener, part_of
 from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.randomness import Randomness
-from echomodel.released.packed import pack_linear_maps
 from echomodel.samplers import Predict, guided
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory

@@ -7,11 +7,17 @@ the last models that it loaded.
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
 
 from echomodel.protocols import RoomModel
 
 PRESETS = ("compact", "paper", "released")
+COMPACT = "echousd-compact-1"
+# format of a weights file -> class whose `load(path, device=...)` gives the model; imported when asked for
+LOADERS = {COMPACT: "echomodel.echo:EchoModel", "echousd-released-1": "echoscene.echo:ReleasedEcho"}
 
 
 def load_model(model: RoomModel | str | Path | None, preset: str | None = None, *, device: str = "cpu") -> RoomModel:
@@ -37,15 +43,20 @@ def load_model(model: RoomModel | str | Path | None, preset: str | None = None, 
 
 @lru_cache(maxsize=2)
 def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
-    from echomodel.released.weights import is_released
+    module, name = LOADERS.get(_format(path), LOADERS[COMPACT]).split(":")
+    found: RoomModel = getattr(import_module(module), name).load(path, device=device)
+    return found
 
-    if path is not None and is_released(path):
-        from echomodel.released.echo import ReleasedEcho
 
-        return ReleasedEcho.load(path, device=device)
-    from echomodel.echo import EchoModel
-
-    return EchoModel.load(path, device=device)
+def _format(path: Path | None) -> str:
+    """What a weights file says it is, "" for folders, files that say nothing and those that cannot be read."""
+    if path is None or path.is_dir():
+        return ""
+    try:
+        with safe_open(path, framework="pt") as file:
+            return (file.metadata() or {}).get("format", "")
+    except (OSError, SafetensorError):
+        return ""
 
 
 def _stamp(path: Path | None) -> tuple[tuple[str, int, int], ...]:

@@ -14,11 +14,11 @@ from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.objectives import clean_from
-from echomodel.released.config import PaperSizes, paper
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.model import ReleasedModel
-from echomodel.released.tables import LayoutTables
 from echomodel.text import ClipTextEncoder, TextEncoderError
+from echoscene.config import PaperSizes, paper
+from echoscene.encoder import SceneGraphTensors
+from echoscene.model import ReleasedModel
+from echoscene.tables import LayoutTables
 
 STATISTICS = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-2.0, -1.0, -2.0), (2.0, 1.0, 2.0), log_size=True)
 SIZES = {

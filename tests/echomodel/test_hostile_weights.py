@@ -12,7 +12,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from echomodel.echo import EchoModel
-from echomodel.released.weights import load_released
+from echoscene.weights import load_released
 
 
 @pytest.fixture(scope="module")

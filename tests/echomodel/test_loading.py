@@ -1,3 +1,7 @@
+import subprocess
+import sys
+from importlib import import_module
+
 import pytest
 
 from echomodel import loading
@@ -34,3 +38,19 @@ def test_another_preset_is_refused():
 
     with pytest.raises(ValueError, match="holds a model of the preset 'paper', asked for: 'released'"):
         load_model(Model(), "released")
+
+
+def test_formats_are_those_that_are_written():
+    from echomodel.compact.model import FORMAT
+    from echoscene.weights import FORMAT as PUBLISHED
+
+    assert set(loading.LOADERS) == {FORMAT, PUBLISHED}
+    assert loading.COMPACT == FORMAT
+    for place in loading.LOADERS.values():
+        module, name = place.split(":")
+        assert callable(getattr(import_module(module), name).load)
+
+
+def test_a_default_model_brings_no_published_network():
+    code = "import sys; from echomodel.loading import load_model; load_model(None); print('echoscene' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from echomodel.released.layout import LayoutNet
-from echomodel.released.shape import ShapeUNet
-from echomodel.released.unet import Down, ResBlock, SpatialTransformer, Up
+from echoscene.layout import LayoutNet
+from echoscene.shape import ShapeUNet
+from echoscene.unet import Down, ResBlock, SpatialTransformer, Up
 
 
 def _convolve(conv: Any, h: Tensor) -> Tensor:

@@ -6,7 +6,7 @@ from typing import Any
 
 from parity_numbers import Numbers
 
-from echomodel.released.config import EncoderConfig, UNetConfig, VQConfig
+from echoscene.config import EncoderConfig, UNetConfig, VQConfig
 
 
 def layout_config(numbers: Numbers) -> UNetConfig:

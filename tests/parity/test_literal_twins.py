@@ -10,12 +10,12 @@ from literal_networks import literal_layout, literal_shape
 from parity_numbers import close, fill
 from torch.nn import functional as F
 
-from echomodel.released.compiled_layout import CompiledLayout
-from echomodel.released.compiled_shape import CompiledShape
-from echomodel.released.config import UNetConfig, shape_unet
-from echomodel.released.layout import LayoutNet
-from echomodel.released.shape import ShapeUNet
-from echomodel.released.volumes import WinogradConv, convolve_repeated
+from echoscene.compiled_layout import CompiledLayout
+from echoscene.compiled_shape import CompiledShape
+from echoscene.config import UNetConfig, shape_unet
+from echoscene.layout import LayoutNet
+from echoscene.shape import ShapeUNet
+from echoscene.volumes import WinogradConv, convolve_repeated
 
 LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)
 SHAPE = shape_unet(width=32, mult=(1, 2), blocks=1, attention=(2,), context=48, objects=24, hidden=32, layers=2, grid=8)

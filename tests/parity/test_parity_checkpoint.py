@@ -9,9 +9,9 @@ import pytest
 import torch
 from parity_numbers import LISTINGS
 
-from echomodel.checkpoint import CheckpointError, build, class_names
-from echomodel.released.config import ReleasedConfig, released
-from echomodel.released.inference import infer_config
+from echoscene.checkpoint import CheckpointError, build, class_names
+from echoscene.config import ReleasedConfig, released
+from echoscene.inference import infer_config
 
 FILES = sorted(LISTINGS.glob("state_dict_*.json.gz"))
 

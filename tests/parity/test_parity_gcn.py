@@ -10,8 +10,8 @@ from parity_configs import encoder_config
 from parity_numbers import Numbers, close, value
 from torch import nn
 
-from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
-from echomodel.released.gcn import TripletGCN
+from echoscene.encoder import GraphEncoder, SceneGraphTensors
+from echoscene.gcn import TripletGCN
 
 
 @pytest.mark.parametrize("name", ["gcn", "gcn_noresidual"])

@@ -7,10 +7,10 @@ import torch
 from parity_configs import layout_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echomodel.released.compiled_layout import CompiledLayout
-from echomodel.released.layout import LayoutNet
-from echomodel.released.sampling import ancestral, layout_loss
-from echomodel.released.tables import LayoutTables
+from echoscene.compiled_layout import CompiledLayout
+from echoscene.layout import LayoutNet
+from echoscene.sampling import ancestral, layout_loss
+from echoscene.tables import LayoutTables
 
 
 def _net(numbers: Numbers) -> LayoutNet:

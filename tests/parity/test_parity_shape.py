@@ -7,11 +7,11 @@ import torch
 from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echomodel.released.compiled_shape import CompiledShape
-from echomodel.released.sampling import ddim, shape_loss
-from echomodel.released.shape import ShapeNet
-from echomodel.released.tables import DDIMGrid, ShapeTables
-from echomodel.released.vqvae import VQVAE
+from echoscene.compiled_shape import CompiledShape
+from echoscene.sampling import ddim, shape_loss
+from echoscene.shape import ShapeNet
+from echoscene.tables import DDIMGrid, ShapeTables
+from echoscene.vqvae import VQVAE
 
 
 def _net(numbers: Numbers) -> ShapeNet:

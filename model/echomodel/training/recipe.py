@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 from echomodel.config import CompactConfig, from_dict, with_settings
-from echomodel.released.config import PaperSizes
 
 Stage = Literal["vqvae", "layout", "shape", "parts", "joint", "paper_vqvae", "paper"]
 
@@ -87,7 +86,7 @@ class Recipe:
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
         threads: CPU threads, 0 = as many as torch likes.
-        model: sizes of the compact model. paper: sizes of the `paper` preset.
+        model: sizes of the compact model. paper: settings of the `paper` preset (`echoscene.config.PaperSizes`).
         optimizer: how to step.
     """
 
@@ -113,7 +112,7 @@ class Recipe:
     precision: Literal["float32", "bfloat16"] = "float32"
     threads: int = 0
     model: CompactConfig = field(default_factory=CompactConfig)
-    paper: PaperSizes = field(default_factory=PaperSizes)
+    paper: dict = field(default_factory=dict)
     optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)
 
     def __post_init__(self) -> None:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
+from importlib import import_module
 from pathlib import Path
 
 import torch
 
-from echomodel.data.roomset import RoomSet
-from echomodel.data.shapeset import ShapeSet
 from echomodel.training.autoencoder_stage import AutoencoderStage
 from echomodel.training.joint_stage import JointStage
 from echomodel.training.layout_stage import LayoutStage
-from echomodel.training.paper_stage import PaperStage, box_bounds, paper_model, text_encoder
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.shape_stage import ShapeStage
-from echomodel.training.start import CompactStage, data_folder, started
+from echomodel.training.start import CompactStage, started
 from echomodel.training.trainer import Report, Trainer
 
 STAGES: dict[str, type[CompactStage]] = {
@@ -26,6 +24,8 @@ STAGES: dict[str, type[CompactStage]] = {
     "joint": JointStage,
     "parts": PartsStage,
 }  # the stages of the compact model, as recipes name them
+# those of other models -> the module whose `opened` makes their trainer
+ELSEWHERE = {"paper": "echoscene.training", "paper_vqvae": "echoscene.training"}
 
 
 def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Report | None = None) -> Trainer:
@@ -46,8 +46,11 @@ def open_run(recipe: Recipe, folder: Path, *, resume: bool = False, report: Repo
     if int(os.environ.get("WORLD_SIZE", 1)) > 1 and not torch.distributed.is_initialized():
         torch.distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     torch.manual_seed(recipe.seed)
-    if recipe.stage in ("paper", "paper_vqvae"):
-        return _open_paper(recipe, folder, device, resume, report)
+    if recipe.stage in ELSEWHERE:
+        made: Trainer = import_module(ELSEWHERE[recipe.stage]).opened(
+            recipe, folder, device, resume=resume, report=report
+        )
+        return made
     kind = STAGES[recipe.stage]
     start = started(kind, recipe, device, resume=resume)
     return Trainer(recipe, start.model, kind.open(start), folder, resume=resume, report=report)
@@ -60,19 +63,3 @@ def own_device() -> torch.device:
     device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", 0)) % torch.cuda.device_count())
     torch.cuda.set_device(device)
     return device
-
-
-def _open_paper(recipe: Recipe, folder: Path, device: torch.device, resume: bool, report: Report | None) -> Trainer:
-    autoencoder = recipe.stage == "paper_vqvae"
-    if not autoencoder and not recipe.start and not resume:
-        raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
-    rooms, shapes = RoomSet(data_folder(recipe, "rooms")), ShapeSet(data_folder(recipe, "shapes"))
-    model = paper_model(recipe.paper, recipe.start)
-    if model.statistics is None:
-        model.statistics = box_bounds(rooms)
-    text = text_encoder(recipe.text, recipe.paper.text)
-    model.text_encoder = text.name  # every weights file says by whom its words were read
-    stage = PaperStage(
-        rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder
-    )
-    return Trainer(recipe, model.to(device), stage, folder, resume=resume, report=report)

@@ -16,11 +16,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor, nn
 
-from echomodel.compact.model import CompactModel
 from echomodel.config import to_json
 from echomodel.files import whole_file
 from echomodel.training.logs import RunLog, plot_log
-from echomodel.training.paper_stage import PaperModel
 from echomodel.training.recipe import Recipe
 
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
@@ -30,7 +28,7 @@ MAY_CHANGE = {
     "validate_every", "save_every", "log_every", "threads", "precision", "nodes", "scenes", "shapes_per_batch",
 }  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]
-Trainable = CompactModel | PaperModel
+Trainable = Any  # a module that names its `parts`, gives their parameters and writes them, as `CompactModel` does
 
 
 class TrainingStage(Protocol):

@@ -13,14 +13,14 @@ from pxr import Usd, UsdGeom
 from safetensors.torch import save_file
 from small_room import ball_tsdf, small_graph
 
-from echomodel.checkpoint import convert
-from echomodel.released.bounds import statistics_from_bounds
-from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
-from echomodel.released.model import ReleasedModel
-from echomodel.released.tables import LayoutTables
-from echomodel.released.vqvae import VQVAE
 from echomodel.roomboxes import RoomBoxes, write_rooms
 from echomodel.text import ClipTextEncoder
+from echoscene.bounds import statistics_from_bounds
+from echoscene.checkpoint import convert
+from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
+from echoscene.model import ReleasedModel
+from echoscene.tables import LayoutTables
+from echoscene.vqvae import VQVAE
 
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
 ENCODER = EncoderConfig(learned=8, flag=4, hidden=16, layers=2, separated=False)

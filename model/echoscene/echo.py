@@ -15,14 +15,14 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.protocols import touched_nodes
-from echomodel.released.editing import pack_changes, pack_scenes
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.grids import DISTANCE, LEVEL, published_grids, turned_back
-from echomodel.released.model import STRUCTURE, GraphChange, ReleasedModel
-from echomodel.released.scene import published_scene
-from echomodel.released.weights import load_released
 from echomodel.text import TextEncoder, encoder_named
 from echomodel.vocabulary import vocabulary
+from echoscene.editing import pack_changes, pack_scenes
+from echoscene.encoder import SceneGraphTensors
+from echoscene.grids import DISTANCE, LEVEL, published_grids, turned_back
+from echoscene.model import STRUCTURE, GraphChange, ReleasedModel
+from echoscene.scene import published_scene
+from echoscene.weights import load_released
 
 if TYPE_CHECKING:
     from echomodel.progress import StepListener

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from echomodel.released.config import EncoderConfig
-from echomodel.released.editing import pack_changes, pack_scenes, pseudo_graph, without_node
-from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
+from echoscene.config import EncoderConfig
+from echoscene.editing import pack_changes, pack_scenes, pseudo_graph, without_node
+from echoscene.encoder import GraphEncoder, SceneGraphTensors
 
 CONFIG = EncoderConfig(text=6, learned=4, flag=4, hidden=8, layers=2, separated=False)
 

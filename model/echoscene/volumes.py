@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from echomodel.released.packed import PackedLinear
+from echomodel.packed import PackedLinear
 
 
 def convolve_repeated(x: Tensor, weight: Tensor, bias: Tensor | None, doubled: tuple[bool, bool, bool]) -> Tensor:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.model import STRUCTURE
 from echomodel.text import TextEncoder, edge_text, node_text
 from echomodel.vocabulary import vocabulary
+from echoscene.encoder import SceneGraphTensors
+from echoscene.model import STRUCTURE
 
 
 def published_scene(

@@ -6,8 +6,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.config import VQConfig
-from echomodel.released.volumes import convolve_repeated
+from echoscene.config import VQConfig
+from echoscene.volumes import convolve_repeated
 
 
 def _norm(channels: int) -> nn.GroupNorm:

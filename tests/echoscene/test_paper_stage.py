@@ -12,19 +12,19 @@ from published_shapes import fit_to_box
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
-from echomodel.released.echo import ReleasedEcho
-from echomodel.released.grids import DISTANCE, published_grids, turned_back
-from echomodel.released.model import ReleasedModel
-from echomodel.released.tables import LayoutTables
-from echomodel.released.weights import load_released
 from echomodel.text import RandomTextEncoder, TextEncoder
 from echomodel.training.logs import read_log
-from echomodel.training.paper_stage import PaperModel, PaperStage, scene_boxes, text_encoder
 from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.run import open_run
 from echomodel.training.trainer import step_generator
+from echoscene.echo import ReleasedEcho
+from echoscene.grids import DISTANCE, published_grids, turned_back
+from echoscene.model import ReleasedModel
+from echoscene.tables import LayoutTables
+from echoscene.training import PaperModel, PaperStage, scene_boxes, text_encoder
+from echoscene.weights import load_released
 
-RECIPE = Path(__file__).parents[3] / "model" / "recipes" / "paper.toml"
+RECIPE = Path(__file__).parents[2] / "model" / "recipes" / "paper.toml"
 SMALL = {
     "text": 12, "learned": 4, "flag": 4, "hidden": 16, "layers": 2, "context": 32, "code": 8, "heads": 2,
     "layout_width": 128, "layout_mult": [1, 1], "shape_width": 32, "shape_mult": [1, 1], "blocks": 1,

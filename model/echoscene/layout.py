@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from echomodel.released.config import UNetConfig
-from echomodel.released.gcn import TripletGCN
-from echomodel.released.unet import UNet
+from echoscene.config import UNetConfig
+from echoscene.gcn import TripletGCN
+from echoscene.unet import UNet
 
 
 class LayoutNet(UNet):

@@ -14,12 +14,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
-from echomodel.released.layout import check_inputs, edge_input
-from echomodel.released.packed import PackedLinear, folded_norm
-from echomodel.released.shape import ShapeUNet
-from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, walk
-from echomodel.released.volumes import WinogradConv, convolve_repeated
+from echomodel.packed import PackedLinear, folded_norm
+from echoscene.compiled_echo import CompiledEcho, GraphIndex
+from echoscene.layout import check_inputs, edge_input
+from echoscene.shape import ShapeUNet
+from echoscene.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, walk
+from echoscene.volumes import WinogradConv, convolve_repeated
 
 LAST = torch.channels_last_3d
 WINOGRAD_VOXELS = 1024  # largest volume per object for which the transforms cost less than they save (measured)

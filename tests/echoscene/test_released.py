@@ -12,16 +12,16 @@ import trimesh
 from published_shapes import fit_to_box, mesh_from_grid, vertex_points
 
 from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, coverage, emd_matrix
-from echomodel.released.bounds import read_bounds, statistics_from_bounds
-from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, released, shape_unet
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.gcn import TripletGCN
-from echomodel.released.model import GraphChange, ReleasedModel
-from echomodel.released.sampling import node_budget
-from echomodel.released.scene import published_scene
-from echomodel.released.shape import ShapeUNet
-from echomodel.released.tables import LayoutTables
 from echomodel.vocabulary import vocabulary
+from echoscene.bounds import read_bounds, statistics_from_bounds
+from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, released, shape_unet
+from echoscene.encoder import SceneGraphTensors
+from echoscene.gcn import TripletGCN
+from echoscene.model import GraphChange, ReleasedModel
+from echoscene.sampling import node_budget
+from echoscene.scene import published_scene
+from echoscene.shape import ShapeUNet
+from echoscene.tables import LayoutTables
 
 ENCODER = EncoderConfig(text=12, learned=4, flag=4, hidden=16, layers=2, separated=False)
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}

@@ -12,16 +12,16 @@ import trimesh
 from published_shapes import fit_to_box, mesh_from_grid
 
 from echomodel.boxes import Boxes
-from echomodel.checkpoint import class_names, convert
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
-from echomodel.released.bounds import statistics_from_bounds
-from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
-from echomodel.released.echo import ReleasedEcho, floor_relations
-from echomodel.released.model import ReleasedModel
-from echomodel.released.tables import LayoutTables
-from echomodel.released.weights import write_released
 from echomodel.vocabulary import vocabulary
+from echoscene.bounds import statistics_from_bounds
+from echoscene.checkpoint import class_names, convert
+from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
+from echoscene.echo import ReleasedEcho, floor_relations
+from echoscene.model import ReleasedModel
+from echoscene.tables import LayoutTables
+from echoscene.weights import write_released
 from echousd.room.meshing import mesh_from_shape
 
 WIDTH = 12

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.gcn import TripletGCN, appearances
-from echomodel.released.packed import PackedLinear, folded_batch_norm
+from echomodel.packed import PackedLinear, folded_batch_norm
+from echoscene.gcn import TripletGCN, appearances
 
 
 class _Layer:

@@ -12,15 +12,15 @@ from torch import Tensor, nn
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.progress import StepListener
 from echomodel.randomness import normal
-from echomodel.released.compiled_layout import CompiledLayout
-from echomodel.released.compiled_shape import CompiledShape
-from echomodel.released.config import ReleasedConfig
-from echomodel.released.encoder import GraphEncoder, SceneGraphTensors
-from echomodel.released.layout import LayoutNet
-from echomodel.released.sampling import Denoiser, ancestral, ddim, last, layout_loss, node_budget, shape_loss
-from echomodel.released.shape import ShapeNet
-from echomodel.released.tables import DDIMGrid, LayoutTables, ShapeTables
-from echomodel.released.vqvae import VQVAE
+from echoscene.compiled_layout import CompiledLayout
+from echoscene.compiled_shape import CompiledShape
+from echoscene.config import ReleasedConfig
+from echoscene.encoder import GraphEncoder, SceneGraphTensors
+from echoscene.layout import LayoutNet
+from echoscene.sampling import Denoiser, ancestral, ddim, last, layout_loss, node_budget, shape_loss
+from echoscene.shape import ShapeNet
+from echoscene.tables import DDIMGrid, LayoutTables, ShapeTables
+from echoscene.vqvae import VQVAE
 
 STRUCTURE = ("floor", "_scene_")  # nodes that take part in both diffusions and have no shape
 

@@ -14,11 +14,11 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import BoxStatistics
-from echomodel.released.config import ReleasedConfig
-from echomodel.released.inference import VQVAE as VQVAE_PREFIX
-from echomodel.released.inference import CheckpointError, infer_config
-from echomodel.released.weights import build, write_released
 from echomodel.vocabulary import vocabulary
+from echoscene.config import ReleasedConfig
+from echoscene.inference import VQVAE as VQVAE_PREFIX
+from echoscene.inference import CheckpointError, infer_config
+from echoscene.weights import build, write_released
 
 IGNORED = ("epoch", "counter", "opt")  # what the published training keeps beside the weights
 NESTED = ("vqvae", "shape_df")

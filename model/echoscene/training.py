@@ -10,19 +10,23 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
+from echomodel.config import from_dict
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
-from echomodel.released.config import PaperSizes, paper
-from echomodel.released.editing import pack_changes, pack_scenes, pseudo_graph
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.grids import published_grids
-from echomodel.released.model import GraphChange, ReleasedModel
-from echomodel.released.scene import published_scene
-from echomodel.released.weights import load_released, write_released
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
+from echomodel.training.recipe import Recipe
 from echomodel.training.shapes import read
+from echomodel.training.start import data_folder
+from echomodel.training.trainer import Report, Trainer
 from echomodel.vocabulary import vocabulary
+from echoscene.config import PaperSizes, paper
+from echoscene.editing import pack_changes, pack_scenes, pseudo_graph
+from echoscene.encoder import SceneGraphTensors
+from echoscene.grids import published_grids
+from echoscene.model import GraphChange, ReleasedModel
+from echoscene.scene import published_scene
+from echoscene.weights import load_released, write_released
 
 SCENE_BOX = (-1.0,) * 6  # what the published loader gives the `_scene_` node, with an angle of -1
 AUTOENCODER = "vqvae"
@@ -209,6 +213,26 @@ def text_encoder(source: str, width: int) -> TextEncoder:
     if encoder.width != width:
         raise ValueError(f"recipe field 'paper.text' is {width}, CLIP's features have {encoder.width} numbers")
     return encoder
+
+
+def opened(
+    recipe: Recipe, folder: Path, device: torch.device, *, resume: bool = False, report: Report | None = None
+) -> Trainer:
+    """The trainer of a recipe of the stages `paper` and `paper_vqvae`; raises ValueError as `open_run` does."""
+    sizes = from_dict(PaperSizes, recipe.paper, "paper")
+    autoencoder = recipe.stage == "paper_vqvae"
+    if not autoencoder and not recipe.start and not resume:
+        raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
+    rooms, shapes = RoomSet(data_folder(recipe, "rooms")), ShapeSet(data_folder(recipe, "shapes"))
+    model = paper_model(sizes, recipe.start)
+    if model.statistics is None:
+        model.statistics = box_bounds(rooms)
+    text = text_encoder(recipe.text, sizes.text)
+    model.text_encoder = text.name  # every weights file says by whom its words were read
+    stage = PaperStage(
+        rooms, shapes, text, scenes=recipe.scenes, budget=recipe.shapes_per_batch, autoencoder=autoencoder
+    )
+    return Trainer(recipe, model.to(device), stage, folder, resume=resume, report=report)
 
 
 def _labels(room: RoomBoxes) -> list[str]:

@@ -15,10 +15,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.compiled_echo import CompiledEcho, GraphIndex
-from echomodel.released.layout import LayoutNet, check_inputs, edge_input
-from echomodel.released.packed import PackedLinear, folded_norm
-from echomodel.released.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, time_signal, walk
+from echomodel.packed import PackedLinear, folded_norm
+from echoscene.compiled_echo import CompiledEcho, GraphIndex
+from echoscene.layout import LayoutNet, check_inputs, edge_input
+from echoscene.unet import GROUPS, Down, ResBlock, SpatialTransformer, Up, time_signal, walk
 
 
 def _tap(conv: Any) -> Tensor:

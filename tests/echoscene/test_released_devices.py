@@ -12,14 +12,14 @@ from second_device import SECOND, second_device
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
-from echomodel.released.config import PaperSizes, paper
-from echomodel.released.echo import ReleasedEcho
-from echomodel.released.editing import pack_changes, pack_scenes
-from echomodel.released.model import GraphChange, ReleasedModel
-from echomodel.released.scene import published_scene
-from echomodel.released.tables import LayoutTables
 from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
+from echoscene.config import PaperSizes, paper
+from echoscene.echo import ReleasedEcho
+from echoscene.editing import pack_changes, pack_scenes
+from echoscene.model import GraphChange, ReleasedModel
+from echoscene.scene import published_scene
+from echoscene.tables import LayoutTables
 
 SIZES = PaperSizes(
     text=12, learned=4, flag=4, hidden=16, layers=2, context=32, code=8, heads=2, layout_width=128,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from echomodel.released.config import UNetConfig
-from echomodel.released.gcn import TripletGCN
-from echomodel.released.layout import check_inputs, edge_input
-from echomodel.released.unet import UNet
+from echoscene.config import UNetConfig
+from echoscene.gcn import TripletGCN
+from echoscene.layout import check_inputs, edge_input
+from echoscene.unet import UNet
 
 
 class ShapeUNet(UNet):

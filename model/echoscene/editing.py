@@ -9,8 +9,8 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from echomodel.released.encoder import SceneGraphTensors
-from echomodel.released.model import GraphChange
+from echoscene.encoder import SceneGraphTensors
+from echoscene.model import GraphChange
 
 CHANGEABLE = range(1, 12)  # predicates that a relation is changed into, as published
 

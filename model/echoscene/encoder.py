@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from echomodel.randomness import normal
-from echomodel.released.config import EncoderConfig
-from echomodel.released.gcn import TripletGCN
+from echoscene.config import EncoderConfig
+from echoscene.gcn import TripletGCN
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from echomodel.released.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
+from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig
 
 Shapes = Mapping[str, tuple[int, ...]]
 LAYOUT, SHAPE, VQVAE = "LayoutDiff.df.model.", "shape_df.diffusion_net.", "vqvae."

@@ -15,11 +15,11 @@ from torch import Tensor, nn
 from echomodel.boxes import BoxStatistics
 from echomodel.config import check_numbers
 from echomodel.files import whole_file
-from echomodel.released.config import ReleasedConfig
-from echomodel.released.inference import CheckpointError
-from echomodel.released.model import ReleasedModel
-from echomodel.released.vqvae import VQVAE
 from echomodel.vocabulary import vocabulary
+from echoscene.config import ReleasedConfig
+from echoscene.inference import CheckpointError
+from echoscene.model import ReleasedModel
+from echoscene.vqvae import VQVAE
 
 FORMAT = "echousd-released-1"
 
@@ -92,15 +92,6 @@ def write_released(
     target.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(target) as beside:
         save_file(state, beside, metadata=metadata)
-
-
-def is_released(path: str | os.PathLike[str]) -> bool:
-    """Whether a file says that it holds a converted model; False for anything else, unreadable files included."""
-    try:
-        with safe_open(path, framework="pt") as file:
-            return (file.metadata() or {}).get("format") == FORMAT
-    except (OSError, SafetensorError):
-        return False
 
 
 def load_released(path: str | os.PathLike[str]) -> nn.Module:

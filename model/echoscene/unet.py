@@ -16,8 +16,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from echomodel.released.config import UNetConfig
-from echomodel.released.volumes import convolve_repeated
+from echoscene.config import UNetConfig
+from echoscene.volumes import convolve_repeated
 
 GROUPS = 32
 Part = TypeVar("Part")

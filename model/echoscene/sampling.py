@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from echomodel.progress import StepListener
-from echomodel.released.tables import DDIMGrid, LayoutTables, ShapeTables
+from echoscene.tables import DDIMGrid, LayoutTables, ShapeTables
 
 Denoiser = Callable[[Tensor, Tensor], Tensor]  # (state (N, ...), step (N,) int64) -> noise (N, ...)
 
