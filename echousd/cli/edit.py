@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -44,6 +44,9 @@ def edit(
     ] = False,
     undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back, byte for byte; alone.")] = False,
     redo: Annotated[bool, typer.Option("--redo", help="Make again what --undo took back last; alone.")] = False,
+    recover: Annotated[
+        bool, typer.Option("--recover", help="Finish what a run that was interrupted has begun to write; alone.")
+    ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
     shapes: Annotated[
@@ -72,23 +75,28 @@ def edit(
     from echousd.room.reading import read_room
     from echousd.room.wishes import Wishes, wished
 
-    room = room_at(room)
+    if not recover:
+        room = room_at(room)
     wishes = Wishes(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
     options: dict[str, Any] = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces}
     options |= {"drafts": drafts, "assets": _allowed(assets, outside)}
-    if undo or redo:
-        if wishes != Wishes() or dry_run or output is not None or (undo and redo):
+    if undo or redo or recover:
+        if wishes != Wishes() or dry_run or output is not None or undo + redo + recover > 1:
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
+            does = "--recover finishes what was interrupted" if recover else does
             raise ValueError(f"{does} and does nothing else; leave the other options out")
-        _step(room, wait, json, back=undo)
+        if recover:
+            _recover(room, wait, json)
+        else:
+            _step(room, wait, json, "undo" if undo else "redo")
         return
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
-        room, lambda: (room, wished(read_room(room), wishes)), output or room.parent, options, nothing,
-        dry_run=dry_run, force=force, wait=wait, json=json,
+        f"edit {_name_of(wishes, options)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
+        options, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
 
 
@@ -120,7 +128,15 @@ def update(
 
     options = {"seed": seed, "shapes": None, "model": weights, "repair": True, "assets": _allowed(None, outside)}
     nothing = f"{layer}: changes nothing about the room"
-    _change(layer, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+    run = f"update {_name_of(layer.name, layer.read_bytes(), options)}"
+    _change(run, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+
+
+def _name_of(*asked: object) -> str:
+    """A word that tells a run from those of which something else was asked."""
+    from echousd.room.journal import digest
+
+    return digest(repr(asked).encode())
 
 
 def _allowed(assets: Path | None, outside: list[Path] | None) -> AssetWishes:
@@ -129,25 +145,63 @@ def _allowed(assets: Path | None, outside: list[Path] | None) -> AssetWishes:
     return asked_of(assets, outside=outside or ())
 
 
-def _step(room: Path, wait: bool, json: bool, *, back: bool) -> None:
-    """Take the last edit of a room back, or make it again, and say what it was."""
+def _step(room: Path, wait: bool, json: bool, run: str) -> None:
+    """Take the last edit of a room back (`undo`), or make it again (`redo`), and say what it was."""
     from echousd.room import history
-    from echousd.room.save import write_preview, write_sheet
+    from echousd.room.folder import held
 
     started = time.perf_counter()
-    steps = history.undo(room, wait=wait) if back else history.redo(room, wait=wait)
-    pictures = [path for path in (write_preview(room), write_sheet(room)) if path]
-    word = "undone" if back else "redone"
+    step = {"undo": history.undo, "redo": history.redo}[run]
+    with held(room.parent, wait=wait, run=run) as finished:
+        steps = history.told(room, run) if finished == run else step(room)
+        pictures = _drawn(room)
+    _say_steps(room, pictures, {"undo": "undone", "redo": "redone"}[run], steps, started, json)
+
+
+def _recover(room: Path, wait: bool, json: bool) -> None:
+    """Finish what an interrupted run has begun, and say what it was."""
+    from echousd.room import history
+    from echousd.room.folder import held
+    from echousd.room.found import room_at
+
+    started, folder = time.perf_counter(), room if room.is_dir() else room.parent
+    if not folder.is_dir():
+        raise ValueError(f"{room}: no such folder")
+    with held(folder, wait=wait) as finished:
+        root = room_at(folder)
+        _say_finished(root, history.told(root, finished) if finished else (), started, json)
+
+
+def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) -> None:
+    """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
+    from echousd.room.manifest import find_manifest
+
+    _say_steps(room, _drawn(room), "finished", steps, started, json)
+    layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
+    if any(layout["broken"] or layout["collisions"] for layout in layouts):
+        raise typer.Exit(1)
+
+
+def _drawn(room: Path) -> list[Path]:
+    """The pictures of a room, drawn as it is now."""
+    from echousd.room.save import write_preview, write_sheet
+
+    return [path for path in (write_preview(room), write_sheet(room)) if path]
+
+
+def _say_steps(
+    room: Path, pictures: Sequence[Path], word: str, steps: Sequence[str], started: float, json: bool
+) -> None:
     if json:
         say_written([room, *pictures], started, more={word: list(steps)})
         return
     for step in steps:
-        say(f"{word}   {step}")
+        say(f"{word:<8} {step}")
     say(f"room     {room}")
 
 
 def _change(
-    room: Path,
+    run: str,
     wanted: Callable[[], tuple[Path, SceneGraph]],
     folder: Path,
     options: dict[str, Any],
@@ -158,10 +212,15 @@ def _change(
     wait: bool,
     json: bool,
 ) -> None:
-    """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen."""
+    """Have the room in a folder become what `wanted` says (its root layer and the graph), or say what would happen.
+
+    The `run` that did the same and was interrupted is finished instead.
+    """
     from echousd.cli.generate import progress_bar
     from echousd.room.edit import edit as change
     from echousd.room.edit import touched
+    from echousd.room.found import room_at
+    from echousd.room.history import told
     from echousd.room.output import check_output, writing
     from echousd.room.progress import StageTimer
     from echousd.room.reading import read_room
@@ -169,7 +228,10 @@ def _change(
 
     started = time.perf_counter()
     check_output(folder, flat=False, force=force)
-    with writing(folder, flat=False, force=force, wait=wait):
+    with writing(folder, flat=False, force=force, wait=wait, run="" if dry_run else run) as finished:
+        if finished:
+            _say_finished(room_at(folder), told(room_at(folder), run), started, json)
+            return
         root, graph = wanted()
         old = read_room(root).graph
         steps = old.diff(graph).lines()

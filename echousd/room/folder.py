@@ -9,14 +9,16 @@ from __future__ import annotations
 import os
 import shutil
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from echomodel.files import flush
 from echousd.naming import free_name
-from echousd.pending import STAGING
+from echousd.pending import JOURNAL, STAGING, half_written
 from echousd.room.journal import (
+    DONE,
     Journal,
     Move,
     Removal,
@@ -25,7 +27,7 @@ from echousd.room.journal import (
     read_journal,
     write_journal,
 )
-from echousd.room.lock import LOCK, locked
+from echousd.room.lock import LOCK, locked, run_of
 from echousd.room.manifest import find_manifest
 from echousd.room.within import inside
 from echousd.stage.files import check_path
@@ -77,15 +79,17 @@ def write_together(
         folder: created if need be.
         files: relative path (forward slashes) -> content, in the order in which they are moved into place.
         last: those of them that are moved after all others, in this order.
-        remove: relative paths that no longer belong to the room, deleted at the very end.
+        remove: relative paths that no longer belong to the room, deleted at the very end; where nothing changes, they
+            are left.
 
     Raises:
         ValueError: something cannot be written, would be outside of the folder, or another process is writing there;
             then nothing was changed.
     """
-    with locked(folder):
+    with held(folder):
         changed = _stage(folder, files, list(last), list(remove))
-        recover(folder)
+        if changed:
+            finish(folder)
     return changed
 
 
@@ -110,30 +114,68 @@ def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: li
             for number, path in enumerate(changed)
         ]
         gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
-        write_journal(staging, Journal(move=move, remove=gone))
+        if changed:
+            write_journal(staging, Journal(run=run_of(folder), move=move, remove=gone))
+        else:
+            _discard(staging)
     except OSError as error:
         shutil.rmtree(staging, ignore_errors=True)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
     return changed
 
 
-def recover(folder: Path) -> None:
-    """Finish an interrupted run that had written its journal; discard one that had not.
+@contextmanager
+def held(folder: Path, *, wait: bool = False, run: str = "") -> Iterator[str]:
+    """Have the folder for this process alone, and an interrupted run finished first.
+
+    Arguments:
+        wait: for another process that writes the folder, instead of raising.
+        run: what this one does: a word and what tells it from others. Until the end of the outermost block the folder
+            says so, for whoever begins the same once more after this process died.
+
+    Yields the `run` that was finished, "" for none and in a block inside another. Raises ValueError as `recover` does.
+    """
+    with locked(folder, wait=wait, run=run) as outermost:
+        yield recover(folder) if outermost else ""
+        if outermost and not half_written(folder):
+            _discard(folder / STAGING)
+
+
+def recover(folder: Path) -> str:
+    """Finish an interrupted run that had written its journal, warn, and return its name; discard one that had not.
 
     Raises ValueError where that is impossible, where another process is writing, and for a journal that names anything
     outside of the folder.
     """
     staging = folder / STAGING
     if not staging.is_symlink() and not staging.is_dir():
-        return
-    with locked(folder):
-        try:
-            journal = read_journal(folder)
-            if journal is not None and _whole(folder, journal):
-                _finish(folder, journal)
+        return ""
+    with locked(folder) as outermost:
+        pending = half_written(folder)
+        run = finish(folder)
+        if pending and run is not None:
+            what = (run or "run").partition(" ")[0]
+            warnings.warn(f"{folder}: the {what} that was interrupted is finished now", stacklevel=3)
+        if outermost and not half_written(folder):
             _discard(staging)
-        except OSError as error:
-            raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
+    return run or ""
+
+
+def finish(folder: Path) -> str | None:
+    """Do what the journal of a run says, and return the run's name; None where there is nothing to finish."""
+    staging = folder / STAGING
+    try:
+        journal = read_journal(folder)
+        if journal is not None and _whole(folder, journal):
+            _finish(folder, journal)
+            (staging / JOURNAL).replace(staging / DONE)
+        else:
+            journal = None if journal else read_journal(folder, DONE)
+        if journal is None or not journal.run:
+            _discard(staging)
+        return journal.run if journal else None
+    except OSError as error:
+        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
 
 
 def backup_name(folder: Path, path: str) -> str:
@@ -188,6 +230,7 @@ def _discard(staging: Path) -> None:
     if staging.is_symlink():
         raise ValueError(f"{staging}: is a link, where runs keep their own files; remove it")
     if staging.exists():
+        (staging / JOURNAL).unlink(missing_ok=True)  # before what it names
         shutil.rmtree(staging)
 
 

@@ -6,6 +6,7 @@ import glob
 from pathlib import Path
 
 from echousd.graph.files import STAGE_FORMS
+from echousd.pending import half_written
 from echousd.room.manifest import find_manifest
 
 
@@ -79,5 +80,7 @@ def _rooms_of(matches: list[Path]) -> list[Path]:
 
 def _room_in(folder: Path) -> Path | None:
     manifest = find_manifest(folder)
+    if manifest is None and half_written(folder):  # the first room there: whoever opens it is told
+        return folder / f"{folder.name}.usda"
     root = None if manifest is None else folder / f"{manifest['name']}.usda"
     return root if root is not None and root.is_file() else None

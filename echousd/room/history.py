@@ -15,8 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from echousd.room import folder as folders
 from echousd.room import ownership
-from echousd.room.lock import locked
-from echousd.room.manifest import read_manifest
+from echousd.room.manifest import find_manifest, read_manifest
 from echousd.room.within import inside
 
 FOLDER = "history"
@@ -78,7 +77,9 @@ def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
     place, or the archive is damaged; nothing is changed then.
     """
     folder = root.parent
-    with locked(folder, wait=wait):
+    with folders.held(folder, wait=wait, run="undo") as finished:
+        if finished == "undo":
+            return told(root, "undo")
         manifest = folders.claim(folder, force=False, root=root.stem)
         if not manifest.get("history"):
             raise ValueError(f"{root}: no edit to take back")
@@ -90,25 +91,18 @@ def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
         earlier = read_manifest(folder / name, json.loads(files[name]))
         expected = {**manifest["files"], **last["leaves"]}
         gone = [path for path in (*last["adds"], last["restores"]) if path in expected and path not in files]
-        told = _Told(
+        words = _Told(
             after=folders.digest(files[name]),
             steps=last["steps"],
             removes=[path for path in files if ownership.read(folder, path) is None],
             leaves=_others(files, earlier, name),
         )
-        again = _step(
-            folder,
-            last["restores"],
-            files,
-            gone,
-            expected,
-            {*earlier["files"], *expected},
-            earlier,
-            "take the edit back",
-        )
+        again = _step(folder, last["restores"], files, gone, expected, earlier, "take the edit back")
         _, where = _free(folder, UNDONE, last["number"])
-        undone = {where: _archive({**again, TOLD: told.model_dump_json().encode()})}
-        folders.write_together(folder, {**undone, **files}, last=[f"{manifest['name']}.usda", name], remove=gone)
+        order = [f"{manifest['name']}.usda", name]
+        undone = {where: _archive({**again, TOLD: words.model_dump_json().encode()})}
+        drawn = ownership.pictures(folder, manifest["name"])
+        folders.write_together(folder, {**undone, **files}, last=order, remove=[*gone, *drawn])
     return tuple(last["steps"])
 
 
@@ -122,7 +116,9 @@ def redo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
     put another in its place, or the archive is damaged; nothing is changed then.
     """
     folder = root.parent
-    with locked(folder, wait=wait):
+    with folders.held(folder, wait=wait, run="redo") as finished:
+        if finished == "redo":
+            return told(root, "redo")
         manifest = folders.claim(folder, force=False, root=root.stem)
         name = f"{manifest.get('name', root.stem)}.json"
         now = ownership.read(folder, name) if manifest else None
@@ -130,14 +126,23 @@ def redo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
         if archive is None:
             raise ValueError(f"{root}: no edit that was taken back can be made again")
         files = _read_archive(folder, archive)
-        told = _read_told(folder / archive, files.pop(TOLD, b""))
+        words = _read_told(folder / archive, files.pop(TOLD, b""))
         later = read_manifest(folder / name, json.loads(files.get(name, b"{}")))
-        leaves = later["history"][-1]["leaves"] if later["history"] else {}
-        expected = {**manifest["files"], **told.leaves}
-        _step(folder, archive, files, told.removes, expected, {*later["files"], *leaves}, later, "make the edit again")
-        order = [f"{manifest['name']}.usda", name]
-        folders.write_together(folder, files, last=order, remove=[*told.removes, archive])
-    return tuple(told.steps)
+        expected = {**manifest["files"], **words.leaves}
+        _step(folder, archive, files, words.removes, expected, later, "make the edit again")
+        order, drawn = [f"{manifest['name']}.usda", name], ownership.pictures(folder, manifest["name"])
+        folders.write_together(folder, files, last=order, remove=[*words.removes, archive, *drawn])
+    return tuple(words.steps)
+
+
+def told(root: Path, run: str) -> tuple[str, ...]:
+    """What the last `undo` of a room took back, or else its last edit or `redo` did; empty where nothing says so."""
+    manifest = find_manifest(root.parent, root.stem)
+    now = ownership.read(root.parent, f"{manifest['name']}.json") if manifest else None
+    if run != "undo" or now is None:
+        return tuple(manifest["history"][-1]["steps"]) if manifest and manifest["history"] else ()
+    archive = _following(root.parent, folders.digest(now))
+    return tuple(_read_told(Path(archive), _read_archive(root.parent, archive)[TOLD]).steps) if archive else ()
 
 
 def undone(folder: Path) -> list[str]:
@@ -195,7 +200,6 @@ def _step(
     files: Mapping[str, bytes],
     removes: Sequence[str],
     expected: Mapping[str, str],
-    known: Collection[str],
     to: Mapping[str, Any],
     then: str,
 ) -> dict[str, bytes]:
@@ -203,13 +207,14 @@ def _step(
 
     Arguments:
         files, removes: what it does. archive: where that stands. to: manifest of the state that it leads to.
-        expected: digests of what the last step left. known: paths that an archive of this room may name.
+        expected: digests of what the last step left.
         then: what shall be done once the folder is as it was.
 
     Raises ValueError for a file of the room that somebody changed, for another in its place, and for assets that the
     state needs and its store no longer has.
     """
     name = f"{to['name']}.json"
+    known = {*expected, *to["files"], *(to["history"][-1]["leaves"] if to["history"] else ())}
     strange = [path for path in files if path != name and path not in known]
     strange += [path for path in removes if path not in expected]
     if strange:

@@ -15,6 +15,8 @@ from echousd.pending import JOURNAL, STAGING
 from echousd.room.manifest import LARGEST, Digest
 from echousd.room.within import check_links, inside
 
+DONE = "done.json"  # the journal of a run that has more to do once its files are in place
+
 
 class Move(BaseModel):
     """A staged file that belongs at `to`; `over` is the digest of what it may replace there, "" for nothing."""
@@ -37,11 +39,12 @@ class Removal(BaseModel):
 
 
 class Journal(BaseModel):
-    """All that is left to do once every file of a run is staged, in order."""
+    """All that is left to do once every file of a run is staged, in order; `run` is what it does, "" = nobody asks."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
     echousd_journal: Literal[2] = 2
+    run: Annotated[str, Field(max_length=200)] = ""
     move: list[Move]
     remove: list[Removal]
 
@@ -69,12 +72,15 @@ def write_journal(staging: Path, journal: Journal) -> None:
     flush(staging)
 
 
-def read_journal(folder: Path) -> Journal | None:
+def read_journal(folder: Path, name: str = JOURNAL) -> Journal | None:
     """The journal of an interrupted run in `folder`; None where it had not come so far, or cannot be read any more.
+
+    Arguments:
+        name: `JOURNAL`, or `DONE` for that of a run whose files are in place.
 
     Raises ValueError for entries that name anything outside of the folder; nothing was changed then.
     """
-    path = folder / STAGING / JOURNAL
+    path = folder / STAGING / name
     check_links(folder, path, f"{path} is read")
     if not path.is_file():
         return None

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from echomodel.files import alive
+
 try:
     import fcntl
 except ImportError:  # no such locks on this system: the owner that the file names decides
@@ -24,12 +26,12 @@ POLL = 0.05  # seconds between two tries of one who waits
 FORGOTTEN = 24 * 3600  # seconds after which the lock of another host is nobody's
 SHORT = 4096  # bytes of a lock file that are read
 
-_held: dict[str, tuple[int, int]] = {}  # folder -> (thread, how often)
+_held: dict[str, tuple[int, int, str]] = {}  # folder -> (thread, how often, for what)
 _guard = threading.Lock()
 
 
 @contextmanager
-def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
+def locked(folder: Path, *, wait: bool = False, run: str = "") -> Iterator[bool]:
     """Keep all other writers out of `folder` inside the block; the same thread may enter again.
 
     The folder is created if need be, and disappears again if the block left it empty.
@@ -37,20 +39,23 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
     Arguments:
         folder: the room's folder.
         wait: until the other writer is done, else raise at once.
+        run: what for, see `run_of`; whoever enters again goes on with the same.
+
+    Yields whether this block is the outermost.
 
     Raises ValueError that names the other writer, or says why nothing can be written.
     """
     key, thread = os.path.realpath(folder), threading.get_ident()
     with _guard:
-        owner, times = _held.get(key, (thread, 0))
+        owner, times, first = _held.get(key, (thread, 0, run))
         if times and owner == thread:
-            _held[key] = (thread, times + 1)
+            _held[key] = (thread, times + 1, first)
     if times and owner == thread:
         try:
-            yield
+            yield False
         finally:
             with _guard:
-                _held[key] = (thread, _held[key][1] - 1)
+                _held[key] = (thread, _held[key][1] - 1, first)
         return
     created = _create(folder)
     file = None
@@ -66,8 +71,8 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
                 time.sleep(POLL)
                 created += _create(folder)  # the other writer may have removed it with the last of its files
         with _guard:
-            _held[key] = (thread, 1)
-        yield
+            _held[key] = (thread, 1, run)
+        yield True
     finally:
         if file is not None:
             with _guard:
@@ -79,6 +84,12 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
         for place in created:
             with contextlib.suppress(OSError):  # not empty, or somebody else's by now
                 place.rmdir()
+
+
+def run_of(folder: Path) -> str:
+    """What this process has the folder for, "" where nobody said."""
+    with _guard:
+        return _held.get(os.path.realpath(folder), (0, 0, ""))[2]
 
 
 def owner_of(folder: Path) -> str:
@@ -164,7 +175,7 @@ def _is_free(path: Path, unsure: bool) -> bool:
         return True
     if found["host"] != _host():
         return not 0 <= time.time() - found["since"] <= FORGOTTEN
-    return not unsure or found["process"] == os.getpid() or not _alive(found["process"])
+    return not unsure or found["process"] == os.getpid() or not alive(found["process"])
 
 
 def _host() -> str:
@@ -173,16 +184,6 @@ def _host() -> str:
 
 def _plain(word: str) -> str:
     return "".join(c if c.isascii() and (c.isalnum() or c in "-._") else "_" for c in word[:100])
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True
-    return True
 
 
 def _read(path: Path) -> dict | None:

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from echousd.room.folder import check_writable, claim
-from echousd.room.lock import locked
+from echousd.room.folder import check_writable, claim, held
 
 
 def check_output(output: Path, *, flat: bool, force: bool) -> None:
@@ -31,14 +30,17 @@ def check_output(output: Path, *, flat: bool, force: bool) -> None:
 
 
 @contextmanager
-def writing(output: Path, *, flat: bool, force: bool, wait: bool) -> Iterator[None]:
-    """Have the folder for this process alone, from what is read of it to what is written."""
+def writing(output: Path, *, flat: bool, force: bool, wait: bool, run: str = "") -> Iterator[bool]:
+    """Have the folder for this process alone, from what is read of it to what is written.
+
+    Yields whether the same run was interrupted and has been finished now, see `echousd.room.folder.held`.
+    """
     if flat:
-        yield
+        yield False
         return
-    with locked(output, wait=wait):
+    with held(output, wait=wait, run=run) as finished:
         claim(output, force=force)
-        yield
+        yield bool(run) and finished == run
 
 
 def set_crate_version(version: str | None) -> None:

@@ -9,6 +9,7 @@ from pxr import Sdf, Tf, Usd, UsdUtils
 
 from echousd.naming import free_name
 from echousd.pending import STAGING
+from echousd.pictures import is_ours
 from echousd.room.folder import backup_name
 from echousd.room.journal import digest, digest_of
 from echousd.room.paths import coarse_file, component_file, payload_file
@@ -101,6 +102,11 @@ def merged_root(path: Path, current: bytes, fresh: bytes) -> bytes:
     theirs.subLayerPaths = present + [layer for layer in ours.subLayerPaths if layer not in present]
     theirs.customLayerData = {**theirs.customLayerData, **ours.customLayerData}
     return theirs.ExportToString().encode("utf-8")
+
+
+def pictures(folder: Path, name: str) -> list[str]:
+    """Pictures of ours that show the room called `name` as it is now: another state must not be seen with them."""
+    return [path for path in (f"{name}.png", f"{name}_layouts.png") if is_ours(folder / path)]
 
 
 def loses_text(layer: bytes) -> bool:

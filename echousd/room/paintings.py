@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import shutil
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -178,7 +180,10 @@ def refitted(
         return {}, []
     looks = [*(read_looks(edited.parent, along) if edited else []), *read_looks(folder, here)]
     # Beside the folder, so that what its layers refer to outside of it (a store) is found.
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.resolve().parent) as scratch:
+    beside, mark = folder.resolve().parent, f".{folder.name}.echousd-"
+    for left in beside.glob(f"{glob.escape(mark)}*"):  # of a run that was killed: the folder is ours alone now
+        shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=mark, dir=beside) as scratch:
         for path, content in {**files, root: _alone(files[root], files)}.items():
             place = Path(scratch) / path
             place.parent.mkdir(parents=True, exist_ok=True)

@@ -21,7 +21,6 @@ from echousd.room import ownership, paintings
 from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.history import remembered, undone
-from echousd.room.lock import locked
 from echousd.room.manifest import FACES, FLAGS, MANIFEST_KEY
 from echousd.room.paths import layer_file
 from echousd.room.room import LayoutOutcome, RoomData
@@ -43,7 +42,7 @@ def save_room(
     store: str | Path | None = None,
 ) -> Path:
     """Write the layered room and its preview; see `Room.save`."""
-    with locked(folder, wait=wait):
+    with folders.held(folder, wait=wait):
         root = save_layers(room, folder, force=force, store=store)
         if preview:
             write_preview(root)
@@ -58,7 +57,7 @@ def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str
     """
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: is a file, the output must be a folder")
-    with locked(folder):
+    with folders.held(folder):
         old = folders.claim(folder, force=force, root=room.name)
         shelf = shelf_of(old, folder) if store is None else Shelf(Store.create(store), folder) if store else None
         return _save_layers(room, folder, old, replace(shelf, keys={}) if shelf else None)
@@ -69,8 +68,6 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     # A folder that was renamed or copied keeps its root's name: other layers refer to it.
     room = replace(room, name=old.get("name") or as_identifier(folder.resolve().name))
     room = replace(room, assets=ownership.free_assets(folder, room, recorded))
-    for left in folder.glob(f".{room.name}.png.*.partial"):  # of a run that was killed at its preview
-        left.unlink(missing_ok=True)
     room = replace(room, graph=beside(room.graph, folder))
     files = room_files(room, shelf, folder)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
@@ -110,7 +107,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, paintings.UNFIT, root, manifest]
-    changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder)])
+    drawn = ownership.pictures(folder, room.name)
+    changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder), *drawn])
     for path, name in kept.items():
         if name:
             folders.tell_kept(folder, path, name)

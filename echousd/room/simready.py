@@ -12,6 +12,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
+from echousd.pending import check_written
 from echousd.room.manifest import find_manifest
 from echousd.room.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.room.stored import asset_from, shelf_of
@@ -43,6 +44,7 @@ def pack(root: Path, out: Path, *, names: Sequence[str] = (), author: str = "Ech
 
     Raises ValueError where there is no room of ours, no such asset, a package in the way, or nothing draws pictures.
     """
+    check_written([root])
     manifest = find_manifest(root.parent, root.stem)
     if manifest is None:
         raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")

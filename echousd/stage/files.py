@@ -13,6 +13,7 @@ from pathlib import Path
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from echomodel.files import whole_file
+from echousd.pending import check_written
 from echousd.stage.encoding import StageError
 
 WRITABLE = (".usd", ".usda", ".usdc")
@@ -23,8 +24,13 @@ READABLE = (*WRITABLE, ".usdz")
 
 
 def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
-    """The stage in the file at `path`; raises StageError for a file that is missing, not USD or does not compose."""
+    """The stage in the file at `path`.
+
+    Raises StageError for a file that is missing, not USD or does not compose, and ValueError for a room that is
+    half-written.
+    """
     path = Path(path)
+    check_written([path])
     try:
         there = path.exists()
     except (OSError, ValueError) as error:
@@ -42,6 +48,7 @@ def open_stage(path: str | os.PathLike[str]) -> Usd.Stage:
     try:
         layers = regular_layers(path)
         stage = Usd.Stage.Open(str(path))
+        check_written([Path(layer.realPath) for layer in layers if layer.realPath])
         del layers
     except UnicodeDecodeError as error:  # in the names of the layers that it refers to
         raise StageError(f"{path}: a layer that is no UTF-8 text ({error.reason})") from None

@@ -11,7 +11,6 @@ from pxr import Sdf
 
 from echousd.room import folder as folders
 from echousd.room import ownership, paintings
-from echousd.room.lock import locked
 from echousd.room.manifest import find_manifest
 from echousd.room.save import write_preview
 from echousd.stage.files import layer_bytes, open_stage
@@ -78,9 +77,10 @@ def import_look(
             f"name is {name!r:.80}, allowed: letters, digits and _, not beginning with a digit, not {paintings.MADE!r}"
         )
     top = room.parent
-    with locked(top, wait=wait):
-        folders.recover(top)
+    run = f"import {folders.digest(repr((folder.absolute(), task, name, skip)).encode())}"
+    with folders.held(top, wait=wait, run=run) as finished:
         layer = f"{paintings.FOLDER}/{name}.usda"
+        force = force or finished == run
         if (top / layer).exists() and not force:
             raise ValueError(f"{top / layer}: exists; choose another --name or use --force")
         stage = open_stage(room)
@@ -93,10 +93,14 @@ def import_look(
             if not results.objects:
                 raise ValueError(f"{folder}: every object with a result is left out (--skip); nothing to import")
             files = look_files(stage, surfaces, results, name, task.tool, task.dressing)
+        taken = [path for path in files if not force and ownership.read(top, path) not in (None, files[path])]
+        if taken:
+            raise ValueError(f"{top / taken[0]}: exists; choose another --name or use --force")
         shared = {path for thing in surfaces.objects for piece in thing.pieces for path in piece.instances}
         files |= _attached(room, layer, shared)
         order = [f"{paintings.FOLDER}/{name}/st.usdc", layer, paintings.UNFIT, room.name, f"{room.stem}.json"]
-        changed = folders.write_together(top, files, last=[path for path in order if path in files], remove=[])
+        drawn = ownership.pictures(top, room.stem)
+        changed = folders.write_together(top, files, last=[path for path in order if path in files], remove=drawn)
         for loaded in filter(None, (Sdf.Layer.Find(str(top / path)) for path in changed)):
             loaded.Reload()  # this process holds it open, as it was before
         if preview and find_manifest(top, room.stem):
@@ -145,6 +149,11 @@ def _attached(room: Path, layer: str, shared: set[str]) -> dict[str, bytes]:
     fresh = layer_bytes(root, ".usdc" if binary else ".usda")
     out[room.name] = fresh
     manifest = find_manifest(top, room.stem)
+    recorded = dict(manifest["files"]) if manifest else {}
+    if current and not binary and recorded.get(room.name) != folders.digest(current) and ownership.loses_text(current):
+        kept = folders.backup_name(top, room.name)
+        folders.tell_kept(top, room.name, kept)
+        out[kept] = current
     listing = f"{room.stem}.json"
     if manifest and manifest["name"] == room.stem and current is not None:
         owned = dict(manifest["files"])
@@ -155,6 +164,9 @@ def _attached(room: Path, layer: str, shared: set[str]) -> dict[str, bytes]:
             out[paintings.UNFIT] = _fitting_again(unfit, layer)
             owned[paintings.UNFIT] = folders.digest(out[paintings.UNFIT])
         content = json.loads((top / listing).read_bytes())
+        last = content["history"][-1] if content.get("history") else {}
+        if last.get("leaves", {}).get(room.name) == folders.digest(current):
+            last["leaves"][room.name] = folders.digest(fresh)  # the edit can still be taken back
         out[listing] = (json.dumps({**content, "files": dict(sorted(owned.items()))}, indent=1) + "\n").encode()
     return out
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
+import socket
 import stat
 import sys
 import traceback
+import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -18,6 +22,8 @@ if TYPE_CHECKING:
 
 HELD = 512 * 2**20  # bytes of memory that reading any file of somebody's may take
 EACH = 16  # and for each of its bytes: plain data takes more than its text
+HOST = f"{zlib.crc32(socket.gethostname().encode()):08x}"
+PARTIAL = re.compile(r"\..+\.(?P<host>[0-9a-f]{8})_(?P<process>[0-9]{1,9})\.\w+")  # what `whole_file` writes to
 
 
 @contextmanager
@@ -31,8 +37,9 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
         ending: of the other name, where the writer goes by it.
     """
     path = Path(path)
-    beside = path.with_name(f".{path.name}.{os.getpid()}{ending}")
+    beside = path.with_name(f".{path.name}.{HOST}_{os.getpid()}{ending}")
     try:
+        sweep(path.parent.absolute())
         beside.unlink(missing_ok=True)  # a link that waits under that name in a folder that somebody sent
         yield beside
         flush(beside)
@@ -46,6 +53,37 @@ def whole_file(path: str | os.PathLike[str], ending: str = ".partial") -> Iterat
         raise
     finally:
         beside.unlink(missing_ok=True)
+
+
+@cache
+def sweep(folder: Path) -> None:
+    """Remove what `whole_file` left in a folder where its process on this machine was killed; once a process."""
+    try:
+        found = [(entry, PARTIAL.fullmatch(entry.name)) for entry in os.scandir(folder)]
+    except OSError:  # whoever writes there is told
+        return
+    for entry, named in found:
+        if (
+            named
+            and named["host"] == HOST
+            and not alive(int(named["process"]))
+            and entry.is_file(follow_symlinks=False)
+        ):
+            with suppress(OSError):
+                Path(entry).unlink()
+
+
+def alive(process: int) -> bool:
+    """Whether a process of this machine runs; True where the system does not tell."""
+    if os.name == "nt":  # there the question would be an order
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def write_text(path: Path, text: str) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from inline_batches import QUICK, Inline
 
+from echomodel.files import HOST
 from echousd.batches.batch import batch
 from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchRequest
@@ -76,7 +77,7 @@ def test_no_link_takes_a_resumed_run_outside(sent, run, name, keep):
 def test_a_link_that_waits_for_a_file_is_replaced(run, monkeypatch):
     """The name under which a file is written is known beforehand, but for the number of the process."""
     for name in ("manifest.jsonl", "summary.json", "index.html", "index.usda"):
-        (run / f".{name}.{os.getpid()}.partial").symlink_to(run.parent / "outside/new")
+        (run / f".{name}.{HOST}_{os.getpid()}.partial").symlink_to(run.parent / "outside/new")
         (run / name).symlink_to(run.parent / "outside/secret")
     before = outside(run)
     finish(run)

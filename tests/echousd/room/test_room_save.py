@@ -12,6 +12,7 @@ from small_room import StandIn, small_graph
 from stopped_disk import stopped_disk
 
 import echousd
+from echomodel.files import HOST
 from echousd.naming import as_identifier
 from echousd.pending import STAGING
 from echousd.room import RoomOptions
@@ -243,14 +244,20 @@ def test_disk_that_is_full_at_the_preview_leaves_the_room(tmp_path, monkeypatch)
 
 
 def test_preview_that_a_killed_run_left_half_written_goes(tmp_path):
+    pytest.importorskip("embreex")
     folder = tmp_path / "bedroom"
     make(seed=1).save(folder, preview=False)
-    left, mine = folder / ".bedroom.png.123.partial", folder / ".notes.png.partial"
-    for path in (left, mine):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    left = [folder / f".{name}.{HOST}_{gone.pid}.partial" for name in ("bedroom.png", "bedroom_layouts.png")]
+    mine = [
+        folder / f".notes.{words}" for words in (f"{HOST}_{os.getpid()}.png", f"00000000_{gone.pid}.png", "partial")
+    ]
+    for path in (*left, *mine):
         path.write_bytes(b"half")
-    make(seed=2).save(folder, preview=False)
-    assert not left.exists()
-    assert mine.exists()
+    make(seed=2).save(folder)
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in mine)
 
 
 def test_z_up_over_an_edited_y_up_root_is_refused(tmp_path):

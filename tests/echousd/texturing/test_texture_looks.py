@@ -16,8 +16,9 @@ from small_room import StandIn, small_graph
 import echousd
 from echousd.checks import check
 from echousd.room.edit import edit
+from echousd.room.history import redo, undo
 from echousd.room.reading import read_room
-from echousd.stage import open_stage
+from echousd.stage import open_stage, read_graph
 from echousd.texturing import atlas, export_job, import_look
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.glb import glb_bytes
@@ -64,6 +65,40 @@ def generated(root, graph):
         warnings.simplefilter("always")
         data.save(root.parent, preview=False)
     return [str(entry.message) for entry in told if "painted" in str(entry.message)]
+
+
+def test_a_persons_files_where_a_look_would_lie_are_left(room):
+    """Not only the look's own layer; and the root layer's remarks, which USD does not write again, stay beside it."""
+    probe = room.parent.parent / "probe"
+    shutil.copytree(room.parent, probe)
+    import_look(probe / room.name, job_of(room), name="oil", preview=False)
+    theirs = [path.relative_to(probe) for path in (probe / "looks/oil").rglob("*") if path.is_file()]
+    assert len(theirs) > 1
+    for path in theirs:
+        own = room.parent / path
+        own.parent.mkdir(parents=True, exist_ok=True)
+        own.write_bytes(b"mine")
+        with pytest.raises(ValueError, match=f"{path.name}: exists; choose another --name or use --force"):
+            import_look(room, job_of(room), name="oil", preview=False)
+        assert own.read_bytes() == b"mine"
+        own.unlink()
+    mine = room.read_text().rstrip()[:-1] + "    # a remark\n}\n"
+    room.write_text(mine)
+    with pytest.warns(UserWarning, match="bedroom.usda: not as echousd wrote it; kept as bedroom.edited.usda"):
+        import_look(room, job_of(room), name="oil", preview=False)
+    assert (room.parent / "bedroom.edited.usda").read_text() == mine
+
+
+def test_an_edit_of_a_room_whose_root_was_edited_is_taken_back_after_an_import(room):
+    room.write_text(room.read_text().rstrip()[:-1] + '    def Cube "Toy"\n    {\n    }\n}\n')
+    fewer = small_graph().remove_node("pendant")
+    edit(room, fewer, model=StandIn(), shapes="boxes", repair=False).save(room.parent, preview=False)
+    import_look(room, job_of(room), name="oil", skip=("pendant",), preview=False)
+    after = room.read_bytes()
+    undo(room)
+    assert "pendant" in read_graph(room).names
+    redo(room)
+    assert room.read_bytes() == after
 
 
 def test_generating_again_keeps_the_look_and_the_file(room):
