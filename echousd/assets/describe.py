@@ -35,7 +35,18 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
         encoder: a model whose encoder makes the descriptor, None = there is none.
         full: with picture and level surfaces, which a model that is not chosen among others does not need.
     """
-    record = AssetRecord(
+    record = left_out(entry, library, "")
+    try:
+        with within_memory(entry.file.path, str(entry.file)):
+            record = replace(record, sha256=digest_of(entry.file))
+        return _read(record, entry, measure(entry.file, painted=full), full, encoder)
+    except ValueError as error:
+        return replace(record, fault=str(error))
+
+
+def left_out(entry: Entry, library: Path, fault: str) -> AssetRecord:
+    """The row of a model that is not opened, and why."""
+    return AssetRecord(
         id=entry.key,
         uri=relative(entry.file.path, library) + (f"!{entry.file.member}" if entry.file.member else ""),
         root=relative(entry.file.top, library),
@@ -44,13 +55,8 @@ def described(entry: Entry, library: Path, *, full: bool = True, encoder: object
         licence=spdx(entry.licence),
         author=entry.author,
         tags=entry.tags,
+        fault=fault,
     )
-    try:
-        with within_memory(entry.file.path, str(entry.file)):
-            record = replace(record, sha256=digest_of(entry.file))
-        return _read(record, entry, measure(entry.file, painted=full), full, encoder)
-    except ValueError as error:
-        return replace(record, fault=str(error))
 
 
 def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encoder: object) -> AssetRecord:

@@ -13,9 +13,11 @@ from pathlib import Path
 from echousd.assets.catalogues import catalogue_of
 from echousd.assets.catalogues.entry import Entry
 from echousd.assets.corrections import Corrections, corrected, read_corrections, said_of
-from echousd.assets.describe import described, relative, stamp
+from echousd.assets.describe import described, left_out, relative, stamp
+from echousd.assets.model_file import STAGES
 from echousd.assets.record import AssetRecord
 from echousd.assets.table import arrow, read_library, write_library
+from echousd.stage.apart import fatal
 
 PACK = 8  # models that a worker reads in one go
 SAVED = 20.0  # seconds after which what is done is written, for a run that goes on after this one was killed
@@ -80,11 +82,15 @@ def index(
         else:
             fresh.append(entry)
     saved = time.monotonic()
-    for count, record in enumerate(_read(fresh, file, workers, descriptors), 1):
+    deadly = fatal(entry.file.path for entry in fresh if entry.file.suffix in STAGES)
+    for entry in (entry for entry in fresh if entry.file.path in deadly):
+        done[entry.key] = left_out(entry, file, deadly[entry.file.path])
+    readable = [entry for entry in fresh if entry.file.path not in deadly]
+    for count, record in enumerate(_read(readable, file, workers, descriptors), 1):
         done[record.id] = corrected(record, wishes[record.id]) if record.id in wishes else record
         if progress:
             progress(len(done), len(entries))
-        if time.monotonic() - saved > SAVED and count < len(fresh):
+        if time.monotonic() - saved > SAVED and count < len(readable):
             write_library(file, done.values(), {"unfinished": True})
             saved = time.monotonic()
     write_library(file, done.values())

@@ -63,8 +63,13 @@ def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: 
     if fault or not check:
         return fault
     from echousd.checks import check as checked
+    from echousd.stage.apart import check_apart
 
-    report = checked(place / row["root"])
+    try:
+        check_apart(place / row["root"])
+        report = checked(place / row["root"])
+    except (ValueError, OSError) as error:
+        return f"check: {error}"
     counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
     return "" if report.ok else "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
 

@@ -62,7 +62,9 @@ def adopt(
         from echousd.room.progress import StageTimer
         from echousd.room.room import RoomOptions
         from echousd.room.written import write_room
+        from echousd.stage.apart import check_apart
 
+        check_apart(stage)
         wishes = asked_of(assets, stretch=stretch, licences=licenses, collect=collect, text=text, outside=outside or ())
         graph = adopted(stage, room=room, add=add, relate=relate or ())
         made = generate(

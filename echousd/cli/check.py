@@ -73,8 +73,10 @@ def _one(
     Raises ValueError for one that cannot be read if it is alone; of several, that is its report.
     """
     from echousd.checks import check as checked
+    from echousd.stage.apart import check_apart
 
     try:
+        check_apart(room)
         report = checked(room, rules=rules, layout=layout, settle=settle)
     except (ValueError, OSError) as error:
         if alone:

@@ -9,6 +9,7 @@ from pathlib import Path
 from echousd.assets.catalogues.entry import Entry, Told
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
+from echousd.stage.apart import fatal
 
 STAND_IN = re.compile(r"[_\-. ](collision|collider|convex|physics|lod_?[1-9])\d*$", re.IGNORECASE)
 # what follows the name of the other one
@@ -60,8 +61,10 @@ def parts_of_others(files: list[Path]) -> set[Path]:
 
     known = {file.resolve(): file for file in files}
     found: set[Path] = set()
-    for file in files:
-        if file.suffix.lower() not in (".usd", ".usda", ".usdc"):
+    layers = [file for file in files if file.suffix.lower() in (".usd", ".usda", ".usdc")]
+    deadly = fatal(layers)
+    for file in layers:
+        if file in deadly:
             continue
         try:
             layer = Sdf.Layer.OpenAsAnonymous(str(file))
