@@ -6,6 +6,7 @@ import platform
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module, metadata, resources, util
+from pathlib import Path
 
 # Optional extra of the distribution, the modules it brings, what needs it.
 EXTRAS = (
@@ -19,6 +20,7 @@ EXTRAS = (
     ("text", ("open_clip",), "text features of the released models"),
     ("train", ("tensorboard",), "curves in TensorBoard"),
 )
+GPUS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd", "/dev/accel")  # on Linux; without one torch finds the processor alone
 OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics
 
 
@@ -76,6 +78,10 @@ def _torch() -> Iterator[Diagnosis]:
     if util.find_spec("torch") is None:
         yield Diagnosis("torch", "gap", "not installed", "pip install torch")
         return
+    version = metadata.version("torch")
+    if platform.system() == "Linux" and not any(Path(device).exists() for device in GPUS):
+        yield Diagnosis("torch", "ok", f"{version}, devices: cpu")  # importing torch takes longer than all the rest
+        return
     import torch
 
     devices = [f"cpu ({torch.get_num_threads()} threads)"]
@@ -90,7 +96,7 @@ def _weights() -> Iterator[Diagnosis]:
     entries = folder.iterdir() if folder.is_dir() else ()
     files = sorted(entry.name for entry in entries if entry.name.endswith(".safetensors"))
     if files:
-        sizes = (len(folder.joinpath(name).read_bytes()) / 2**20 for name in files)
+        sizes = (Path(str(folder.joinpath(name))).stat().st_size / 2**20 for name in files)
         told = ", ".join(f"{name} ({size:.1f} MiB)" for name, size in zip(files, sizes, strict=True))
         yield Diagnosis("weights", "ok", f"{told} in {folder}")
     else:

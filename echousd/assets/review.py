@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import html
 import io
+import re
 from collections.abc import Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from PIL import Image, ImageDraw
 
@@ -20,6 +21,7 @@ LABEL = 24  # pixels below a picture
 STYLE = """body{font:13px sans-serif;margin:2em}div{display:inline-block;width:11em;vertical-align:top;margin:.4em}
 img{width:96px;height:96px}u{display:block;width:96px;height:8px;text-decoration:none}s{display:inline-block;height:8px}
 b,i,span{display:block;overflow-wrap:anywhere}i{color:#777}.doubt{background:#fff3d6}"""
+OWN = re.compile(r"'[^']*'|\"[^\"]*\"|[/\w.-]*/[/\w.-]+|\d+(\.\d+)?")  # quoted words, paths and numbers in a reason
 DOUBT = 0.7  # confidence below which a row is coloured
 
 
@@ -30,13 +32,25 @@ def write_page(path: Path, records: Sequence[AssetRecord]) -> None:
     for category, members in grouped(records).items():
         parts.append(f"<h2>{category} ({len(members)})</h2>")
         parts += map(_card, members)
-    out = [record for record in records if not record.usable]
+    out = left_out(records)
     if out:
-        parts.append(f"<h2>not used ({len(out)})</h2><ul>")
-        parts += [f"<li>{html.escape(r.id)}: {html.escape(r.fault)}" for r in out]
-        parts.append("</ul>")
+        parts.append(f"<h2>not used ({sum(map(len, out.values()))})</h2>")
+    for reason, members in out.items():
+        parts.append(f"<details><summary>{len(members)}: {html.escape(reason)}</summary><ul>")
+        parts += [f"<li>{html.escape(r.id)}: {html.escape(r.fault)}" for r in members]
+        parts.append("</ul></details>")
     with whole_file(path) as beside:
         beside.write_text("\n".join(parts) + "\n", "utf-8")
+
+
+def left_out(records: Sequence[AssetRecord]) -> dict[str, list[AssetRecord]]:
+    """The models that cannot be used by the reason, the commonest first; what is of one model alone is `...` there."""
+    found: dict[str, list[AssetRecord]] = {}
+    for record in sorted((r for r in records if not r.usable), key=lambda record: record.id):
+        where, _, why = record.fault.partition(": ")
+        reason = why if why and PurePath(where).name == PurePath(record.id).name else record.fault
+        found.setdefault(OWN.sub("...", reason) or "no size or category", []).append(record)
+    return dict(sorted(found.items(), key=lambda entry: (-len(entry[1]), entry[0])))
 
 
 def _card(record: AssetRecord) -> str:

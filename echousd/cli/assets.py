@@ -86,7 +86,7 @@ def review(
     The table lies beside the index; what it says counts when the library is indexed again.
     """
     from echousd.assets.corrections import read_corrections, write_table
-    from echousd.assets.review import write_page, write_sheets
+    from echousd.assets.review import left_out, write_page, write_sheets
     from echousd.assets.table import read_library
 
     started, found = time.perf_counter(), read_library(library)
@@ -98,9 +98,13 @@ def review(
     write_page(folder / "review.html", records)
     table = library.with_suffix(".csv")
     write_table(table, records, read_corrections(table) if table.exists() else None)
+    reasons = {reason: len(members) for reason, members in left_out(records).items()}
     if json:
-        say_written([folder / "review.html", *sheets, table], started, more={"models": len(records)})
+        more = {"models": len(records), "left_out": reasons}
+        say_written([folder / "review.html", *sheets, table], started, more=more)
         return
+    for reason, count in reasons.items():
+        say(f"left out {count}: {reason}")
     say(f"page     {folder / 'review.html'}")
     say(f"sheets   {len(sheets)} in {folder}")
     say(f"table    {table}: correct it and run echousd assets index again")

@@ -40,7 +40,11 @@ def export(
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
-    """Write a room as one file: usdz for the web or ARKit, glb, or flat USD."""
+    """Write a room as one file: usdz for the web or ARKit, glb, or flat USD.
+
+    Readers that compose no layers, as three.js and tinyusdz, find nothing in a room's root layer: they need this file.
+    Those that ignore purposes draw its colliders: --no-physics.
+    """
     from echousd.exporting import export as write
     from echousd.room.found import room_at
 

@@ -240,7 +240,10 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     stage = _room_stage(room, "")
     layer = stage.GetRootLayer()
     layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
-    layer.documentation = "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten."
+    layer.documentation = (
+        "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten.\n"
+        "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
+    )
     prim = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
     Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
     Usd.ModelAPI(prim).SetAssetName(room.name)

@@ -6,14 +6,17 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from pxr import Sdf, Usd, UsdGeom
 
 from echousd.stage import values
 from echousd.stage.encoding import StageError
 from echousd.stage.subdivision import refined, smooth_normals
+
+if TYPE_CHECKING:
+    import trimesh
 
 MAX_INSTANCES = 50_000  # of one instancer
 SOLIDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
@@ -152,6 +155,8 @@ def is_subdivision(prim: Usd.Prim) -> bool:
 
 def solid(prim: Usd.Prim) -> trimesh.Trimesh:
     """One of `SOLIDS` as triangles, in the prim's own frame and unit."""
+    import trimesh  # with scipy half a second, which stages of meshes alone need not wait for
+
     kind = prim.GetTypeName()
 
     def length(name: str, default: float) -> float:

@@ -48,6 +48,18 @@ def test_doctor_as_json(echousd_command):
     assert done.code == (0 if report["ok"] else 1)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere torch is asked for its devices")
+def test_doctor_asks_torch_only_where_there_may_be_a_gpu():
+    code = (
+        "import sys\nfrom echousd import diagnosis\ndiagnosis.GPUS = ({!r},)\n"
+        "found = {{one.name: one for one in diagnosis.diagnose()}}\n"
+        "assert 'cpu' in found['torch'].found, found\nprint('torch' in sys.modules)"
+    )
+    for device, imported in (("/dev/no_such_device", "False"), ("/dev/null", "True")):
+        done = subprocess.run([sys.executable, "-c", code.format(device)], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout) == (0, f"{imported}\n"), done.stderr
+
+
 def test_every_extra_of_the_distribution_is_looked_at():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
     assert {extra for extra, _, _ in diagnosis.EXTRAS} == project["optional-dependencies"].keys() - {"dev"}

@@ -8,7 +8,7 @@ from small_models import chest, seat, small_library, write_obj
 from echousd.assets.corrections import read_corrections, write_table
 from echousd.assets.front import front_by_shape
 from echousd.assets.index import index
-from echousd.assets.review import write_page, write_sheets
+from echousd.assets.review import left_out, write_page, write_sheets
 from echousd.assets.table import read_library
 
 
@@ -76,6 +76,26 @@ def test_a_page_and_sheets_show_every_model(tmp_path):
     assert len(sheets) == 6
     with Image.open(sheets[0]) as picture:
         assert np.asarray(picture.convert("L")).min() < 100
+
+
+def test_models_that_are_left_out_are_told_by_reason(tmp_path, echousd_command):
+    folder = small_library(tmp_path / "models")
+    for name in ("gizmo", "widget", "doodad"):
+        write_obj(folder, name, chest())
+    (folder / "desk.glb").write_bytes(b"no glb")
+    file = index([folder], tmp_path / "lib.parquet").file
+    found = left_out(list(read_library(file).records.values()))
+    reasons = {reason: [record.id for record in members] for reason, members in found.items()}
+    unknown = "... is of no known category; set `category` in the table"
+    assert next(iter(reasons)) == unknown  # the commonest first
+    assert sorted(reasons.pop(unknown)) == ["doodad.obj", "gizmo.obj", "widget.obj"]
+    ((reason, ids),) = reasons.items()
+    assert reason.startswith("cannot be read")
+    assert ids == ["desk.glb"]
+    said = echousd_command("assets", "review", file).out
+    assert f"left out 3: {unknown}\n" in said
+    page = (tmp_path / "lib_review" / "review.html").read_text()
+    assert "<summary>3: ... is of no known category" in page
 
 
 @pytest.mark.parametrize("quarters", range(4))

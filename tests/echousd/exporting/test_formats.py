@@ -1,4 +1,6 @@
 import struct
+import subprocess
+import sys
 import zipfile
 
 import numpy as np
@@ -189,6 +191,19 @@ def test_z_up_rooms_come_out_y_up_where_the_format_says_so(tmp_path):
     stage = Usd.Stage.Open(str(export(root, tmp_path / "room.usdz")))
     assert UsdGeom.GetStageUpAxis(stage) == "Z"
     assert world_bounds(stage).GetMax()[2] == pytest.approx(2.8, abs=1e-3)
+
+
+@pytest.mark.parametrize("ending", [".usdz", ".glb", ".usdc"])
+def test_an_export_loads_what_it_needs(root, tmp_path, ending):
+    """Half of its time went into modules that it never called."""
+    code = (
+        "import sys\nfrom echousd.cli.main import run\n"
+        "assert run(['export', *sys.argv[1:]]) == 0\n"
+        "print(sorted({'torch', 'trimesh', 'scipy', 'networkx', 'shapely'} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", code, str(root), "-o", str(tmp_path / f"room{ending}")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1:] == ["[]"], done.stderr
 
 
 def test_refusals(root, tmp_path):
