@@ -6,8 +6,8 @@ Each round makes the room three times as a new process, in turns: as installed a
 processes that count for ever, and with OMP_NUM_THREADS=1 beside the same. Wanted of the least seconds: with neighbours
 the default is never slower than one thread and takes at most twice what it takes alone. Threads that spin while they
 wait would show in the seconds of the processor too, which other load on the machine changes less. Then the stages of
-`--timings` are added up beside the wall clock, and `echousd.generate` is called three times in one process, which
-keeps the model.
+`timings` of `--json` are added up beside the wall clock, and `echousd.generate` is called three times in one process,
+which keeps the model.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def neighbours(count: int) -> Iterator[None]:
 def cold_room(folder: Path, **environment: str) -> tuple[float, float, dict[str, float]]:
     """Seconds of the wall clock and of the processor of one new process, and its own timings."""
     (folder / "graph.yaml").write_text(GRAPH)
-    words = ["generate", "graph.yaml", "-o", "room", "--seed", "7", "--force", "--json", "--timings"]
+    words = ["generate", "graph.yaml", "-o", "room", "--seed", "7", "--force", "--json"]
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     started = time.perf_counter()
     command, around = [sys.executable, "-c", COLD, *words], {**os.environ, **environment}

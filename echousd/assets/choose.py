@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,13 +19,12 @@ from echousd.assets.licences import allowed
 from echousd.assets.matching import apart, main_colors, told_colors
 from echousd.assets.matching import costs as color_costs
 from echousd.assets.matching import table as color_table
-from echousd.assets.record import AssetRecord
-from echousd.assets.table import Library, read_library
+from echousd.assets.record import STRETCH, AssetRecord
+from echousd.assets.table import Library
 
 if TYPE_CHECKING:
     from echomodel.text import TextEncoder
 
-STRETCH = 1.15  # largest factor by which a model may be made longer or shorter along an axis
 EQUALLY_GOOD = 0.12  # difference of costs among which the seed decides
 OTHER_WORD, OTHER_FAMILY = 0.35, 0.8  # cost of a model of a related category
 AGAIN, BEYOND, UNSURE, UNLIKE = 0.6, 3.0, 0.5, 0.25
@@ -91,34 +89,6 @@ class AssetWishes:
         vectors = torch.nn.functional.normalize(torch.as_tensor(vectors), dim=1)
         away = TEXT * (1.0 - vectors[1:] @ vectors[0])
         return dict(zip((record.id for record in records), away.tolist(), strict=True))
-
-
-def wishes_of(assets: AssetWishes | str | os.PathLike[str] | None) -> AssetWishes:
-    """What is asked, from an index's file or as it is; raises ValueError for a file that is no index."""
-    if isinstance(assets, AssetWishes):
-        return assets
-    return AssetWishes() if assets is None else AssetWishes(read_library(assets))
-
-
-def asked_of(
-    assets: Path | None,
-    *,
-    stretch: float = STRETCH,
-    licences: str | None = None,
-    collect: bool = False,
-    text: str = "",
-    outside: Sequence[Path] = (),
-) -> AssetWishes:
-    """What the options of a command ask for; raises ValueError for an option that is not allowed."""
-    words = tuple(word.strip() for word in (licences or "").split(",") if word.strip())
-    if licences is not None and not words:
-        raise ValueError(f"--licenses is {licences!r}, allowed: licences with commas between, such as CC0,CC-BY")
-    if text and assets is None:
-        raise ValueError(f"--text {text!r} needs models to choose from; name a library's index with --assets")
-    library = None if assets is None else read_library(assets)
-    wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(outside))
-    _ = wishes.unlikeness  # what is absent is told before any long work
-    return wishes
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,7 +81,7 @@ def batch(
         sample: room type -> how many graphs are drawn from the room generator.
         count, seed: rooms of each graph, the first with this seed, the next with one more.
         variations: option -> values, whose combinations a graph's rooms take in turn.
-        options: of the rooms, fields of `echousd.batches.options.BatchOptions` (shapes, weights, drafts, dress ...);
+        options: of the rooms, those of `echousd.batches.options.BatchOptions`;
             of the run, fields of `echousd.batches.run.RunOptions`: workers, shard=(i, n), resume, max_failures,
             timeout, until, memory, ray, to, outside, executor, progress.
 
@@ -134,7 +134,7 @@ def generate_many(
 
     Arguments:
         graphs: taken a few at a time. seed: of every room, or `seeds`, one each.
-        options: fields of `echousd.batches.options.BatchOptions`.
+        options: those of `RoomOptions`.
 
     Raises ValueError for the first graph that no room can be made of.
     """
@@ -143,7 +143,7 @@ def generate_many(
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
-    load_model(asked.weights or None, asked.preset, device=asked.device)
+    load_model(asked.weights, device=asked.device)
     number = 0
     for pack in packed(graphs):
         own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
@@ -192,7 +192,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def weights_hash(weights: str) -> str:
+def weights_hash(weights: str | None) -> str:
     """Short hash of the weights files; raises ValueError where there are none."""
     source = Path(weights) if weights else Path(str(resources.files("echomodel") / "weights"))
     files = sorted(source.rglob("*")) if source.is_dir() else [source]

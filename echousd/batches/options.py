@@ -5,147 +5,75 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
-from echousd.room.manifest import MAX_SEED
-from echousd.room.room import RoomOptions
-
-if TYPE_CHECKING:
-    from echousd.assets.choose import AssetWishes
+from echousd.graph.nodes import PlainModel
+from echousd.room.options import FILES, MAX_SEED, ROOM, RoomOptions, row, told
 
 
-class BatchOptions(BaseModel):
-    """Options of every room; those of `echousd.generate` and `RoomOptions`, and how rooms are drawn and shown.
+class BatchOptions(RoomOptions):
+    """Options of every room of a run: those of any room, and how graphs are drawn and assets stored."""
 
-    Arguments:
-        relations: relations an object that are told of a room drawn from the room generator (`sample`).
-        preview: draw a picture of every room (needs the extra `render`).
-        weights: weights file or folder, "" for those that ship. assets: index of a library, "" for none.
-        stretch: how much its models may be stretched, 1 to 4. licenses: of models, such as `CC0,CC-BY`, "" = all.
-        text: what models shall be like (extra `text`). collect: take them along with their files.
-        fit: `keep` all that is asked for, or `drop` what has no place. settle: as it comes to rest (extra `sim`).
-        device: what the network runs on, `cpu`, `cuda` or `mps`; it is part of the plan, as sums round by it.
-        palette: harmony of the room, "" = the seed chooses.
-        merge: what of a piece is one mesh, `parts`, `bodies` or `closed`, see `RoomOptions`.
-        materialx: materials have a MaterialX network as well. crate, instances, thumbnails: see `RoomOptions`.
-        dress_graph: small things are nodes of the graph on the stage, too, see `RoomOptions`.
-        openings: `kept`, those of the graph, or `drawn`, doors and windows where the seed puts them.
-        self_contained: every room has its assets and images in its own folder, instead of the run's `store`.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-    shapes: str | None = None
-    preset: str | None = None
-    weights: str = ""
-    assets: str = ""
-    stretch: Annotated[float, Field(ge=1, le=4)] = 1.15
-    licenses: str = ""
-    text: str = ""
-    collect: bool = False
-    fit: Literal["keep", "drop"] = "keep"
-    settle: bool = False
-    device: Literal["cpu", "cuda", "mps"] = "cpu"
-    repair: bool = True
-    layouts: Annotated[int, Field(ge=1, le=1000)] = 1
-    drafts: Annotated[int, Field(ge=1, le=64)] | None = None
-    steps: Annotated[int, Field(ge=1)] | None = None
-    faces: Annotated[int, Field(ge=100)] = 5000
-    up_axis: str = "Y"
-    walls: bool = True
-    ceiling: bool = False
-    atlas: bool = False
-    dress: str = "none"
-    palette: str = ""
-    merge: Literal["parts", "bodies", "closed"] = "parts"
-    materialx: bool = False
-    crate: bool = False
-    instances: bool = False
-    thumbnails: bool = False
-    dress_graph: bool = False
-    openings: Literal["kept", "drawn"] = "kept"
-    preview: bool = True
-    relations: Annotated[float, Field(ge=0, le=20)] = 1.5
-    self_contained: bool = False
-
-    @property
-    def look(self) -> RoomOptions:
-        """How a room is written; raises ValueError for a word that is not allowed."""
-        return RoomOptions(**{field.name: getattr(self, field.name) for field in fields(RoomOptions)})
-
-    def wishes(self, outside: tuple[str, ...] = ()) -> AssetWishes:
-        """What is asked of a library; raises ValueError for what is not allowed or not there.
-
-        Arguments:
-            outside: folders besides that of the index in which its models may lie.
-        """
-        index = Path(self.assets)
-        changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
-        return _wishes(self.assets, changed, self.stretch, self.licenses, self.text, self.collect, outside)
+    relations: float = row(1.5, ROOM, "relations an object that are told of a room which is drawn", ge=0, le=20)
+    self_contained: bool = row(False, FILES, "assets in every room's own folder, not once in the run's store")
 
 
-@lru_cache(maxsize=4)  # words are compared with those of all models once in a process
-def _wishes(
-    assets: str, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
-) -> AssetWishes:
-    from echousd.assets.choose import asked_of
-
-    index, folders = Path(assets) if assets else None, [Path(folder) for folder in outside]
-    return asked_of(index, stretch=stretch, licences=licenses or None, collect=collect, text=text, outside=folders)
-
-
-class BatchRequest(BaseModel):
+class BatchRequest(PlainModel):
     """One run: what `batch.toml` holds, field by field.
 
     Arguments:
         sources: graph files, folders, globs, JSONL or Parquet files of graphs.
         sample: room type -> how many graphs of that type are drawn from the room generator.
         count: rooms of every graph of the sources; seed: of the first, the next one's is one more.
-        options: of every room. variations: option -> values; a graph's rooms take the combinations in turn.
+        options: of every room, but for the seed. variations: option -> values; a graph's rooms take the combinations
+            in turn.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+    model_config = ConfigDict(strict=True)
 
-    sources: list[str] = []
-    sample: dict[str, Annotated[int, Field(ge=1)]] = {}
+    sources: list[str] = Field([])
+    sample: dict[str, Annotated[int, Field(ge=1)]] = Field({})
     count: Annotated[int, Field(ge=1)] = 1
     seed: Annotated[int, Field(ge=0, le=MAX_SEED)] = 0
     options: BatchOptions = BatchOptions()
-    variations: dict[str, list[Any]] = {}
+    variations: dict[str, list[Any]] = Field({})
+
+    @classmethod
+    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
+        return ValueError(told(error, cls))
 
     def chosen(self, copy: int) -> BatchOptions:
         """The options of the room number `copy` of a graph."""
         combinations = list(itertools.product(*self.variations.values()))
-        values = combinations[copy % len(combinations)]
-        return BatchOptions(**{**self.options.model_dump(), **dict(zip(self.variations, values, strict=True))})
+        values = dict(zip(self.variations, combinations[copy % len(combinations)], strict=True))
+        chosen: BatchOptions = self.options.replaced(**values)
+        return chosen
 
 
 def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
     """A checked request; raises ValueError that names `where`, the field, what was found and what is allowed."""
     try:
-        request = BatchRequest.model_validate(dict(raw))
-        if "device" in request.variations:
-            raise ValueError(f"{where}: variations: device, allowed: options that a room shows; one device for all")
+        request = BatchRequest(**{**raw, "options": _options(raw.get("options", {}))})
+        if fixed := {"device", "seed"} & request.variations.keys():
+            raise ValueError(f"variations: {fixed.pop()}, allowed: options that a room shows")
         if not all(request.variations.values()):
-            raise ValueError(f"{where}: variations: an empty list, allowed: at least one value of each option")
+            raise ValueError("variations: an empty list, allowed: at least one value of each option")
         for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):
-            _ = request.chosen(copy).look
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field = ".".join(str(part) for part in first["loc"])
-        allowed = first["msg"]
-        if first["type"] == "extra_forbidden":
-            known = BatchOptions if field.startswith(("options.", *BatchOptions.model_fields)) else BatchRequest
-            allowed = f"unknown field, allowed: {', '.join(known.model_fields)}"
-        raise ValueError(f"{where}: {field} is {first['input']!r:.80} ({allowed})") from None
+            request.chosen(copy)
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
     if not request.sources and not request.sample:
         raise ValueError(f"{where}: neither sources nor a sample; name graph files, or --sample bedroom:20")
     return request
+
+
+def _options(raw: Any) -> BatchOptions:
+    if not isinstance(raw, Mapping) or "seed" in raw:
+        raise ValueError(f"options is {raw!r:.80}, allowed: names and values, the seed beside them")
+    return BatchOptions(**raw)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

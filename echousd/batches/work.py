@@ -100,10 +100,10 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
         for i, drafts in zip(rows, found, strict=True):
             out[i] = Sampled(graphs[i].to_json(), (*jobs[i].rounds, tuple(map(_rows, drafts))))
 
-    asked = {i: (jobs[i].options.weights, jobs[i].options.preset, jobs[i].options.steps) for i in graphs}
-    for weights, preset, steps in dict.fromkeys(asked.values()):
-        same = [i for i in graphs if asked[i] == (weights, preset, steps)]
-        model = load_model(weights or None, preset, device=jobs[same[0]].options.device)
+    asked = {i: (jobs[i].options.weights, jobs[i].options.steps) for i in graphs}
+    for weights, steps in dict.fromkeys(asked.values()):
+        same = [i for i in graphs if asked[i] == (weights, steps)]
+        model = load_model(weights, device=jobs[same[0]].options.device)
         try:
             sample(model, same, steps)
         except ValueError:
@@ -122,7 +122,7 @@ def samples(asks: tuple[Job, Wanted]) -> bytes:
 
     asked, wanted = asks[0].options, asks[1]
     with one_thread():
-        return sampled(load_model(asked.weights or None, asked.preset, device=asked.device), wanted.call)
+        return sampled(load_model(asked.weights, device=asked.device), wanted.call)
 
 
 def room(job: Job) -> dict[str, Any] | Best | Wanted:
@@ -169,14 +169,10 @@ def generated(job: Job, *, here: bool = False) -> Any:
     best = None if found is None else BestDraft(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
     drawn = Drawn(drafts, elsewhere=True, best=best) if drafts else None
     asked = job.options
-    model = load_model(asked.weights or None, asked.preset, device=asked.device if here else CPU)
+    model = load_model(asked.weights, device=asked.device if here else CPU)
     if asked.device != CPU and not here:
         model = ElsewhereModel(model, job.answers)
-    made = generate(
-        _checked(job), seed=job.seed, shapes=asked.shapes, assets=asked.wishes(job.outside), model=model,
-        preset=asked.preset, repair=asked.repair, samples=asked.layouts, drafts=asked.drafts, steps=asked.steps,
-        faces=asked.faces, options=asked.look, drawn=drawn, fit=asked.fit,
-    )  # fmt: skip
+    made = generate(_checked(job), options=asked, seed=job.seed, model=model, drawn=drawn, outside=job.outside)
     if not asked.settle:
         return made
     from echousd.settle import settled
@@ -193,7 +189,7 @@ def best_of(wanted: DraftsWanted) -> Best:
 def _checked(job: Job) -> Any:
     """The graph, if a room can be made of it; raises ValueError."""
     from echousd.graph.doors import check_doors
-    from echousd.graph.floors import check_space
+    from echousd.graph.floors import check_space, without_openings
     from echousd.room.layouts import check_objects
 
     if job.draw is not None and not job.text:
@@ -201,7 +197,7 @@ def _checked(job: Job) -> Any:
     else:
         graph = SceneGraph.from_json(job.text)
     if job.options.openings == "drawn":
-        graph = graph.replaced(room=graph.room.replaced(openings=()))
+        graph = without_openings(graph)
     check_objects(graph)
     check_doors(graph)
     if job.options.fit == "keep":

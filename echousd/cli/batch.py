@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from echousd.cli.options import AsJson, Licenses, Outside, Weights
+from echousd.cli.options import AsJson, Outside, add_room_command
 from echousd.cli.output import one_line, plain_json, say, say_error, say_json
 
 if TYPE_CHECKING:
@@ -33,12 +33,11 @@ batch_app = typer.Typer(cls=_RunByDefault, no_args_is_help=True)
 
 def register(app: typer.Typer) -> None:
     """Add the topic."""
+    example = "echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
+    add_room_command(batch_app, run, example, batch=True)
     app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
 
 
-@batch_app.command(
-    "run", epilog="Example: echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
-)
 def run(
     sources: Annotated[
         list[str] | None,
@@ -51,46 +50,27 @@ def run(
     count: Annotated[int | None, typer.Option(help="Rooms of each graph; default 1.", min=1)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of each graph's first room; default 0.", min=0)] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; default: one a core.", min=1)] = None,
-    shard: Annotated[str, typer.Option(help="Part i of n, for job arrays, such as 0/8.")] = "0/1",
+    shard: Annotated[str, typer.Option(help="Part i of n, for job arrays, such as 0/8.", hidden=True)] = "0/1",
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
-    max_failures: Annotated[int | None, typer.Option(help="Stop after more failed rooms than this.", min=0)] = None,
-    timeout: Annotated[float | None, typer.Option(help="Seconds a room may take.", min=0.1)] = None,
-    until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.")] = "",
-    memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", min=256)] = 4096,
-    shapes: Annotated[
-        str | None, typer.Option(help="parts, sdf, library, guided, boxes; default: the best of the model.")
+    max_failures: Annotated[
+        int | None, typer.Option(help="Stop after more failed rooms than this.", hidden=True, min=0)
     ] = None,
-    assets: Annotated[Path | None, typer.Option(help="Index of a library, for --shapes library and guided.")] = None,
-    outside: Outside = None,
-    stretch: Annotated[
-        float | None, typer.Option(help="How much models may be stretched; default 1.15.", min=1, max=4)
-    ] = None,
-    licenses: Licenses = None,
-    text: Annotated[
-        str | None, typer.Option(help='What models shall be like, "mid-century oak" (extra: text).')
-    ] = None,
-    weights: Weights = None,
-    device: Annotated[
-        str | None, typer.Option(help="Of the network: cpu, cuda (a process for each) or mps; default cpu.")
-    ] = None,
-    preview: Annotated[bool | None, typer.Option("--preview/--no-preview", help="A picture of every room.")] = None,
-    drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most for each room.", min=1)] = None,
-    dress: Annotated[str | None, typer.Option(help="Small things: none, some or full; default none.")] = None,
-    dress_graph: Annotated[
-        bool | None, typer.Option("--dress-graph", help="Small things are nodes of the graph, too.", show_default=False)
-    ] = None,
-    walls: Annotated[bool | None, typer.Option("--walls/--no-walls", help="Walls around the floor.")] = None,
+    timeout: Annotated[float | None, typer.Option(help="Seconds a room may take.", hidden=True, min=0.1)] = None,
+    until: Annotated[str, typer.Option(help="Time to stop at, such as 06:30.", hidden=True)] = "",
+    memory: Annotated[int, typer.Option(help="MiB that a worker may hold.", hidden=True, min=256)] = 4096,
     more: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Any other option of the rooms, such as ceiling=true, palette=oak, settle=true."),
+        list[str] | None, typer.Option("--set", help="An option of the rooms by its name, such as ceiling=true.")
     ] = None,
-    ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.")] = "",
-    to: Annotated[str, typer.Option(help="URL that rooms and store go to (fsspec), such as s3://bucket/night.")] = "",
-    self_contained: Annotated[
-        bool | None, typer.Option("--self-contained/--store", help="Assets in every room, or once in a store.")
-    ] = None,
-    webdataset: Annotated[bool, typer.Option("--webdataset", help="Also tars of previews and JSON.")] = False,
+    ray: Annotated[str, typer.Option(help="Run on Ray: auto, or the address of a cluster.", hidden=True)] = "",
+    to: Annotated[
+        str, typer.Option(help="URL that rooms and store go to (fsspec), such as s3://bucket/night.", hidden=True)
+    ] = "",
+    webdataset: Annotated[
+        bool, typer.Option("--webdataset", help="Also tars of previews and JSON.", hidden=True)
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="A JSON line for every room, on stdout.")] = False,
+    outside: Outside = None,
+    **given: Any,
 ) -> None:
     """Make many rooms, each whole or not at all; end it, go on with --resume, on as many machines as there are."""
     from echousd.batches.batch import run_batch
@@ -106,20 +86,9 @@ def run(
     raw["sources"] = [*raw.get("sources", []), *(word for word in words if word not in files)]
     raw["sample"] = {**raw.get("sample", {}), **parse_sample(sample)}
     raw |= {key: value for key, value in (("count", count), ("seed", seed)) if value is not None}
-    told: dict[str, Any] = {
-        "shapes": shapes,
-        "assets": str(assets.absolute()) if assets else None,
-        "stretch": stretch,
-        "licenses": licenses,
-        "text": text,
-        "weights": str(weights) if weights else None,
-        "device": device,
-        "preview": preview,
-        "walls": walls,
-    }
-    told |= {"drafts": drafts, "dress": dress, "dress_graph": dress_graph, "self_contained": self_contained}
-    told = {key: value for key, value in told.items() if value is not None}
-    raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **told}
+    if "assets" in given:
+        given["assets"] = str(Path(given["assets"]).absolute())
+    raw["options"] = {**raw.get("options", {}), **parse_options(more or []), **given}
     request = request_of(raw, files[0] if files else "batch")
     if to and webdataset:
         raise ValueError("--webdataset takes rooms in the run's own folder; leave out --to")

@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from echousd.cli.options import Assets, Outside, Wait, Weights
+from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import say
 from echousd.cli.report import report, say_written, telling_faults
 
 if TYPE_CHECKING:
-    from echousd.assets.choose import AssetWishes
     from echousd.graph import SceneGraph
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(
-        epilog='Example: echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
-    )(edit)
-    app.command(epilog="Example: echousd update out/bedroom/mine.usda")(update)
+    example = 'echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
+    add_room_command(app, edit, example, edits=True)
+    add_room_command(app, update, "echousd update out/bedroom/mine.usda", edits=True)
 
 
 def edit(
@@ -48,24 +46,11 @@ def edit(
         bool, typer.Option("--recover", help="Finish what a run that was interrupted has begun to write; alone.")
     ] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Other folder; default: in place.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-    shapes: Annotated[
-        str | None,
-        typer.Option(help="Of new objects: parts, sdf, library, guided, boxes; default: as the room is made."),
-    ] = None,
-    assets: Assets = None,
-    outside: Outside = None,
-    weights: Weights = None,
-    faces: Annotated[int | None, typer.Option(help="Faces of each new mesh; default: as the room.", min=100)] = None,
-    drafts: Annotated[int | None, typer.Option(help="Layouts drawn at most, the best is kept.", min=1, max=64)] = None,
-    repair: Annotated[
-        bool, typer.Option("--repair/--no-repair", help="Move and size new boxes until the graph is kept.")
-    ] = True,
-    force: Annotated[bool, typer.Option("--force", help="Write into a folder that is not ours.")] = False,
+    force: Force = False,
     wait: Wait = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
-    ] = False,
+    outside: Outside = None,
+    json: Made = False,
+    **given: Any,
 ) -> None:
     """Change what a room holds; objects that the change does not touch stay byte for byte.
 
@@ -81,8 +66,6 @@ def edit(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
         turn or (), resize or (), restyle or (),
     )  # fmt: skip
-    options: dict[str, Any] = {"seed": seed, "shapes": shapes, "model": weights, "repair": repair, "faces": faces}
-    options |= {"drafts": drafts, "assets": _allowed(assets, outside)}
     if undo or redo or recover:
         if wishes != Wishes() or dry_run or output is not None or undo + redo + recover > 1:
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
@@ -93,23 +76,21 @@ def edit(
         else:
             _step(room, wait, json, "undo" if undo else "redo")
         return
+    given["outside"] = outside or ()
     nothing = "nothing to change; use --add, --remove, --relabel, --relate, --unrelate, --move and others (--help)"
     _change(
-        f"edit {_name_of(wishes, options)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
-        options, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
+        f"edit {_name_of(wishes, given)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
+        given, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
 
 
 def update(
     layer: Annotated[Path, typer.Argument(help="Your layer over a room, or its folder.", show_default=False)],
-    seed: Annotated[int, typer.Option(help="Seed of the new randomness, 0 to 2^63 - 1.")] = 0,
-    outside: Outside = None,
-    weights: Weights = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would change; write nothing.")] = False,
     wait: Wait = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print what was changed and made, faults and seconds as JSON.")
-    ] = False,
+    outside: Outside = None,
+    json: Made = False,
+    **given: Any,
 ) -> None:
     """Bring a room up to date with what a stronger layer changes: its relations, objects and transforms.
 
@@ -126,10 +107,10 @@ def update(
             say(f"locked   {name}, where {layer.name} puts it")
         return own, graph
 
-    options = {"seed": seed, "shapes": None, "model": weights, "repair": True, "assets": _allowed(None, outside)}
+    given["outside"] = outside or ()
     nothing = f"{layer}: changes nothing about the room"
-    run = f"update {_name_of(layer.name, layer.read_bytes(), options)}"
-    _change(run, wanted, layer.parent, options, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
+    run = f"update {_name_of(layer.name, layer.read_bytes(), given)}"
+    _change(run, wanted, layer.parent, given, nothing, dry_run=dry_run, force=False, wait=wait, json=json)
 
 
 def _name_of(*asked: object) -> str:
@@ -137,12 +118,6 @@ def _name_of(*asked: object) -> str:
     from echousd.room.journal import digest
 
     return digest(repr(asked).encode())
-
-
-def _allowed(assets: Path | None, outside: list[Path] | None) -> AssetWishes:
-    from echousd.assets.choose import asked_of
-
-    return asked_of(assets, outside=outside or ())
 
 
 def _step(room: Path, wait: bool, json: bool, run: str) -> None:

@@ -15,7 +15,7 @@ import typer
 
 from echousd.cli.numbers import bound_numbers
 from echousd.cli.output import one_line, safe
-from echousd.cli.quiet import add_quiet
+from echousd.cli.quiet import add_help_all, add_quiet
 
 app = typer.Typer(
     name="echousd",
@@ -111,6 +111,7 @@ def command() -> Any:
     root = typer.main.get_command(app)
     bound_numbers(root)
     add_quiet(root)
+    add_help_all(root)
     return root
 
 

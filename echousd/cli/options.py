@@ -1,25 +1,112 @@
-"""Options that several commands have in the same words."""
+"""Options that several commands have in the same words, and flags made of the table of a room's options."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
-Wait = Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.")]
-Weights = Annotated[Path | None, typer.Option(help="Weights file or folder; default: those that ship.")]
-Assets = Annotated[Path | None, typer.Option(help="Index of a library (assets index).", show_default=False)]
+Made = Annotated[bool, typer.Option("--json", help="Say what was made as JSON.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over what is not ours.")]
+Wait = Annotated[bool, typer.Option("--wait", help="Wait for another process that writes the folder.", hidden=True)]
 Outside = Annotated[
     list[Path] | None,
     typer.Option(
         "--allow-outside",
         help="Folder in which models may lie besides those of the graph and of the index; may be repeated.",
-        show_default=False,
+        hidden=True,
     ),
 ]
-Stretch = Annotated[float, typer.Option(help="How much models may be stretched.", min=1, max=4)]
-Licenses = Annotated[
-    str | None, typer.Option(help="Licences of models that are allowed, such as CC0,CC-BY; default: all.")
-]
+LONG = 8  # characters in place of a value; longer ones would leave no room for help
+
+
+def add_room_command(
+    app: typer.Typer, command: Callable[..., Any], example: str, *, edits: bool = False, batch: bool = False
+) -> None:
+    """Add a command that takes a room's options: in place of its `**given` those of the table that are used.
+
+    Arguments:
+        edits: only what an edit may set. batch: the table of a batch, whose seed is not among the rooms'.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    given = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+    own = [one.replace(annotation=hints[one.name]) for one in given]
+    used: dict[str, Any] = {}
+
+    class WithFlags(TyperCommand):
+        """The command, which reads the table when it is called: `echousd --help` must not wait for it."""
+
+        flags: frozenset[str] = frozenset()
+
+        def make_context(self, *values: Any, **extra: Any) -> Any:
+            if not self.flags:
+                found = _flags(edits=edits, batch=batch)
+                self.flags = frozenset(one.name for one in found)
+                self.params[len(own) : len(own)] = click_options(*found)
+            return super().make_context(*values, **extra)
+
+        def invoke(self, ctx: Any) -> Any:
+            used.clear()
+            used.update({name: ctx.params.pop(name) for name in [*ctx.params] if name in self.flags})
+            return super().invoke(ctx)
+
+    @wraps(command)
+    def call(**values: Any) -> Any:
+        return command(**values, **{name: value for name, value in used.items() if value is not None})
+
+    call.__signature__ = signature(command).replace(parameters=own)  # type: ignore[attr-defined]
+    call.__annotations__ = {one.name: one.annotation for one in own}
+    app.command(command.__name__, cls=WithFlags, epilog=f"Example: {example}")(call)
+
+
+def click_options(*flags: Parameter) -> list[Any]:
+    """Flags as typer makes them of a function's arguments."""
+
+    def holder(**_: Any) -> None: ...
+
+    holder.__signature__ = Signature(flags)  # type: ignore[attr-defined]
+    holder.__annotations__ = {flag.name: flag.annotation for flag in flags}
+    alone = typer.Typer(add_completion=False)
+    alone.command()(holder)
+    return list(typer.main.get_command(alone).params)
+
+
+def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
+    from echousd.batches.options import BatchOptions
+    from echousd.room.options import GROUPS, OF_NEW, RoomOptions
+
+    rows: dict[str, Any] = dict((BatchOptions if batch else RoomOptions).model_fields)
+    chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
+    ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
+    return [_flag(name, rows[name]) for name in ordered]
+
+
+def _flag(name: str, row: Any) -> Parameter:
+    """The flag of a row: None where it is not given, so that a file's value or the default stands."""
+    from echousd.room.options import words_of
+
+    kind = next(kind for kind in (bool, int, float, str) if _is(row.annotation, kind))
+    word, said = f"--{name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"
+    if kind is bool and row.default:
+        word += f"/--no-{name.replace('_', '-')}"
+    words, extra = words_of(row), row.json_schema_extra
+    if len(words) > LONG:
+        said, words = f"{said}: {words.replace('|', ', ')}", "word"
+    default = f" ({row.default})" if row.default not in (None, "", True, False) else ""
+    option = typer.Option(
+        word, help=f"{said}{default}.", metavar=words or None, show_default=False,
+        hidden=not extra["everyday"], rich_help_panel=None if extra["everyday"] else extra["group"],
+    )  # fmt: skip
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option])
+
+
+def _is(annotation: Any, kind: type) -> bool:
+    """Whether a field holds values of a kind, alone or among others (a Literal's words are texts)."""
+    inner = getattr(annotation, "__args__", ())
+    return annotation is kind or isinstance(annotation, kind) or any(_is(one, kind) for one in inner)

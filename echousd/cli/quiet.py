@@ -8,11 +8,29 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from functools import wraps
+from inspect import Parameter
 from typing import Annotated, Any, TextIO
 
 import typer
 
-HELP = "Print errors and warnings alone, and what --json asks for."
+from echousd.cli.options import click_options
+
+
+def _show_all(context: typer.Context, wanted: bool) -> None:
+    if wanted:
+        for option in context.command.params:
+            option.hidden = False  # type: ignore[attr-defined]
+        context.command.get_help(context)
+        raise typer.Exit
+
+
+def _flag(name: str, help: str, **more: Any) -> Parameter:
+    option = typer.Option(f"--{name.replace('_', '-')}", help=help, **more)
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=False, annotation=Annotated[bool, option])
+
+
+QUIET = _flag("quiet", "Say errors and warnings alone.")
+HELP_ALL = _flag("help_all", "Show this with all options.", is_eager=True, callback=_show_all, expose_value=False)
 DATA = ("--json", "--yaml", "--dot", "--schema")  # options that ask for data on stdout
 
 
@@ -23,18 +41,16 @@ def add_quiet(command: Any) -> None:
         add_quiet(each)
     if below is None:
         data = [option.name for option in command.params if set(option.opts) & set(DATA)]
-        command.params.append(_option())
+        command.params += click_options(QUIET)
         command.callback = _hushed(command.callback, data)
 
 
-def _option() -> Any:
-    """The flag as typer makes it of a function's argument."""
-
-    def flag(quiet: Annotated[bool, typer.Option("--quiet", help=HELP)] = False) -> None: ...
-
-    alone = typer.Typer(add_completion=False)
-    alone.command()(flag)
-    return typer.main.get_command(alone).params[0]
+def add_help_all(command: Any) -> None:
+    """Give every command that keeps some of its options off the first page of its help the flag that shows them."""
+    for below in getattr(command, "commands", {}).values():
+        add_help_all(below)
+    if any(getattr(option, "hidden", False) for option in command.params) and not hasattr(command, "commands"):
+        command.params += click_options(HELP_ALL)
 
 
 def _hushed(callback: Callable[..., Any], data: list[str]) -> Callable[..., Any]:

@@ -128,6 +128,12 @@ def check_extents(extents: tuple[float, float] | None) -> None:
         )
 
 
+def without_openings(graph: SceneGraph) -> SceneGraph:
+    """The graph whose doors and windows nobody stated."""
+    found: SceneGraph = graph.replaced(room=graph.room.replaced(openings=()))
+    return found
+
+
 def check_space(graph: SceneGraph) -> tuple[str, ...]:
     """Sentences where the furniture leaves hardly a way through the floor that is stated, and of what stands beside it.
 

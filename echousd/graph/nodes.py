@@ -44,7 +44,7 @@ class PlainModel(BaseModel, metaclass=_Plain):
             raise fault
 
     @classmethod
-    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> GraphError:
+    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
         first = error.errors(include_url=False)[0]
         cause = first["ctx"]["error"] if first["type"] == "value_error" else None
         message = first["msg"] if cause is None else str(cause)

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from echousd.room.finished import Room
+    from echousd.room.options import RoomOptions
     from echousd.room.pipeline import generate
-    from echousd.room.room import Provenance, RoomOptions, Verdict
+    from echousd.room.room import Provenance, Verdict
 
 # `generate` needs torch, the plain data does not: each is imported on first use.
 _HOME = {
     "Provenance": "echousd.room.room",
     "Room": "echousd.room.finished",
-    "RoomOptions": "echousd.room.room",
+    "RoomOptions": "echousd.room.options",
     "Verdict": "echousd.room.room",
     "generate": "echousd.room.pipeline",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,22 +13,21 @@ from echomodel.boxes import Boxes
 from echomodel.loading import load_model
 from echomodel.progress import StageListener
 from echomodel.vocabulary import vocabulary
-from echousd.assets.choose import AssetWishes, wishes_of
 from echousd.assets.record import Vector
 from echousd.graph import Node, SceneGraph
 from echousd.graph.floors import with_plan_of
 from echousd.naming import free_name
 from echousd.room.clearing import cleared_layouts
 from echousd.room.finished import Room
-from echousd.room.layouts import Draws, best_boxes, check_drafts, check_objects, most_drafts, room_floor, with_sizes
+from echousd.room.layouts import Draws, best_boxes, check_objects, most_drafts, room_floor, with_sizes
 from echousd.room.looks import palette_of_room
-from echousd.room.manifest import FACES, FLAGS, check_seed
 from echousd.room.merging import merged
+from echousd.room.options import OF_NEW, Look, RoomOptions, takes_options
 from echousd.room.progress import StageTimer
 from echousd.room.reading import SavedRoom, read_room
 from echousd.room.reproducible import one_thread
-from echousd.room.room import Provenance, RoomOptions
-from echousd.room.sources import default_source, shape_source
+from echousd.room.room import Provenance
+from echousd.room.sources import default_source
 from echousd.room.sources.mixing import check_sources, mixed_shapes
 from echousd.room.sources.retrieval import (
     Retrieved,
@@ -48,19 +47,15 @@ if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
 
 
+@takes_options(OF_NEW)
 def edit(
     root: str | Path,
     graph: SceneGraph,
     *,
-    seed: int = 0,
-    shapes: str | None = None,
     model: RoomModel | str | Path | None = None,
-    repair: bool = True,
-    drafts: int | None = None,
-    steps: int | None = None,
-    faces: int | None = None,
+    outside: Sequence[str | Path] = (),
     progress: StageListener | None = None,
-    assets: AssetWishes | str | Path | None = None,
+    **given: Any,
 ) -> Room:
     """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
 
@@ -71,22 +66,24 @@ def edit(
         root: root layer of a room that `generate` made.
         graph: what its graph (`read_room(root).graph`) shall become; a floor or openings that it leaves open stay
             those of the room.
-        seed: of the new randomness.
-        shapes: as for `generate`; None = what the room is made of.
-        faces: face budget of each new mesh; None = that of the room.
-        model, repair, drafts, steps, progress, assets: as for `generate`.
+        model, outside, progress: as for `generate`.
+        given: options of what is new (`RoomOptions`); `shapes` and `faces` are those of the room where none are given.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
     `model` is None. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
-    check_seed(seed)
-    check_drafts(drafts)
-    if shapes is not None:
-        shape_source(shapes)
-    timer, wishes = StageTimer(progress), wishes_of(assets)
+    if wrong := sorted(given.keys() - set(OF_NEW)):
+        raise ValueError(f"{wrong[0]} is no option of an edit, allowed: {', '.join(OF_NEW)}")
+    given = {name: value for name, value in given.items() if value is not None}
+    RoomOptions(**given)  # what is not allowed is told before the room is read
+    timer = StageTimer(progress)
     with timer.stage("read"):
         saved = read_room(root)
+    manifest = saved.manifest
+    look = {name: manifest[name] for name in Look.model_fields}
+    asked = RoomOptions(**{**look, **given})
+    wishes, shapes, model = asked.wishes(outside), asked.shapes, asked.weights if model is None else model
     check_objects(graph, str(root))
     beside = Path(root).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
@@ -97,17 +94,17 @@ def edit(
     change: GraphEdit | None = None
     pins: list[SceneGraph] = []
     notes: tuple[str, ...] = ()
-    given = Retrieved()
+    own = Retrieved()
     if fresh or moving:
         with timer.stage("load"), one_thread():
-            model_used = load_model(model)
+            model_used = load_model(model, device=asked.device)
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
             made_of = saved.manifest["shapes"]
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and wishes.library is not None)
             shapes = shapes or (made_of if again else default_source(model_used))
             check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
-            given = given_pieces(graph, shapes, wishes, fresh)
+            own = given_pieces(graph, shapes, wishes, fresh)
         change = graph_edit(saved.graph, graph)
 
     def laid_out(sizes: Mapping[str, Vector]) -> list[Boxes]:
@@ -123,37 +120,37 @@ def edit(
                 layouts.append(_boxes_of(pinned))
                 continue
             found, told = best_boxes(
-                model_used, pinned, styles, Draws(seed, number, steps, change), repair=repair,
-                drafts=drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
+                model_used, pinned, styles, Draws(asked.seed, number, asked.steps, change), repair=asked.repair,
+                drafts=asked.drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
             )  # fmt: skip
             layouts.append(found)
             notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
         return layouts
 
-    layouts, models, budget = laid_out(given.sizes), given, faces or saved.manifest.get("faces", FACES)
+    layouts, models = laid_out(own.sizes), own
     if fresh and shapes is not None:
-        palette = saved.manifest.get("palette") or palette_of_room(saved.manifest["seed"])
-        models = retrieved(graph, layouts[0], styles, shapes, wishes, seed, given, among=fresh, palette=palette)
-        layouts = laid_out(models.sizes) if models.sizes != given.sizes else layouts
+        palette = asked.palette or palette_of_room(manifest["seed"])
+        models = retrieved(graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=fresh, palette=palette)
+        layouts = laid_out(models.sizes) if models.sizes != own.sizes else layouts
         notes = (*models.notes, *notes)
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
     names = {name: saved.assets[name] for name in geometry}
     if fresh and shapes is not None:
         wanted = tuple(name for name in graph.names if name in fresh)
         request = ShapeRequest(
-            graph, layouts[0], styles, seed, model_used, steps, budget, wanted, dict(geometry), change, timer, models
-        )
+            graph, layouts[0], styles, asked.seed, model_used, asked.steps, asked.faces, wanted, dict(geometry), change,
+            timer, models,
+        )  # fmt: skip
         made = mixed_shapes(request, shapes)
-        own = {name: made.geometry[owner] for name, owner in made.owners.items()}
-        geometry |= merged(own, saved.manifest.get("merge", "parts"), budget)
+        shaped = {name: made.geometry[owner] for name, owner in made.owners.items()}
+        geometry |= merged(shaped, asked.merge, asked.faces)
         names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
     names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
-    manifest = saved.manifest
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
-    if repair:
+    if asked.repair:
         with timer.stage("repair"), one_thread():
-            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=manifest.get("walls", False))
+            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
     room = Room(
         name=manifest["name"],
         graph=graph,
@@ -164,17 +161,8 @@ def edit(
         layouts=tuple(layouts),
         outcomes=outcomes,
         notes=notes,
-        provenance=_provenance(manifest, model_used, budget),
-        options=RoomOptions(
-            manifest["up_axis"],
-            manifest.get("walls", False),
-            manifest.get("atlas", False),
-            manifest.get("ceiling", False),
-            manifest.get("dress", "none"),
-            manifest.get("palette", ""),
-            manifest.get("merge", "parts"),
-            *(manifest.get(word, False) for word in FLAGS),
-        ),
+        provenance=_provenance(manifest, model_used),
+        options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds,
         edited=Path(root),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
@@ -274,8 +262,8 @@ def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, given: bool, root:
         )
 
 
-def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None, faces: int) -> Provenance:
+def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None) -> Provenance:
     preset, model = manifest["preset"], manifest["model"]
     if echo is not None:
         preset, model = echo.preset, echo.hash or model
-    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"], faces)
+    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])

@@ -23,7 +23,7 @@ class Room(RoomData):
         folder: str | Path,
         *,
         force: bool = False,
-        preview: bool = True,
+        preview: bool | None = None,
         wait: bool = False,
         store: str | Path | None = None,
     ) -> Path:
@@ -34,7 +34,7 @@ class Room(RoomData):
                 that it has. Files that somebody else wrote or edited stay, if need be under another name that a warning
                 tells.
             force: also write into a folder that holds other things than a room of ours.
-            preview: draw `<name>.png` (needs the extra `render`; left out without it).
+            preview: draw `<name>.png` (needs the extra `render`; left out without it); None = as its options say.
             wait: for another process that writes this folder, instead of raising.
             store: folder where many rooms keep their assets and images once (`echousd.store`), made if need be; None =
                 that of the room which is there, "" = none: the room travels alone.

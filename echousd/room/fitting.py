@@ -11,7 +11,6 @@ from echousd.graph.consistency import GraphError
 from echousd.graph.floors import check_space
 from echousd.room.verdicts import colliding
 
-FITS = ("keep", "drop")
 LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
 Layout = tuple[Boxes, tuple[str, ...]]
 

@@ -26,7 +26,7 @@ from echousd.room.verdicts import layout_outcome
 if TYPE_CHECKING:
     from echomodel.protocols import GraphEdit, RoomModel
 
-DRAFTS, MOST_DRAFTS = 8, 64  # of which the best is kept
+DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
 CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
@@ -188,12 +188,6 @@ def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
 
     shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
     return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
-
-
-def check_drafts(drafts: int | None) -> None:
-    """Raise ValueError for a number of drafts that is not allowed."""
-    if drafts is not None and not 1 <= drafts <= MOST_DRAFTS:
-        raise ValueError(f"drafts is {drafts}, allowed: 1 to {MOST_DRAFTS}")
 
 
 def most_drafts(model: RoomModel, objects: int) -> int:

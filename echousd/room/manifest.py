@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from echousd.room.options import MAX_SEED, Look, told
 from echousd.room.within import check_links, inside
 
 MANIFEST_KEY = "echousd_room"
 LARGEST = 64 * 2**20  # bytes of a manifest or journal that are read
-MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=255)]
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]*$", max_length=128)]
-
-
-FLAGS = (
-    "materialx",
-    "crate",
-    "instances",
-    "thumbnails",
-    "dress_graph",
-)  # named only where set; in `RoomOptions`' order
-FACES = 5000  # budget of each mesh where nobody says another
 
 
 class Step(BaseModel):
@@ -41,10 +30,10 @@ class Step(BaseModel):
     steps: list[str]
     restores: Annotated[str, Field(max_length=4096)]
     adds: list[str]
-    leaves: dict[str, Digest] = {}
+    leaves: dict[str, Digest] = Field({})
 
 
-class Manifest(BaseModel):
+class Manifest(Look):
     """The fields that are read back; others are kept as they are. `echousd.room.save.manifest_of` writes them."""
 
     model_config = ConfigDict(extra="allow", strict=True)
@@ -52,35 +41,16 @@ class Manifest(BaseModel):
     echousd_room: Literal[1]
     name: Name
     files: dict[str, Digest]
-    assets: dict[str, Name] = {}
+    assets: dict[str, Name] = Field({})
     seed: Annotated[int, Field(ge=0, le=MAX_SEED)] = 0
     preset: str = "compact"
     model: str = ""
     shapes: str = "sdf"
     source: str = ""
-    up_axis: Literal["Y", "Z"] = "Y"
-    walls: bool = False
-    atlas: bool = False
-    ceiling: bool = False
-    dress: Literal["none", "some", "full"] = "none"
-    palette: str = ""
-    merge: Literal["parts", "bodies", "closed"] = "parts"
-    materialx: bool = False
-    crate: bool = False
-    instances: bool = False
-    thumbnails: bool = False
-    dress_graph: bool = False
-    faces: Annotated[int, Field(ge=1)] = FACES
-    meshes: dict[str, dict[str, Any]] = {}
-    history: list[Step] = []
+    meshes: dict[str, dict[str, Any]] = Field({})
+    history: list[Step] = Field([])
     store: Annotated[str, Field(max_length=4096)] = ""
-    stored: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]] = {}
-
-
-def check_seed(seed: int) -> None:
-    """Raises ValueError for a seed that no layer stores as a whole number."""
-    if not 0 <= seed <= MAX_SEED:
-        raise ValueError(f"seed is {seed}, allowed: 0 to {MAX_SEED}")
+    stored: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]] = Field({})
 
 
 def find_manifest(folder: Path, root: str = "") -> dict[str, Any] | None:
@@ -119,9 +89,7 @@ def read_manifest(path: Path, raw: dict[str, Any]) -> dict[str, Any]:
     try:
         manifest = Manifest.model_validate(raw)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"{path}: {where} is {first['input']!r:.100}, allowed: {_allowed(first)}") from None
+        raise ValueError(f"{path}: {told(error, Manifest)}") from None
     for name in manifest.files:
         inside(path.parent, name, f"{path}: files")
     for step in manifest.history:
@@ -140,11 +108,3 @@ def _raw(folder: Path, path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, RecursionError):
         return None
     return raw if isinstance(raw, dict) and MANIFEST_KEY in raw and isinstance(raw.get("files"), dict) else None
-
-
-def _allowed(error: Any) -> str:
-    """What pydantic says is expected, in our words."""
-    pattern = error.get("ctx", {}).get("pattern", "")
-    if pattern.startswith("^[A-Za-z_]"):
-        return "a name of letters, digits and _"
-    return "a hexadecimal digest" if pattern else re.sub(r"^Input should be ", "", error["msg"])

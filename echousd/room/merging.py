@@ -90,7 +90,9 @@ def closed_surface(parts: Sequence[Part], faces: int) -> tuple[trimesh.Trimesh, 
         used, index = np.unique(np.asarray(whole.faces)[members], return_inverse=True)
         made = Manifold(Mesh(points[used], index.reshape(-1, 3).astype(np.uint32)))
         if made.status() != Error.NoError:
-            raise ValueError(f"part {parts[0].name!r} is no closed solid ({made.status().name}); leave out --closed")
+            raise ValueError(
+                f"part {parts[0].name!r} is no closed solid ({made.status().name}); leave out merge=closed"
+            )
         made = made.as_original()
         word_of[made.original_id()] = slot[members[0]]
         solids.append(made)

@@ -5,8 +5,6 @@ Loads neither pxr nor torch, so that a wrong command line is told at once.
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -41,13 +39,3 @@ def writing(output: Path, *, flat: bool, force: bool, wait: bool, run: str = "")
     with held(output, wait=wait, run=run) as finished:
         claim(output, force=force)
         yield bool(run) and finished == run
-
-
-def set_crate_version(version: str | None) -> None:
-    """Make USD write usdc files of an older version; must come before USD writes its first one."""
-    if version is None:
-        return
-    found = re.fullmatch(r"0\.(\d{1,2})\.\d", version, re.ASCII)
-    if not found or int(found[1]) < 7:
-        raise ValueError(f"crate version is {version!r}, allowed: 0.7.0 and newer, such as 0.8.0")
-    os.environ["USD_WRITE_NEW_USDC_FILES_AS_VERSION"] = version

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import trimesh
 
-from echousd.room.finishes.harmonies import HARMONIES as PALETTES
-from echousd.room.manifest import FACES, check_seed
+from echousd.room.options import RoomOptions
 from echousd.room.styles import style_groups
 
 if TYPE_CHECKING:
@@ -20,60 +19,6 @@ if TYPE_CHECKING:
     from echousd.graph import SceneGraph
     from echousd.repair.report import Collision
     from echousd.room.geometry import Geometry
-
-
-DRESS = ("none", "some", "full")
-MERGES = ("parts", "bodies", "closed")
-
-
-@dataclass(frozen=True)
-class RoomOptions:
-    """How a room is written.
-
-    Arguments:
-        up_axis: `Y`, or `Z`: assets, shell, places, lights and cameras are written so (`echousd.turning`).
-        walls: add walls around the floor, with doors and windows in their openings.
-        ceiling: add a ceiling.
-        dress: how much small things it gets, `none`, `some` or `full`, see `echousd.room.dressing`. What stands is a
-            body with collider and mass; what hangs is static, a collider without mass; rugs, throws and cables, which
-            lie flat below or on what stands, have neither, as a collider there would lift it.
-        atlas: unwrap every mesh without overlaps (extra `texture`) instead of projecting along the axes.
-        merge: `parts`, a mesh for every part (legs, top, drawers), `bodies`, one for all that moves together,
-            or `closed`, likewise, as a single closed surface without insides (`echousd.room.merging`).
-        palette: harmony that is selected at first, one of `echousd.room.finishes.harmonies`; "" = the seed chooses.
-        materialx: give the room's materials a MaterialX network beside their UsdPreviewSurface.
-        crate: write the layers as usdc, which open faster, instead of text.
-        instances: objects that share an asset are instances of it, bound through its class: less memory, no overrides
-            below one of them alone.
-        thumbnails: a picture of every asset, `.thumbs/256x256/<name>.usda.png` in its folder (extra `render`).
-        dress_graph: small things are nodes of the graph on the stage, too, in the layer of the dressing
-            (`echousd.read_dressing`); readers of the graph pass over them.
-    """
-
-    up_axis: str = "Y"
-    walls: bool = False
-    atlas: bool = False
-    ceiling: bool = False
-    dress: str = "none"
-    palette: str = ""
-    merge: str = "parts"
-    materialx: bool = False
-    crate: bool = False
-    instances: bool = False
-    thumbnails: bool = False
-    dress_graph: bool = False
-
-    def __post_init__(self) -> None:
-        if self.up_axis not in ("Y", "Z"):
-            raise ValueError(f"up axis is {self.up_axis!r}, allowed: Y, Z")
-        if self.dress not in DRESS:
-            raise ValueError(f"dress is {self.dress!r}, allowed: {', '.join(DRESS)}")
-        if self.dress_graph and self.dress == "none":
-            raise ValueError("dress_graph writes small things into the graph, but dress is 'none', allowed: some, full")
-        if self.merge not in MERGES:
-            raise ValueError(f"merge is {self.merge!r}, allowed: {', '.join(MERGES)}")
-        if self.palette and self.palette not in PALETTES:
-            raise ValueError(f"palette is {self.palette!r}, allowed: {', '.join(PALETTES)}")
 
 
 @dataclass(frozen=True)
@@ -136,17 +81,13 @@ class LayoutOutcome:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a room comes from; written into every layer and, with the face budget of its meshes, into the manifest."""
+    """Where a room comes from; written into every layer and the manifest."""
 
     seed: int = 0
     preset: str = "compact"
     model: str = "none"
     shapes: str = "boxes"
     source: str = ""
-    faces: int = FACES
-
-    def __post_init__(self) -> None:
-        check_seed(self.seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +120,7 @@ class RoomData:
     outcomes: tuple[LayoutOutcome, ...] = ()
     notes: tuple[str, ...] = ()
     provenance: Provenance = Provenance()
-    options: RoomOptions = RoomOptions()
+    options: RoomOptions = field(default_factory=RoomOptions)
     timings: Mapping[str, float] = field(default_factory=dict)
     carried: Mapping[str, Mapping[str, bytes]] = field(default_factory=dict)
     edited: Path | None = None

@@ -21,7 +21,8 @@ from echousd.room import ownership, paintings
 from echousd.room.compose import LAYERS, room_files
 from echousd.room.geometry import Geometry
 from echousd.room.history import remembered, undone
-from echousd.room.manifest import FACES, FLAGS, MANIFEST_KEY
+from echousd.room.manifest import MANIFEST_KEY
+from echousd.room.options import Look
 from echousd.room.paths import layer_file
 from echousd.room.room import LayoutOutcome, RoomData
 from echousd.room.sources.retrieval import beside
@@ -37,14 +38,14 @@ def save_room(
     folder: Path,
     *,
     force: bool = False,
-    preview: bool = True,
+    preview: bool | None = None,
     wait: bool = False,
     store: str | Path | None = None,
 ) -> Path:
     """Write the layered room and its preview; see `Room.save`."""
     with folders.held(folder, wait=wait):
         root = save_layers(room, folder, force=force, store=store)
-        if preview:
+        if room.options.preview if preview is None else preview:
             write_preview(root)
             write_sheet(root)
         return root
@@ -189,15 +190,7 @@ def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
         "model": room.provenance.model,
         "shapes": room.provenance.shapes,
         "source": room.provenance.source,
-        "up_axis": room.options.up_axis,
-        "walls": room.options.walls,
-        "atlas": room.options.atlas,
-        "ceiling": room.options.ceiling,
-        "dress": room.options.dress,
-        **({"palette": room.options.palette} if room.options.palette else {}),
-        **({"faces": room.provenance.faces} if room.provenance.faces != FACES else {}),
-        **({"merge": room.options.merge} if room.options.merge != "parts" else {}),
-        **{word: True for word in FLAGS if getattr(room.options, word)},
+        **room.options.model_dump(include=set(Look.model_fields)),
         "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
         "relations": first.counts(),
         "notes": list(room.notes),

@@ -34,7 +34,7 @@ def write_room(
     """Write a room as layers with pictures, or as one flat file without; raises ValueError, see `Room.save`."""
     with timer.stage("write"):
         root = save_flat(room, output, force=force) if flat else save_layers(room, output, force=force, store=store)
-    if flat:
+    if flat or not room.options.preview:
         return Written(room, root)
     with timer.stage("preview"):
         preview = write_preview(root)

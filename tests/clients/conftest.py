@@ -32,7 +32,7 @@ def z_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room with Z up, its layers as usdc."""
     from echousd import RoomOptions, generate
 
-    options = RoomOptions("Z", walls=True, dress="some", crate=True)
+    options = RoomOptions(up_axis="Z", walls=True, dress="some", crate=True)
     return generate(SAMPLES / "study.usda", seed=301, options=options).save(tmp_path_factory.mktemp("z") / "study")
 
 

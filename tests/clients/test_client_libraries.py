@@ -10,10 +10,9 @@ import pytest
 from environments import python_of, run, three
 from pxr import Usd, UsdGeom, UsdShade
 from small_models import chest, seat, write_glb, write_obj, write_usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.assets.choose import asked_of
 from echousd.assets.index import index
 from echousd.exporting import export
 
@@ -32,8 +31,8 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_glb(folder / "models", "nightstand", chest(0.5, 0.5, 0.4))
     write_obj(folder / "models", "table_lamp", seat(0.25, 0.45, 0.25), scale=100)
     write_obj(folder / "models", "pendant_lamp", seat(0.5, 0.7, 0.5))
-    wishes = asked_of(index([folder / "models"], folder / "lib.parquet").file, collect=True)
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=wishes)
+    file = index([folder / "models"], folder / "lib.parquet").file
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file, collect=True, **BARE)
     return made.save(folder / "bedroom", preview=False)
 
 

@@ -9,6 +9,7 @@ import pytest
 import torch
 from inline_batches import Inline
 from pxr import Usd, UsdPhysics
+from small_room import BARE
 
 import echousd
 from echomodel.boxes import Boxes
@@ -81,7 +82,7 @@ def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
     assert graph.relation("stool", "in_line_with", "harp")
     assert SceneGraph.from_yaml(graph.to_yaml()) == graph
 
-    room = echousd.generate(graph, seed=3, shapes="boxes")
+    room = echousd.generate(graph, seed=3, shapes="boxes", **BARE)
     verdicts = {(v.subject, v.predicate): v.state for v in room.verdicts}
     assert set(verdicts.values()) == {"kept"}
     assert ("stool", "in_line_with") in verdicts

@@ -11,6 +11,8 @@ from echomodel.boxes import Boxes
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 
+BARE = {"walls": False, "dress": "none"}  # options of a room that is its furniture alone
+
 # category -> size, and places in the order of use (metres, radians)
 PLACES: dict[str, tuple[tuple[float, float, float], list[tuple[float, float, float, float]]]] = {
     "double_bed": ((1.8, 1.0, 2.1), [(0.0, 0.0, -0.6, 0.0)]),

@@ -66,11 +66,11 @@ def test_a_batch_asks_a_library_as_generate_does(library, source, tmp_path, monk
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"text": "oak"}, "--text 'oak' needs models to choose from"),
+        ({"text": "oak"}, "batch: text 'oak' needs models to choose from"),
         ({"assets": "none.parquet"}, "none.parquet: no such file, allowed: an index"),
-        ({"stretch": 9.0}, "options.stretch is 9.0"),
-        ({"licenses": ","}, "--licenses is ',', allowed: licences with commas between"),
-        ({"fit": "squeeze"}, "options.fit is 'squeeze'"),
+        ({"stretch": 9.0}, "batch: stretch is 9.0, allowed: 1 to 4"),
+        ({"licenses": ","}, "batch: licenses is ',', allowed: licences with commas between"),
+        ({"fit": "squeeze"}, "batch: fit is 'squeeze', allowed: keep or drop"),
     ],
 )
 def test_what_a_library_lacks_is_told_before_the_first_room(source, tmp_path, options, said):
@@ -118,7 +118,7 @@ def test_any_option_is_set_by_its_name(echousd_command, tmp_path):
     told = echousd_command("batch", "--sample", "bedroom:1", "--set", "ceiling", "-o", tmp_path / "run")
     assert (told.code, "--set is 'ceiling', allowed: an option of a room and its value" in told.err) == (2, True)
     told = echousd_command("batch", "--sample", "bedroom:1", "--set", "ceilin=true", "-o", tmp_path / "run")
-    assert (told.code, "unknown field, allowed: shapes" in told.err) == (2, True)
+    assert (told.code, "batch: ceilin is no option, allowed: assets, atlas, ceiling" in told.err) == (2, True)
     path = tmp_path / "batch.toml"
     path.write_text('[sample]\nbedroom = 1\n[options]\nassets = "lib.parquet"\nlicenses = "CC0"\nstretch = 1.3\n')
     options = request_of(read_toml(path), str(path)).options

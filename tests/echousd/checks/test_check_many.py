@@ -4,7 +4,7 @@ import json
 
 import pytest
 import torch
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
@@ -13,7 +13,7 @@ from echomodel.boxes import Boxes
 @pytest.fixture
 def rooms(tmp_path):
     for name in ("a", "b"):
-        room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+        room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
         room.save(tmp_path / name, preview=False)
     return tmp_path
 
@@ -89,13 +89,13 @@ def test_a_folder_without_rooms(tmp_path, echousd_command):
 
 def test_a_layout_of_ones_own():
     graph = small_graph()
-    drawn = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes").boxes
+    drawn = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes", **BARE).boxes
     moved = Boxes(drawn.size, drawn.position + torch.tensor([0.05, 0.0, 0.0]), drawn.yaw)
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes", boxes=moved)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", boxes=moved, **BARE)
     torch.testing.assert_close(room.boxes.position[:, [0, 2]], moved.position[:, [0, 2]], atol=2e-3, rtol=0)
     torch.testing.assert_close(room.boxes.size, moved.size, atol=2e-3, rtol=0)
     with pytest.raises(ValueError, match="boxes: 1 for a graph of"):
-        echousd.generate(graph, model=StandIn(), boxes=Boxes(drawn.size[:1], drawn.position[:1], drawn.yaw[:1]))
+        echousd.generate(graph, model=StandIn(), boxes=Boxes(drawn.size[:1], drawn.position[:1], drawn.yaw[:1]), **BARE)
 
 
 def test_a_piece_of_ones_own(tmp_path):
@@ -103,7 +103,7 @@ def test_a_piece_of_ones_own(tmp_path):
 
     file = tmp_path / "bed.obj"
     trimesh.creation.box((1.6, 0.6, 2.0)).export(file)
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", meshes={"bed": file})
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", meshes={"bed": file}, **BARE)
     assert room.geometry["bed"].origin.source == "own"
     with pytest.raises(ValueError, match=r"meshes: object 'bed': .*gone.glb: no such file"):
-        echousd.generate(small_graph(), model=StandIn(), meshes={"bed": tmp_path / "gone.glb"})
+        echousd.generate(small_graph(), model=StandIn(), meshes={"bed": tmp_path / "gone.glb"}, **BARE)

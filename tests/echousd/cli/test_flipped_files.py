@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 from flips import KINDS, Flip, fault, files_of
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 
@@ -16,7 +16,7 @@ COMMANDS = ("graph", "check --json", "glb")
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     return made.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutations import COMMANDS, SHAPES, VALUES, Mutation, mutate, properties
 from pxr import Usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.cli.main import run
@@ -48,7 +48,7 @@ class Hang(Exception):
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory) -> Path:
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     return made.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 

@@ -42,13 +42,14 @@ def read(text):
 
 def test_json_of_a_room_from_generation_to_export(graph, tmp_path, echousd_command):
     root = tmp_path / "bedroom/bedroom.usda"
-    done = echousd_command("generate", graph, "-o", root.parent, *BOXES, "--json", "--timings")
+    done = echousd_command("generate", graph, "-o", root.parent, *BOXES, "--json")
     made = read(done.out)
     assert made["written"] == [str(root), str(root.with_suffix(".png"))]
     assert made["ok"] == (done.code == 0) == (not made["faults"])
     (room,) = made["rooms"]
     assert (room["room"], room["objects"]) == (str(root), 6)
     assert sum(room["layouts"][0]["relations"].values()) == len(small_graph().relations)
+    assert set(made["timings"]) >= {"imports", "read", "load", "layout", "meshes", "write", "preview"}
     assert 0 < made["timings"]["write"] < made["timings"]["total"] <= made["seconds"] + 0.01
 
     wish = ("edit", root, "--restyle", "bed:oak", *BOXES, "--json")

@@ -78,7 +78,7 @@ def test_check_measures_placements(tmp_path):
     boxes = drawn(1)
     for good in (True, False):
         placed = repair(graph, boxes).boxes if good else boxes
-        room = echousd.generate(graph, shapes="boxes", boxes=placed, repair=False)
+        room = echousd.generate(graph, shapes="boxes", boxes=placed, repair=False, walls=False, dress="none")
         root = room.save(tmp_path / str(good))
         found = {str(each.relation): each.kept for each in check(root).relations}
         assert found["plant in_corner"] is good

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdSemantics
 from small_models import chest, seat
-from small_room import StandIn
+from small_room import BARE, StandIn
 
 import echousd
 from echousd import check
@@ -52,7 +52,7 @@ def test_a_half_furnished_stage_is_completed_and_left_as_it_is(loft, tmp_path):
     graph = adopted(loft, add=["wardrobe:wardrobe"], relate=["wardrobe taller than bed"])
     assert [node.locked for node in graph.nodes] == [True, True, False]
     assert graph.node("bed").asset == f"{loft.as_posix()}</World/Furniture/bed>"
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes")
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
     root = room.save(tmp_path / "out/loft_room", preview=False)
     assert hashlib.sha256(loft.read_bytes()).hexdigest() == before
     ours, theirs = open_stage(root), open_stage(loft)
@@ -114,7 +114,7 @@ def test_what_a_person_would_point_at_in_their_arrangement_is_told(tmp_path, tur
         ("sofa", seat(2.0, 0.8, 0.9), "sofa", (0, 0, 1), turn),
     )
     graph = adopted(loft, room="living_room", add=["plant:plant"])
-    room = echousd.generate(graph, shapes="boxes", steps=2, drafts=1)
+    room = echousd.generate(graph, shapes="boxes", steps=2, drafts=1, **BARE)
     assert seen_in_theirs(room) == seen
     row = room.names.index("sofa")
     np.testing.assert_allclose(room.boxes.position[row], (0, 0, 1), atol=2e-3)
@@ -133,4 +133,4 @@ def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monk
     assert UsdGeom.Mesh(form).GetPointsAttr().Get()
     done = echousd_command(*words, "--text", "mid-century oak")
     assert done.code == 2
-    assert "--text 'mid-century oak' needs models to choose from; name a library's index with --assets" in done.err
+    assert "text 'mid-century oak' needs models to choose from; name a library's index (assets)" in done.err

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
+from small_room import BARE
 
 import echousd
 from echomodel.vocabulary import vocabulary
@@ -36,7 +37,7 @@ def test_graphs_without_relations_become_rooms(graph, seed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RoomWarning)
         try:
-            room = echousd.generate(graph, seed=seed, shapes="boxes", drafts=1)
+            room = echousd.generate(graph, seed=seed, shapes="boxes", drafts=1, **BARE)
         except GraphError:  # the floor is too small for it, which is said in one line
             reject()
     assert room.names == graph.names

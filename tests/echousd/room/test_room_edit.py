@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 from pxr import Sdf, Usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.protocols import GraphEdit
@@ -19,7 +19,7 @@ from echousd.room.reading import read_room
 
 @pytest.fixture
 def root(tmp_path):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600)
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
     return room.save(tmp_path / "bedroom", preview=False)
 
 
@@ -32,7 +32,7 @@ def hashes(folder):
 
 
 def test_room_reads_back(root):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600)
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
     saved = read_room(root)
     assert saved.graph == room.graph
     assert saved.assets == room.assets
@@ -93,7 +93,7 @@ def test_an_edit_leaves_small_things_alone(tmp_path):
 
 
 def test_all_layouts_of_a_room_are_kept(tmp_path):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(0.4), faces=600, samples=3)
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(0.4), faces=600, layouts=3, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     saved = read_room(root)
     assert len(saved.layouts) == 3

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from small_room import BARE
 
 import echousd
 from echomodel.boxes import Boxes
@@ -25,7 +26,7 @@ def graph_of(room):
 def test_a_hall_of_twenty_and_more_is_furnished_without_a_collision():
     halls = [hall for hall in generate_rooms(40, 11, halls=1.0) if 20 <= len(hall) <= 28]
     graph = graph_of(min(halls, key=len))
-    room = echousd.generate(graph, shapes="boxes", seed=1)
+    room = echousd.generate(graph, shapes="boxes", seed=1, **BARE)
     assert room.faults == ()
     assert len(living_faults(room.graph, room.boxes)) <= 0.08 * len(graph.nodes)
 
@@ -35,11 +36,11 @@ def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
     nodes = tuple(Node(word, word) for word in words)
     graph = SceneGraph(nodes=nodes, relations=(), room=RoomSpec(type="bedroom", size=(3.0, 2.0)))
     with pytest.raises(ValueError, match="too small for its furniture"):
-        echousd.generate(graph, shapes="boxes", seed=2)
+        echousd.generate(graph, shapes="boxes", seed=2, **BARE)
     (tmp_path / "flat.yaml").write_text(graph.to_yaml(), encoding="utf-8")
     with pytest.raises(ValueError, match=r"^flat\.yaml: the floor of 3\.00 x 2\.00 m .* is too small"):
-        echousd.generate(tmp_path / "flat.yaml", shapes="boxes", seed=2)
-    room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=2)
+        echousd.generate(tmp_path / "flat.yaml", shapes="boxes", seed=2, **BARE)
+    room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=2, **BARE)
     gone = set(words) - set(room.graph.names)
     assert gone
     assert {note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out")} == gone

@@ -4,7 +4,7 @@ import json
 import warnings
 
 import pytest
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
@@ -38,7 +38,7 @@ def together():
 
 def test_a_collision_that_is_left_is_warned_of_and_in_the_manifest(tmp_path):
     with pytest.warns(RoomWarning, match="bed and wardrobe collide by 1.10 m"):
-        room = echousd.generate(together(), model=StandIn(), shapes="boxes")
+        room = echousd.generate(together(), model=StandIn(), shapes="boxes", **BARE)
     assert any("bed and wardrobe collide" in fault for fault in room.faults)
     root = room.save(tmp_path / "room", preview=False)
     (only,) = json.loads(root.with_suffix(".json").read_text())["layouts"]
@@ -48,7 +48,7 @@ def test_a_collision_that_is_left_is_warned_of_and_in_the_manifest(tmp_path):
 def test_a_good_room_warns_of_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert echousd.generate(small_graph(), model=StandIn(), shapes="boxes").faults == ()
+        assert echousd.generate(small_graph(), model=StandIn(), shapes="boxes", **BARE).faults == ()
 
 
 def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch):
@@ -71,7 +71,7 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
 def later(tmp_path_factory):
     """A room whose second layout is bad."""
     with pytest.warns(RoomWarning, match="layout_1: bed and wardrobe collide"):
-        room = echousd.generate(small_graph(), model=Piled(True), shapes="boxes", samples=2, repair=False)
+        room = echousd.generate(small_graph(), model=Piled(True), shapes="boxes", layouts=2, repair=False, **BARE)
     assert [len(found.collisions) > 0 for found in room.outcomes] == [False, True]
     return room.save(tmp_path_factory.mktemp("rooms") / "room")
 
@@ -125,10 +125,10 @@ def test_more_layouts_are_drawn_again_where_the_first_try_fails():
         return graph.replaced(room=graph.room.replaced(openings=(window,)))
 
     model = Counting()
-    room = echousd.generate(lit(small_graph()), model=model, shapes="boxes", samples=3)
+    room = echousd.generate(lit(small_graph()), model=model, shapes="boxes", layouts=3, **BARE)
     assert [found.faults for found in room.outcomes] == [(), (), ()]
     assert model.drawn == 3  # none was drawn twice
     crowded = Counting()
     with pytest.warns(RoomWarning):
-        echousd.generate(lit(together()), model=crowded, shapes="boxes", samples=2)
+        echousd.generate(lit(together()), model=crowded, shapes="boxes", layouts=2, **BARE)
     assert crowded.drawn == 3 + 3  # crowding is seen in both

@@ -4,7 +4,7 @@ import json
 import warnings
 
 import pytest
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.pending import STAGING
@@ -17,7 +17,7 @@ OUTSIDE = "precious"
 
 
 def make(seed=0, graph=None):
-    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(0.5), shapes="boxes", repair=False)
+    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(0.5), shapes="boxes", repair=False, **BARE)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.checks import check
@@ -70,9 +70,9 @@ def test_one_of_them(file, tmp_path, echousd_command):
     done = echousd_command("generate", file, "-o", tmp_path / "north", "--room", "/House/North")
     assert done.code == 2
     assert "no room '/House/North', allowed: /House/West, /House/East" in done.err
-    assert len(echousd.generate(file, room="/House/West", model=StandIn(), shapes="boxes").names) == 6
+    assert len(echousd.generate(file, room="/House/West", model=StandIn(), shapes="boxes", **BARE).names) == 6
     with pytest.raises(ValueError, match=r"2 rooms, say which one of /House/West, /House/East"):
-        echousd.generate(file, model=StandIn(), shapes="boxes")
+        echousd.generate(file, model=StandIn(), shapes="boxes", **BARE)
 
 
 def test_a_file_that_is_no_house_of_ours_stays(file, tmp_path, echousd_command):

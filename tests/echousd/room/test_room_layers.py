@@ -4,7 +4,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
-from small_room import OBJECTS, StandIn, small_graph
+from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.room import RoomOptions
@@ -15,7 +15,7 @@ from echousd.views import perspective_view
 
 @pytest.fixture(scope="module")
 def room():
-    return echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, faces=800)
+    return echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, faces=800, **BARE)
 
 
 @pytest.fixture(scope="module")
@@ -302,7 +302,12 @@ def test_provenance_in_every_layer_and_in_the_manifest(root, room, stage):
 
 def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
     turned = echousd.generate(
-        small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions("Z")
+        small_graph(),
+        seed=3,
+        model=StandIn(),
+        repair=False,
+        shapes="boxes",
+        options=RoomOptions(up_axis="Z", walls=False, dress="none"),
     )
     stage = Usd.Stage.Open(str(turned.save(tmp_path / "bedroom", preview=False)))
     assert UsdGeom.GetStageUpAxis(stage) == "Z"
@@ -325,7 +330,9 @@ def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
 
 def test_walls_stand_around_the_floor(tmp_path):
     graph = small_graph(size=None, floor_polygon=((-2, -2), (2, -2), (2, 2), (0, 2), (0, 1), (-2, 1)), height=3.0)
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True))
+    room = echousd.generate(
+        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+    )
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     walls = [p for p in stage.GetPrimAtPath("/Room/Shell").GetChildren() if p.GetName().startswith("Wall_")]
     assert len(walls) == 6
@@ -340,7 +347,7 @@ def test_walls_stand_around_the_floor(tmp_path):
 
 def test_a_floor_that_nobody_stated_lies_under_all_furniture():
     graph = small_graph(size=None)
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes")
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE)
     corners = np.array(
         [room.pose(i) @ [x, 0, z, 1] for i, n in enumerate(room.names) for x, z in room.meshes[n].bounds[:, [0, 2]]]
     )

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 from small_models import chest, picture, seat, small_library, write_obj, write_usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.assets.choose import Asked, AssetWishes, asked_of, choose
+from echousd.assets.choose import Asked, AssetWishes, choose
 from echousd.assets.index import index
 from echousd.assets.table import read_library
 from echousd.checks import check
@@ -33,7 +33,7 @@ def boxes_of(stage, name):
 
 
 def test_a_room_of_a_library(library, tmp_path):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="library", assets=library)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="library", assets=library, **BARE)
     assert not room.faults
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = open_stage(root)
@@ -64,7 +64,9 @@ def test_a_room_of_a_library(library, tmp_path):
 def test_equal_arguments_give_equal_rooms(library):
     from echousd.room.compose import room_files
 
-    rooms = [echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=library) for _ in range(2)]
+    rooms = [
+        echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=library, **BARE) for _ in range(2)
+    ]
     assert room_files(rooms[0]) == room_files(rooms[1])
 
 
@@ -73,7 +75,7 @@ def test_a_piece_of_ones_own_beside_generated_ones(tmp_path):
     graph = small_graph().update_node("wardrobe", asset="mine/dresser.usda")
     text = tmp_path / "bedroom.yaml"
     text.write_text(graph.to_yaml())
-    room = echousd.generate(text, model=StandIn(), shapes="boxes")
+    room = echousd.generate(text, model=StandIn(), shapes="boxes", **BARE)
     assert room.boxes.size[room.names.index("wardrobe")].tolist() == pytest.approx([1.0, 2.0, 0.5], abs=1e-3)
     assert {geometry.origin.source for geometry in room.geometry.values()} == {"own", "boxes"}
     root = room.save(tmp_path / "out/bedroom", preview=False)
@@ -81,12 +83,12 @@ def test_a_piece_of_ones_own_beside_generated_ones(tmp_path):
     assert read_room(root).graph.node("wardrobe").asset == "../../mine/dresser.usda"
     with pytest.raises(ValueError, match=r"'wardrobe': asset names .*dresser.usda, allowed: files below .*bedroom \("):
         echousd.generate(root, model=StandIn(), shapes="boxes")
-    again = echousd.generate(root, model=StandIn(), shapes="boxes", assets=AssetWishes(outside=(tmp_path / "mine",)))
+    again = echousd.generate(root, model=StandIn(), shapes="boxes", outside=[tmp_path / "mine"], **BARE)
     assert again.geometry["wardrobe"].origin.asset == "dresser.usda"
 
 
 def test_an_edit_keeps_models_and_their_paths(library, tmp_path):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="library", assets=library)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="library", assets=library, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     before = {path: path.read_bytes() for path in (tmp_path / "bedroom/assets").rglob("*") if path.is_file()}
     graph = read_room(root).graph.add_node("chest", "wardrobe").relate("chest", "close_by", "bed")
@@ -100,7 +102,7 @@ def test_an_edit_keeps_models_and_their_paths(library, tmp_path):
 
 def test_faults_name_the_object_and_the_file(library, tmp_path):
     def made(graph, **options):
-        return echousd.generate(graph, model=StandIn(), **options)
+        return echousd.generate(graph, model=StandIn(), **options, **BARE)
 
     with pytest.raises(ValueError, match=r"object 'lamp': .*nowhere.glb: no such file"):
         made(small_graph().update_node("lamp", asset="nowhere.glb"), shapes="boxes")
@@ -119,18 +121,18 @@ def test_a_model_that_vanished_or_changed_since_it_was_indexed_is_told(tmp_path)
     file = index([folder], tmp_path / "lib.parquet").file
     (folder / "storage/thing_17.usda").write_text("#usda 1.0\n")
     with pytest.raises(ValueError, match=r"storage/thing_17.usda': .* was changed since; index the folder again"):
-        echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
+        echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file, **BARE)
     (folder / "storage/thing_17.usda").unlink()
     with pytest.raises(ValueError, match=r"thing_17.usda: no such file; index the folder again"):
-        echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
+        echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file, **BARE)
 
 
 def test_collected_models_make_a_room_that_needs_no_library(tmp_path):
     folder = small_library(tmp_path / "models")
     write_usd(folder / "storage/thing_17.usda", chest(1.6, 2.2, 0.6), label="wardrobe", texture="./oak.png")
     (folder / "storage/oak.png").write_bytes(picture())
-    wishes = asked_of(index([folder], tmp_path / "lib.parquet").file, collect=True)
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=wishes)
+    file = index([folder], tmp_path / "lib.parquet").file
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file, collect=True, **BARE)
     root = room.save(tmp_path / "out/bedroom", preview=False)
     shutil.rmtree(folder)
     moved = tmp_path / "elsewhere"
@@ -148,7 +150,7 @@ def test_collected_models_make_a_room_that_needs_no_library(tmp_path):
 def test_a_room_packs_models_of_a_library_where_that_is_allowed(tmp_path):
     folder = small_library(tmp_path / "models")
     file = index([folder], tmp_path / "lib.parquet").file
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=file, **BARE)
     root = room.save(tmp_path / "out/bedroom", preview=False)
     with pytest.raises(ValueError, match=r"allowed: files in .* \(--search DIR adds one\)"):
         export(root, tmp_path / "room.usdz")
@@ -158,7 +160,9 @@ def test_a_room_packs_models_of_a_library_where_that_is_allowed(tmp_path):
 def test_models_lie_once_in_a_store(library, tmp_path):
     for number in range(3):
         graph = small_graph(size=(4.0 + 0.2 * number, 3.4))
-        room = echousd.generate(graph, seed=number, model=StandIn(0.05 * number), shapes="library", assets=library)
+        room = echousd.generate(
+            graph, seed=number, model=StandIn(0.05 * number), shapes="library", assets=library, **BARE
+        )
         root = room.save(tmp_path / f"room_{number}", preview=False, store=tmp_path / "store")
         assert open_stage(root).GetPrimAtPath("/Room/Objects/lamp/lamp_placed/lamp_model/mesh_0")
         assert check(root).ok
@@ -184,12 +188,12 @@ def test_nothing_out_of_the_library_is_taken(tmp_path):
     assert found["wardrobe.obj"].missing == ("../secret.png",)
     assert found["double_bed.obj"].missing == (str(tmp_path / "secret.png"),)
     graph = small_graph()
-    room = echousd.generate(graph, model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(graph, model=StandIn(), shapes="library", assets=done.file, **BARE)
     assert not any(path.endswith(".png") for g in room.geometry.values() if g.original for path in g.original.files)
     with pytest.raises(
         ValueError, match=r"nightstand.usda: </.+> depends on .*secret.png, allowed: files below .*models"
     ):
-        echousd.generate(graph, model=StandIn(), shapes="library", assets=asked_of(done.file, collect=True))
+        echousd.generate(graph, model=StandIn(), shapes="library", assets=done.file, collect=True, **BARE)
 
 
 def test_variants_payloads_and_materials_of_a_model_are_kept(tmp_path):
@@ -208,7 +212,7 @@ def test_variants_payloads_and_materials_of_a_model_are_kept(tmp_path):
     done = index([tmp_path / "models"], tmp_path / "lib.parquet")
     record = read_library(done.file).records["wardrobe.usda"]
     assert (done.models, record.variants, inner.exists()) == (1, ("finish=white",), True)
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file, **BARE)
     assert room.notes[0].startswith("the library has nothing for bed, nightstand_left, nightstand_right, lamp, pendant")
     saved = open_stage(room.save(tmp_path / "bedroom", preview=False))
     model = saved.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model")
@@ -226,7 +230,7 @@ def test_models_with_colliders_of_their_own_keep_them_and_are_not_stretched(tmp_
     stage.Save()
     done = index([tmp_path / "models"], tmp_path / "lib.parquet")
     assert read_library(done.file).records["wardrobe.usda"].rigid
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file, **BARE)
     assert room.boxes.size[room.names.index("wardrobe")].tolist() == pytest.approx([1.5, 2.1, 0.58], abs=1e-3)
     saved = open_stage(room.save(tmp_path / "bedroom", preview=False))
     assert not saved.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_collider")
@@ -235,13 +239,12 @@ def test_models_with_colliders_of_their_own_keep_them_and_are_not_stretched(tmp_
 
 
 def test_licences_are_filtered(library):
-    wishes = asked_of(library, licences="CC-BY")
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=wishes)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=library, licenses="CC-BY", **BARE)
     assert not any(geometry.origin.asset for geometry in room.geometry.values())  # all of them are CC0
-    with pytest.raises(ValueError, match="--licenses is '', allowed: licences with commas between"):
-        asked_of(library, licences="")
+    with pytest.raises(ValueError, match="licenses is '', allowed: licences with commas between"):
+        echousd.RoomOptions(assets=library, licenses="")
     with pytest.raises(ValueError, match="stretch is 9, allowed: 1 to 4"):
-        asked_of(library, stretch=9)
+        echousd.RoomOptions(assets=library, stretch=9)
 
 
 def test_objects_of_a_set_share_a_model_and_others_do_not_repeat(tmp_path):

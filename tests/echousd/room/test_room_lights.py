@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from pxr import Gf, Usd, UsdGeom, UsdLux
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
@@ -22,7 +22,9 @@ WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory):
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True))
+    room = echousd.generate(
+        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+    )
     return Usd.Stage.Open(str(room.save(tmp_path_factory.mktemp("lights") / "bedroom", preview=False)))
 
 
@@ -60,11 +62,13 @@ def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path
     assert up[2] > up[0] > 120
     assert down[1] > down[2]
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
-    options = RoomOptions(walls=True, ceiling=True)
+    options = RoomOptions(walls=True, ceiling=True, dress="none")
     room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
     closed = Usd.Stage.Open(str(room.save(tmp_path / "closed", preview=False)))
     assert intensity(closed, "sun") > 2 * intensity(stage, "sun")  # through the window alone
-    bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes").save(tmp_path / "bare", preview=False)
+    bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE).save(
+        tmp_path / "bare", preview=False
+    )
     assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
 
 
@@ -86,7 +90,7 @@ def test_lamps_shine_where_they_are(stage) -> None:
 
 
 def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
-    room = echousd.generate(small_graph(), model=StandIn(), repair=False, shapes="boxes")
+    room = echousd.generate(small_graph(), model=StandIn(), repair=False, shapes="boxes", **BARE)
     moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
     stage = Usd.Stage.Open(str(replace(room, layouts=(room.boxes, moved)).save(tmp_path / "two", preview=False)))
     layouts = stage.GetPrimAtPath("/Room").GetVariantSet("layout")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from pxr import Sdf, Vt
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.room.paintings import RECORD, read_look
@@ -33,7 +33,7 @@ def test_records_name_prims_inside_a_room():
 
 @pytest.fixture
 def root(tmp_path):
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     return made.save(tmp_path / "bedroom", preview=False)
 
 
@@ -44,7 +44,9 @@ def test_an_edit_leaves_a_room_that_opens(root, place):
     layer = Sdf.Layer.OpenAsAnonymous(str(root))
     layer.subLayerPaths = ["./looks/oil.usda", *layer.subLayerPaths]
     root.write_text(layer.ExportToString())
-    echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False).save(root.parent, preview=False)
+    echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False, **BARE).save(
+        root.parent, preview=False
+    )
     assert open_stage(root).GetPrimAtPath("/Room/Objects/bed")
 
 

@@ -83,5 +83,5 @@ def test_a_closed_surface_keeps_a_small_budget_and_says_what_is_not_closed():
     box = trimesh.creation.box()
     box.update_faces(np.arange(12) > 0)
     lid_off = replace(plant, parts=(Part("crate", box, {"wood": np.arange(11)}),), coarse=())
-    with pytest.raises(ValueError, match=r"part 'crate' is no closed solid \(\w+\); leave out --closed"):
+    with pytest.raises(ValueError, match=r"part 'crate' is no closed solid \(\w+\); leave out merge=closed"):
         merged({"fern": lid_off}, "closed", 5000)

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from pxr import Sdf, Usd, UsdGeom
 from small_models import chest, picture, seat, write_obj, write_usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.assets.index import index
@@ -35,7 +35,7 @@ def test_a_converted_model_is_no_longer_inside_out(tmp_path):
     mesh.faces = mesh.faces[:, ::-1]
     write_obj(tmp_path / "models", "wardrobe", mesh)
     done = index([tmp_path / "models"], tmp_path / "lib.parquet")
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file, **BARE)
     stage = open_stage(room.save(tmp_path / "room", preview=False))
     form = UsdGeom.Mesh(stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model/mesh_0"))
     index_of = np.array(form.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
@@ -64,7 +64,7 @@ def test_folders_of_a_simulators_models_have_one_row_each(tmp_path):
         "table_collision.obj": found["table_collision.obj"].category,
     }
     assert all(record.missing == () for key, record in found.items() if "aws" in key)
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file, **BARE)
     root = room.save(tmp_path / "room", preview=False)
     assert [path.suffix for path in (root.parent / "assets/wardrobe/original/textures").iterdir()] == [".png"]
 
@@ -82,7 +82,7 @@ def test_payloads_within_payloads_and_inherited_classes_arrive(tmp_path):
     done = index([tmp_path / "models"], tmp_path / "lib.parquet")
     assert (done.models, inner.exists()) == (1, True)
     assert read_library(done.file).records["wardrobe.usda"].dims == pytest.approx((1.6, 2.2, 0.6), abs=1e-3)
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="library", assets=done.file, **BARE)
     stage = open_stage(room.save(tmp_path / "room", preview=False))
     form = stage.GetPrimAtPath("/Room/Objects/wardrobe/wardrobe_placed/wardrobe_model/inside/inside/form")
     box = UsdGeom.BBoxCache(Usd.TimeCode.Default(), ["default"]).ComputeWorldBound(form).ComputeAlignedRange()

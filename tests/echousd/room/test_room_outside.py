@@ -9,10 +9,9 @@ from dataclasses import replace
 import pytest
 from inline_batches import QUICK, Inline
 from small_models import chest, picture, write_obj
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.assets.choose import AssetWishes, asked_of
 from echousd.assets.index import index
 from echousd.assets.table import read_library, write_library
 from echousd.batches.batch import batch
@@ -47,7 +46,7 @@ def test_an_index_reaches_no_further_than_its_folder(sent, echousd_command):
     )
     assert (done.code, "a row names" in done.err) == (2, True)
     assert not (sent / "out").exists()
-    room = echousd.generate(graph, model=StandIn(), shapes="library", assets=asked_of(file, outside=[sent.parent]))
+    room = echousd.generate(graph, model=StandIn(), shapes="library", assets=file, outside=[sent.parent], **BARE)
     brought = [content for g in room.geometry.values() if g.original for content in g.original.files.values()]
     assert any(content.startswith(b"\x89PNG") for content in brought)
 
@@ -99,8 +98,8 @@ def test_a_room_reaches_no_further_than_its_folder(sent, echousd_command):
     done = echousd_command("edit", root, "--resize", "wardrobe:1,1.9,0.5")
     assert (done.code, "secret.obj, allowed: files below" in done.err) == (2, True)
     assert {path: path.read_bytes() for path in (sent / "bedroom").rglob("*") if path.is_file()} == before
-    allowed = AssetWishes(outside=(sent.parent / "outside",))
-    assert edit(root, wished, model=StandIn(), shapes="boxes", assets=allowed).geometry["wardrobe"].original
+    allowed = [sent.parent / "outside"]
+    assert edit(root, wished, model=StandIn(), shapes="boxes", outside=allowed).geometry["wardrobe"].original
     assert edit(root, read_room(root).graph.remove_node("lamp"), model=StandIn()).names  # nothing of it is read anew
 
 

@@ -7,7 +7,7 @@ import warnings
 
 import pytest
 from pxr import Sdf, Usd
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.pending import STAGING
@@ -21,7 +21,9 @@ MINE = '#usda 1.0\n(\n    defaultPrim = "fern"\n)\ndef Sphere "fern" {}\n'
 
 def make(seed=0, graph=None, **more):
     model = StandIn(0.5)
-    return echousd.generate(graph or small_graph(), seed=seed, model=model, shapes="boxes", repair=False, **more)
+    return echousd.generate(
+        graph or small_graph(), seed=seed, model=model, shapes="boxes", repair=False, **more, **BARE
+    )
 
 
 def remade(root, graph):

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
@@ -95,7 +95,7 @@ def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
 def test_what_the_graph_fixes_comes_back():
     graph = small_graph().update_node("wardrobe", size=(1.0, 2.0, 0.5), yaw=0.3)
     graph = graph.update_node("bed", size=(1.4, 0.9, 2.0), position=(0.2, 0.0, 0.1), yaw=0.5)
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
     at = room.names.index("wardrobe")
     np.testing.assert_allclose(room.boxes.size[at], (1.0, 2.0, 0.5))
     assert float(room.boxes.yaw[at]) == pytest.approx(0.3)
@@ -105,7 +105,7 @@ def test_what_the_graph_fixes_comes_back():
 def test_floor_away_from_the_origin_takes_the_furniture_along():
     corners = ((8.0, 3.0), (12.0, 3.0), (12.0, 7.0), (8.0, 7.0))
     room = echousd.generate(
-        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False
+        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False**BARE
     )
     np.testing.assert_allclose(room.boxes.position[0], (10.0, 0.0, 4.4), atol=1e-5)
 
@@ -117,16 +117,16 @@ def test_repair_keeps_the_graph():
             return Boxes(found.size, found.position * torch.tensor([0.3, 1.0, 0.3]), found.yaw)
 
     graph = small_graph().relate("nightstand_left", "front", "bed")
-    heap = echousd.generate(graph, model=Heap(), shapes="boxes", repair=False)
+    heap = echousd.generate(graph, model=Heap(), shapes="boxes", repair=False, **BARE)
     assert any(v.state == "broken" for v in heap.verdicts)
-    room = echousd.generate(graph, model=Heap(), shapes="boxes")
+    room = echousd.generate(graph, model=Heap(), shapes="boxes", **BARE)
     assert [v.state for v in room.verdicts if v.state != "unmeasured"] == ["kept"] * 5
     assert room.notes == ()
     assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
 
 
 def test_verdicts_are_those_of_the_rules():
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     by = {(v.subject, v.predicate): v for v in room.verdicts}
     assert by["lamp", "standing_on"].state == "kept"
     assert by["nightstand_left", "same_style_as"].state == "unmeasured"
@@ -141,7 +141,7 @@ def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
     small_graph().to_stage(tmp_path / "graph.usda")
     told = []
     room = echousd.generate(
-        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state)
+        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state) ** BARE
     )
     assert room.graph.replaced(room=small_graph().room) == small_graph()
     assert {opening.kind for opening in room.graph.room.openings} == {"door", "window"}
@@ -164,7 +164,7 @@ class Empty(StandIn):
     ("arguments", "text"),
     [
         ({"shapes": "cubes"}, "shapes is 'cubes', allowed: parts, sdf, boxes"),
-        ({"samples": 0}, "samples is 0, allowed: 1 to 1000"),
+        ({"layouts": 0}, "layouts is 0, allowed: 1 to 1000"),
         ({"seed": -1}, "seed is -1, allowed: 0 to 9223372036854775807"),
         ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),
         ({"model": Empty()}, "shape of 'bed': TSDF holds no surface"),
@@ -179,21 +179,21 @@ def test_bad_arguments_are_named(arguments, text):
 def test_more_objects_than_a_room_may_hold_are_refused():
     crowd = SceneGraph("living_room", tuple(Node(f"chair_{i}", "dining_chair") for i in range(201)))
     with pytest.raises(ValueError, match="the graph: 201 objects, allowed in one room: 200"):
-        echousd.generate(crowd, model=StandIn(), shapes="boxes")
+        echousd.generate(crowd, model=StandIn(), shapes="boxes", **BARE)
 
 
 def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -> None:
     graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("bed", "double_bed"), Node("wardrobe", "wardrobe")))
-    first = echousd.generate(graph, seed=1, shapes="boxes")
+    first = echousd.generate(graph, seed=1, shapes="boxes", **BARE)
     first.save(tmp_path / "room", preview=False)
     locked = graph.lock("wardrobe").relate("bed", "left", "wardrobe")
-    again = echousd.generate(locked, seed=9, shapes="boxes", earlier=tmp_path / "room")
+    again = echousd.generate(locked, seed=9, shapes="boxes", earlier=tmp_path / "room", **BARE)
     for field in ("size", "position", "yaw"):
         assert torch.allclose(getattr(again.boxes, field)[1], getattr(first.boxes, field)[1], atol=2e-3)
     stage = tmp_path / "room" / "room.usda"
     text = SceneGraph.from_stage(str(stage)).lock("wardrobe")
     assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
-    homeless = echousd.generate(locked, seed=9, shapes="boxes")
+    homeless = echousd.generate(locked, seed=9, shapes="boxes", **BARE)
     assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes
     assert with_locked_places(locked.update_node("wardrobe", position=(0.5, 0.0, 0.5)))[1] == ()
 
@@ -203,8 +203,8 @@ def test_what_cannot_fit_is_said_or_left_out() -> None:
     nodes += (Node("bed", "double_bed", size=(1.8, 1.0, 2.1)),)
     graph = SceneGraph(RoomSpec("bedroom", size=(2.6, 2.9)), nodes)
     with pytest.raises(ValueError, match="too small for its furniture"):
-        echousd.generate(graph, model=StandIn(), shapes="boxes")
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes", fit="drop")
+        echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", fit="drop", **BARE)
     assert not room.faults
     assert "bed" in room.names
     gone = sorted(set(graph.names) - set(room.names))
@@ -212,12 +212,12 @@ def test_what_cannot_fit_is_said_or_left_out() -> None:
     said = sorted(note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out"))
     assert said == gone
     with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep, drop"):
-        echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze")
+        echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze", **BARE)
 
 
 def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
     nodes = (Node("bed", "double_bed", size=(0.18, 0.9, 2.0)), Node("wardrobe", "wardrobe", size=(0.9, 2.0, 0.6)))
     graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), nodes, ())
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes")
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
     assert room.boxes.size[0].tolist() == pytest.approx([0.18, 0.9, 2.0])
     assert room.notes == ("bed is 0.18 m wide as stated; such furniture: 1.32 to 3.28 m",)

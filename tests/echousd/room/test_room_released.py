@@ -13,6 +13,7 @@ from pxr import Usd, UsdGeom
 from safetensors.torch import save_file
 from small_room import ball_tsdf, small_graph
 
+from echomodel.loading import load_model
 from echomodel.roomboxes import RoomBoxes, write_rooms
 from echomodel.text import ClipTextEncoder
 from echoscene.bounds import statistics_from_bounds
@@ -52,7 +53,7 @@ def weights(tmp_path, monkeypatch) -> Path:
 def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
     small_graph().to_stage(tmp_path / "graph.usda")
     folder = tmp_path / "out" / "bedroom"
-    words = ("--weights", weights, "--preset", "released", "--seed", 3, "--steps", 2, "--faces", 400)
+    words = ("--weights", weights, "--seed", 3, "--steps", 2, "--faces", 400)
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", folder, *words)
     assert done.code == 0, done.err
     manifest = json.loads((folder / "bedroom.json").read_text())
@@ -86,9 +87,10 @@ def test_scored_like_any_other_model(weights, tmp_path, echousd_command):
 def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):
     graph, out = tmp_path / "graph.usda", tmp_path / "room"
     small_graph().to_stage(graph)
-    done = echousd_command("generate", graph, "-o", out, "--model", weights, "--preset", "compact")
-    assert (done.code, out.exists()) == (2, False)
-    assert "model.safetensors: holds a model of the preset 'released', asked for: 'compact'" in done.err
+    with pytest.raises(ValueError, match="holds a model of the preset 'released', asked for: 'compact'"):
+        load_model(weights, "compact")
+    with pytest.raises(ValueError, match=r"convert a published checkpoint .echousd convert. and name"):
+        load_model(None, "released")
     monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "empty"))
     from echomodel.text import TextEncoderError
 

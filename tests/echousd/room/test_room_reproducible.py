@@ -8,7 +8,7 @@ import textwrap
 import numpy as np
 import pytest
 import torch
-from small_room import small_graph
+from small_room import BARE, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
@@ -109,7 +109,7 @@ def test_networks_run_on_one_thread(shapes, monkeypatch):
     before = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
-        echousd.generate(small_graph(), model=echo, shapes=shapes, steps=1, drafts=1, faces=100, repair=False)
+        echousd.generate(small_graph(), model=echo, shapes=shapes, steps=1, drafts=1, faces=100, repair=False, **BARE)
     finally:
         torch.set_num_threads(before)
     assert seen == [("sample_layout", 1), ("sample_furniture" if shapes == "parts" else "sample_shapes", 1)]

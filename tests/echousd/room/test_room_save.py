@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 from stopped_disk import stopped_disk
 
 import echousd
 from echomodel.files import HOST
 from echousd.naming import as_identifier
 from echousd.pending import STAGING
-from echousd.room import RoomOptions
 from echousd.room.compose import room_files
 from echousd.room.flat import save_flat
 from echousd.room.save import write_preview
@@ -23,7 +22,7 @@ from echousd.room.save import write_preview
 
 def make(seed=0, shift=0.5, graph=None, **more):
     more = {"repair": False, "shapes": "boxes", **more}
-    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(shift), **more)
+    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(shift), **{**BARE, **more})
 
 
 def opened(path):
@@ -265,11 +264,11 @@ def test_z_up_over_an_edited_y_up_root_is_refused(tmp_path):
     root = make(seed=1).save(folder, preview=False)
     root.write_text(root.read_text().replace("customLayerData = {", "customLayerData = {\n        bool mine = 1", 1))
     with pytest.raises(ValueError, match="edited by hand and Y-up; a Z-up room needs another folder"):
-        make(seed=1, options=RoomOptions("Z")).save(folder, preview=False)
+        make(seed=1, up_axis="Z").save(folder, preview=False)
 
 
 def test_samples_are_one_variant_set_of_the_same_furniture(tmp_path):
-    room = make(seed=1, samples=3)
+    room = make(seed=1, layouts=3)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = Usd.Stage.Open(str(root))
     variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
@@ -281,13 +280,13 @@ def test_samples_are_one_variant_set_of_the_same_furniture(tmp_path):
         seen.append(bed.ExtractTranslation()[0])
         assert seen[-1] == pytest.approx(float(room.layouts[number].position[0, 0]), abs=1e-4)
     assert len(set(seen)) == 3
-    alone = make(seed=1, samples=1)
+    alone = make(seed=1, layouts=1)
     assert (alone.boxes.position == room.boxes.position).all()  # more samples do not change the first
 
 
 @pytest.mark.parametrize("ending", [".usda", ".usdc"])
 def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
-    room = make(seed=1, samples=2)
+    room = make(seed=1, layouts=2)
     path = save_flat(room, tmp_path / f"room{ending}")
     stage = Usd.Stage.Open(str(path))
     assert stage.GetCompositionErrors() == []
@@ -319,7 +318,7 @@ def shown(stage, layout):
 
 @pytest.mark.parametrize("dress", ["none", "some"])
 def test_layouts_of_a_flat_room_look_as_those_of_its_folder(tmp_path, dress):
-    room = make(seed=1, samples=2, options=RoomOptions(walls=True, dress=dress, up_axis="Z"))
+    room = make(seed=1, layouts=2, walls=True, dress=dress, up_axis="Z")
     stages = [opened(room.save(tmp_path / "room", preview=False)), opened(save_flat(room, tmp_path / "flat.usda"))]
     found = [[shown(stage, layout) for layout in ("layout_0", "layout_1")] for stage in stages]
     assert found[0] == found[1]

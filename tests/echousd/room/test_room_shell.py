@@ -72,7 +72,7 @@ def test_ceiling_lies_on_the_walls() -> None:
 def test_prims_of_the_shell(tmp_path) -> None:
     spec = RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW))
     graph = small_graph().replaced(room=spec)
-    options = RoomOptions(walls=True, ceiling=True)
+    options = RoomOptions(walls=True, ceiling=True, dress="none")
     room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     shell = stage.GetPrimAtPath("/Room/Shell")
@@ -118,7 +118,7 @@ def test_a_leaf_opens_about_its_hinge_to_the_side_that_it_should(swing, hinge, t
 def test_doors_articulate(tmp_path) -> None:
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
     for up in ("Y", "Z"):
-        options = RoomOptions(up_axis=up, walls=True)
+        options = RoomOptions(up_axis=up, walls=True, dress="none")
         room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
         stage = Usd.Stage.Open(str(room.save(tmp_path / up, preview=False)))
         door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")

@@ -2,7 +2,7 @@
 
 import pytest
 from pxr import Usd, UsdGeom, UsdPhysics
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.room.simready import FURNITURE, pack
@@ -11,7 +11,7 @@ from echousd.room.simready import FURNITURE, pack
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
     pytest.importorskip("embreex")
-    made = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes")
+    made = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
     return made.save(tmp_path_factory.mktemp("room") / "bedroom", preview=False)
 
 

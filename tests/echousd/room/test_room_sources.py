@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.room import sources
@@ -60,7 +60,7 @@ def slabs(monkeypatch):
 
 
 def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", repair=False)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", repair=False, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = open_stage(root)
     bed = "/Room/Objects/bed/geo"
@@ -83,13 +83,13 @@ def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
 
 
 def test_objects_that_share_an_asset_share_their_geometry(slabs):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="slabs")
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="slabs", **BARE)
     assert room.geometry["nightstand_left"] is room.geometry["nightstand_right"]
     assert room.assets["nightstand_left"] == "nightstand"
 
 
 def test_an_edit_asks_for_the_new_objects_and_reads_the_others_back(slabs, tmp_path):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs")
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     saved = read_room(root)
     for name, geometry in room.geometry.items():
@@ -117,7 +117,7 @@ def test_a_source_refuses_a_model_before_the_long_work(slabs):
 
     model = Paper()
     with pytest.raises(ValueError, match="slabs are not for paper models"):
-        echousd.generate(small_graph(), model=model, shapes="slabs")
+        echousd.generate(small_graph(), model=model, shapes="slabs", **BARE)
     assert model.edits == []
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.graph import GraphError
@@ -25,7 +25,7 @@ def model(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path):
-    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes")
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
     return room.save(tmp_path / "bedroom", preview=False)
 
 
@@ -99,7 +99,9 @@ def test_unlocked_things_may_move_again(root):
 
 def test_titles_in_any_script_name_what_changes(tmp_path):
     graph = small_graph().update_node("bed", title="Große Liege").update_node("wardrobe", title="衣柜")
-    root = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes").save(tmp_path / "bedroom", preview=False)
+    root = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes", **BARE).save(
+        tmp_path / "bedroom", preview=False
+    )
     saved = read_room(root)
     by_title = Wishes(
         lock=("Große Liege",), move=("衣柜:1.2,1.0",), turn=("衣柜:180",), resize=("Große Liege:1.6,0.5,2.0",),

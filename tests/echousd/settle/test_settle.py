@@ -8,7 +8,7 @@ import pytest
 import shapely
 import trimesh
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.room import RoomOptions
@@ -20,7 +20,7 @@ simulated = pytest.mark.skipif("not __import__('importlib.util').util.find_spec(
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -31,7 +31,14 @@ def moved(stage, name, by):
 
 
 @simulated
-@pytest.mark.parametrize("options", [RoomOptions(), RoomOptions(walls=True), RoomOptions("Z")])
+@pytest.mark.parametrize(
+    "options",
+    [
+        RoomOptions(walls=False, dress="none"),
+        RoomOptions(walls=True, dress="none"),
+        RoomOptions(up_axis="Z", walls=False, dress="none"),
+    ],
+)
 def test_a_room_that_stands_rests(options, tmp_path):
     room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
     report = settle(room.save(tmp_path / "bedroom", preview=False))

@@ -17,7 +17,11 @@ pytestmark = pytest.mark.skipif("not __import__('importlib.util').util.find_spec
 
 def lifted(up_axis="Y", **by):
     room = echousd.generate(
-        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(up_axis=up_axis)
+        small_graph(),
+        model=StandIn(),
+        shapes="boxes",
+        repair=False,
+        options=RoomOptions(up_axis=up_axis, walls=False, dress="none"),
     )
     position = room.boxes.position.clone()
     for name, way in by.items():

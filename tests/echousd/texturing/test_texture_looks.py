@@ -11,7 +11,7 @@ import trimesh
 from painter import errors_in_texels, paint
 from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
-from small_room import StandIn, small_graph
+from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.checks import check
@@ -32,7 +32,7 @@ SIZE = 128
 def made(tmp_path_factory):
     """A room and its painted job."""
     top = tmp_path_factory.mktemp("rooms")
-    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
     root = data.save(top / "bedroom", preview=False)
     export_job(root, top / "job", "generic", resolution=SIZE)
     paint(top / "job")
@@ -60,7 +60,7 @@ def material(root, name):
 
 
 def generated(root, graph):
-    data = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    data = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         data.save(root.parent, preview=False)
