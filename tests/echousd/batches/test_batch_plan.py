@@ -65,9 +65,9 @@ def test_variations_are_taken_in_turn():
     [
         ({}, "neither sources nor a sample"),
         ({"sample": {"bedroom": 0}}, "sample.bedroom is 0"),
-        ({"sample": {"bedroom": 1}, "options": {"colour": 1}}, "unknown field, allowed: shapes"),
+        ({"sample": {"bedroom": 1}, "options": {"colour": 1}}, "colour is no option, allowed: assets, atlas"),
         ({"sample": {"bedroom": 1}, "variations": {"walls": []}}, "an empty list"),
-        ({"sample": {"bedroom": 1}, "variations": {"wall": [True]}}, "unknown field"),
+        ({"sample": {"bedroom": 1}, "variations": {"wall": [True]}}, "wall is no option"),
     ],
 )
 def test_a_wrong_request_is_told(raw, said):

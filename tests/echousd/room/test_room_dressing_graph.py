@@ -172,5 +172,5 @@ def test_nothing_to_write_is_an_error():
     with pytest.raises(ValueError, match=r"^dress_graph writes .*dress is 'none', allowed: some, full$"):
         RoomOptions(dress_graph=True, walls=False, dress="none")
     with pytest.raises(ValueError, match="dress is 'none'"):
-        _ = BatchOptions(dress_graph=True).look
-    assert BatchOptions(dress="some", dress_graph=True).look.dress_graph
+        BatchOptions(dress="none", dress_graph=True)
+    assert BatchOptions(dress_graph=True).dress_graph

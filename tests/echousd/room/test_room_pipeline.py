@@ -105,7 +105,7 @@ def test_what_the_graph_fixes_comes_back():
 def test_floor_away_from_the_origin_takes_the_furniture_along():
     corners = ((8.0, 3.0), (12.0, 3.0), (12.0, 7.0), (8.0, 7.0))
     room = echousd.generate(
-        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False**BARE
+        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False, **BARE
     )
     np.testing.assert_allclose(room.boxes.position[0], (10.0, 0.0, 4.4), atol=1e-5)
 
@@ -141,7 +141,7 @@ def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
     small_graph().to_stage(tmp_path / "graph.usda")
     told = []
     room = echousd.generate(
-        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state) ** BARE
+        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state), **BARE
     )
     assert room.graph.replaced(room=small_graph().room) == small_graph()
     assert {opening.kind for opening in room.graph.room.openings} == {"door", "window"}
@@ -211,7 +211,7 @@ def test_what_cannot_fit_is_said_or_left_out() -> None:
     assert gone
     said = sorted(note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out"))
     assert said == gone
-    with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep, drop"):
+    with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep or drop"):
         echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze", **BARE)
 
 
