@@ -241,7 +241,7 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     layer = stage.GetRootLayer()
     layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
     layer.documentation = (
-        "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten.\n"
+        "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten. "
         "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
     )
     prim = UsdGeom.Xform.Define(stage, "/Room").GetPrim()

@@ -337,6 +337,10 @@ def test_omniverse_validator_reports_no_issues(rooms: list[Path]) -> None:
     command = python_of("omni").with_name("omni_asset_validate")
     for room in rooms:
         assert "No issues found" in run(command, "--no-variants", room, accepted=(0, 1)), room
+    # At its defaults it walks through the product of all variants, which of a whole room takes most of an hour.
+    assets = sorted(rooms[0].parent.glob("assets/[!s]*/"))[:3]
+    for file in (folder / f"{folder.name}.usda" for folder in assets):
+        assert "No issues found" in run(command, file, accepted=(0, 1)), file
 
 
 def simready(file: Path, profile: str) -> set[str]:
