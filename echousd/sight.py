@@ -33,6 +33,13 @@ class Furniture:
         weight = self.size[:, [0, 2]].prod(1)
         return np.asarray(weight @ self.position[:, [0, 2]] / max(float(weight.sum()), 1e-9))
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(n, 8, 3) float, the corners of each box, metres."""
+        cube = np.stack(np.meshgrid((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5), indexing="ij"), -1).reshape(-1, 3)
+        local = cube * self.size[:, None]
+        return np.asarray(self.position[:, None] + np.einsum("nji,nkj->nki", self._turns(), local))
+
     def nearness(self, eye: np.ndarray, reach: float) -> np.ndarray:
         """(n,) how near each box is to `eye` (3,): 0 at `reach` metres and beyond, 1 where the eye touches it."""
         cos, sin = np.cos(self.yaw), np.sin(self.yaw)

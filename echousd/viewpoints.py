@@ -13,12 +13,10 @@ from scipy.spatial import ConvexHull
 from echousd.naming import free_name
 from echousd.scenery import Scenery
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.views import APERTURE, EYES, FOCAL_LENGTH, WIDE, framed, inside_view, perspective_views, turning_matrices
+from echousd.views import APERTURE, FOCAL_LENGTH, framed, inside_view, perspective_views, turning_matrices
 
 if TYPE_CHECKING:
     from pxr import Usd
-
-EYE = 1.55  # metres above the floor
 
 
 @dataclass(frozen=True)
@@ -69,8 +67,8 @@ def eye_view(scenery: Scenery) -> View:
     lower, upper = scenery.bounds
     x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
     floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
-    matrix = inside_view(floor, scenery.furniture, EYE / EYES, scenery.hung)
-    return View(matrix, APERTURE / 2 / WIDE, False)
+    matrix, lens = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
+    return View(matrix, APERTURE / 2 / lens, False)
 
 
 def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:

@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 
 from echomodel.openings import inward_normal
 from echomodel.triangles import cross
-from echousd.sight import Furniture
+from echousd.sight import RAYS, Furniture
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
-WIDE = 21.0  # mm, for a camera inside: 81 degrees across
-EYES = 0.62  # of the height of the walls: where a camera inside is
-STEEPEST = 0.3  # metres that a camera inside looks down for a metre ahead
+LENSES = (24.0, 28.0, 35.0)  # mm, of a camera inside: 74 to 54 degrees across
+EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
+SLOPES = (0.05, 0.15, 0.25, 0.36)  # metres that it looks down for a metre ahead
+PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
+WHOLE, CLEAR = 200.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
+TRIED = 128  # views of all that are looked at closely
+LOW = 1.4  # metres: over what is so high one looks
+BARE, BAREST, DEEP = (
+    60.0,
+    0.28,
+    0.02,
+)  # bare walls: what all of a picture costs, from which share on, metres of rounding
 BEFORE, WALLED = 2.0, 0.9  # metres: what is nearer to the eye fills the picture, and which walls do
-FILLED = 250.0  # metres of depth that a picture full of what is near is worth
+FILLED = 60.0  # metres of depth that a picture full of what is near is worth
 SHOWN, FAR = 20.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
-PANS = (0.0, -0.3, 0.3)  # radians that a camera inside may turn aside from the middle
 TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
 STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
 APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
@@ -25,6 +37,15 @@ ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.25  # or along a wall, as shares of 
 MARGIN = 1.06
 RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
 FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
+
+
+class Shot(NamedTuple):
+    """A camera inside: what it costs at first sight, camera to world (4, 4), mm, metres down for a metre ahead."""
+
+    cost: float
+    view: np.ndarray
+    lens: float
+    slope: float
 
 
 def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -85,47 +106,115 @@ def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return view_matrix(target + direction * distance, target)
 
 
-def inside_view(floor: np.ndarray, furniture: Furniture, height: float, hung: Furniture | None = None) -> np.ndarray:
-    """(4, 4) float camera to world of a view from a corner inside a room with walls, where little is hidden.
+def inside_view(
+    floor: np.ndarray,
+    furniture: Furniture,
+    height: float,
+    hung: Furniture | None = None,
+    openings: Furniture | None = None,
+    main: int | None = None,
+) -> tuple[np.ndarray, float]:
+    """Camera to world (4, 4) float and focal length in mm of a view inside a room with walls, its main piece whole.
+
+    Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
+    hides and cuts off least, has most furniture and depth in its picture and no bare wall over a third of it.
 
     Arguments:
         floor: (k, 2) float, x and z of the corners, metres.
         furniture: what shall be seen, its fronts rather than its backs.
         height: of the walls, metres.
         hung: what hangs or stands at the walls: none of it shall be right before the eye.
+        openings: doors and windows as boxes in the walls, which are then not bare.
+        main: row of the furniture that must be whole in the picture; None = the largest that one looks over.
     """
+    floor = np.asarray(floor, float)
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
-    aim = 0.5 * middle + 0.5 * furniture.centre if len(furniture.size) else middle
     things = [some for some in (furniture, hung) if some is not None and len(some.size)]
-    near = [*((some, BEFORE) for some in things), (_walls(np.asarray(floor, float), height), WALLED)]
-    best, most = _level_view(middle + 0.1, aim, height), -np.inf
-    for spot in _spots(np.asarray(floor, float), middle):
-        if not room.contains(shapely.LineString([spot, middle])):
-            continue
-        eye = np.array([spot[0], EYES * height, spot[1]])
-        points, blocked = furniture.blocked(eye)
-        touched = sum(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things)
-        fixed = (spot - middle) @ furniture.facing
-        for pan in PANS:
-            way = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ (aim - spot)
-            view = _level_view(spot, spot + way, height)
-            merit = fixed + min(_depth(room, spot, way), FAR)
-            if len(points):
-                merit -= (blocked | ~_framed_points(points, view)).mean(1).sum()
-                merit += SHOWN * np.isfinite(furniture.away(view, APERTURE / 2 / WIDE)).mean()
-            for some, reach in near:
-                merit -= FILLED * some.filled(view, APERTURE / 2 / WIDE, reach)
-            merit -= FILLED * touched
-            if merit > most:
-                best, most = view, merit
+    walls = _walls(floor, height)
+    near = [*((some, BEFORE) for some in things), (walls, WALLED)]
+    at_walls = [*things, *([openings] if openings is not None and len(openings.size) else [])]
+    main = _main(furniture) if main is None else main
+    aim = middle if main is None else furniture.position[main, [0, 2]]
+    around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
+    best, most = (_view(middle + 0.1, middle, EYES[0] * height, SLOPES[-1]), LENSES[0]), -np.inf
+    shots: list[Shot] = []
+    seen: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # eye -> points of the furniture, and which are hidden
+    for spot in _spots(floor, middle):
+        for level in EYES:
+            eye = np.array([spot[0], level * height, spot[1]])
+            if any(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things):
+                continue
+            points, blocked = seen[eye.tobytes()] = furniture.blocked(eye)
+            hidden = 0.0 if main is None else _hidden(room, points[main], blocked[main], eye)
+            corners = np.empty((0, 3)) if main is None else furniture.corners[main]
+            for way in (aim - spot, around - spot):
+                for pan, slope in product(PANS, SLOPES):
+                    turned = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ way
+                    view = _view(spot, spot + turned, eye[1], slope)
+                    off = _aside(corners, view)
+                    for number, lens in enumerate(LENSES):
+                        cut = float((off > APERTURE / 2 / lens / MARGIN).mean()) if len(off) else 0.0
+                        shots.append(Shot(WHOLE * cut + CLEAR * hidden + abs(pan) + 0.1 * number, view, lens, slope))
+    shots.sort(key=lambda shot: shot.cost)
+    for first, view, lens, _ in _varied(shots)[:TRIED]:
+        eye, half = view[:3, 3], APERTURE / 2 / lens
+        way = -view[[0, 2], 2]
+        merit = min(_depth(room, eye[[0, 2]], way), FAR) - first
+        merit -= FILLED * sum(some.filled(view, half, reach) for some, reach in near)
+        merit -= BARE * max(0.0, bare_share(floor, height, at_walls, view, half) - BAREST)
+        if len(furniture.size):
+            points, blocked = seen[eye.tobytes()]
+            unseen = blocked | (_aside(points, view) > half)
+            merit += float((eye[[0, 2]] - middle) @ furniture.facing - unseen.mean(1).sum())
+            merit += SHOWN * np.isfinite(furniture.away(view, half)).mean()
+        if merit > most:
+            best, most = (view, lens), merit
     return best
 
 
-def _framed_points(points: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """(...) bool: which points (..., 3) are in the picture of a camera inside."""
+def _varied(shots: list[Shot]) -> list[Shot]:
+    """The shots in their order, of each eye the first for each slope."""
+    out: dict[tuple[bytes, float], Shot] = {}
+    for shot in shots:
+        out.setdefault((shot.view[:3, 3].tobytes(), shot.slope), shot)
+    return list(out.values())
+
+
+def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
+    """Share of a square picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
+
+    Arguments:
+        floor: (k, 2) float, metres; height: of the walls, metres. view, half: as `Furniture.away`.
+    """
+    wall = _walls(floor, height).away(view, half)
+    before = np.min([some.away(view, half) for some in things], axis=0) if things else np.inf
+    way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
+    way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
+    with np.errstate(divide="ignore"):
+        level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
+    return float((wall < np.minimum(before, level) - DEEP).mean())
+
+
+def _main(furniture: Furniture) -> int | None:
+    """The largest piece that one looks over, of all where there is none; None where there is nothing."""
+    if not len(furniture.size):
+        return None
+    low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
+    area = furniture.size[:, [0, 2]].prod(1) * np.where(low | ~low.any(), 1.0, 0.0)
+    return int(area.argmax())
+
+
+def _hidden(room: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye: np.ndarray) -> float:
+    """Share of the points (p, 3) of a piece that furniture (`blocked`) or a corner of the room hides from an eye."""
+    lines = shapely.linestrings([[eye[[0, 2]], point] for point in points[:, [0, 2]]])
+    return float((blocked | ~shapely.covers(room.buffer(0.05), lines)).mean())
+
+
+def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """(...) float: how far points (..., 3) are from the middle of a picture, at distance 1; inf behind the camera."""
     x, y, z = np.moveaxis((points - view[:3, 3]) @ view[:3, :3], -1, 0)
-    return np.asarray((z < 0) & (np.maximum(np.abs(x), np.abs(y)) < -z * (APERTURE / 2 / WIDE)))
+    return np.asarray(np.where(z < 0, np.maximum(np.abs(x), np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
 
 
 def _walls(floor: np.ndarray, height: float) -> Furniture:
@@ -149,11 +238,10 @@ def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
     return spots
 
 
-def _level_view(spot: np.ndarray, aim: np.ndarray, height: float) -> np.ndarray:
-    """(4, 4) float camera to world from eye height over `spot` to a little lower over `aim`, x and z each."""
-    eye = np.array([spot[0], EYES * height, spot[1]])
-    lower = max(0.3 * height, eye[1] - STEEPEST * float(np.linalg.norm(aim - spot)))
-    return view_matrix(eye, np.array([aim[0], lower, aim[1]]))
+def _view(spot: np.ndarray, aim: np.ndarray, level: float, slope: float) -> np.ndarray:
+    """(4, 4) float camera to world over `spot` at a level towards `aim`, `slope` metres down for a metre ahead."""
+    away = float(np.linalg.norm(aim - spot))
+    return view_matrix(np.array([spot[0], level, spot[1]]), np.array([aim[0], level - slope * away, aim[1]]))
 
 
 def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:

@@ -253,7 +253,8 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
     lights.write_lights(stage, room, seen)
     walled = room.floor if room.options.walls else None
-    cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung)
+    main = cameras.main_piece([node.category for node in room.graph.nodes], furniture)
+    cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung, cameras.opening_boxes(room), main)
     names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
     paths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
     return assets.without_stage(stage, lambda layer: setattr(layer, "subLayerPaths", paths))
