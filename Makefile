@@ -4,8 +4,9 @@ PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+AUDIT := .audit
 
-.PHONY: help room test lint types clients benchmarks schema clean
+.PHONY: help room test lint types clients hashes audit benchmarks schema clean
 
 help:
 	@grep -E '^# ' Makefile | cut -c3-
@@ -32,6 +33,17 @@ test: lint types
 clients: $(STAMP)
 	$(BIN)/python -m pytest tests/clients -m clients
 
+# make hashes: requirements.txt, the hashes of what ships, made anew from constraints.txt.
+hashes: $(STAMP)
+	$(BIN)/python docs/make_hashes.py
+
+# make audit: known faults of what ships; says so where the database of them cannot be reached.
+audit:
+	@rm -f $(AUDIT)/found.json
+	test -x $(AUDIT)/bin/pip-audit || { $(PYTHON) -m venv $(AUDIT) && $(AUDIT)/bin/pip install --quiet pip-audit; }
+	-$(AUDIT)/bin/pip-audit -r requirements.txt --require-hashes --disable-pip --progress-spinner off -f json -o $(AUDIT)/found.json
+	@$(AUDIT)/bin/python docs/audited.py $(AUDIT)/found.json
+
 # make benchmarks: ratios, each printed with what was asked; wants an idle machine and some minutes.
 benchmarks: $(STAMP)
 	cd benchmarks && for script in compact_budget graph_stage rooms layout_step; do ../$(BIN)/python $$script.py; done
@@ -41,4 +53,4 @@ schema: $(STAMP)
 	$(BIN)/python -m echousd.schemas.regenerate
 
 clean:
-	rm -rf $(VENV) out build *.egg-info
+	rm -rf $(VENV) $(AUDIT) out build *.egg-info

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import runpy
 import subprocess
 import sys
+import tomllib
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from setuptools.dist import Distribution
 
 ROOT = Path(__file__).parents[1]
@@ -58,3 +63,42 @@ def wheel(script):
 def test_types_are_told_in_every_package(wheel, package):
     assert f"{package}/py.typed" in wheel
     assert (ROOT / ("." if package == "echousd" else "model") / package / "py.typed").is_file()
+
+
+def needed(name):
+    """Names of the distributions that one needs on this system, itself included."""
+    found, todo = set(), [name]
+    while todo:
+        name = canonicalize_name(todo.pop())
+        if name not in found:
+            found.add(name)
+            wanted = map(Requirement, metadata.requires(name) or ())
+            todo += [one.name for one in wanted if one.marker is None or one.marker.evaluate({"extra": ""})]
+    return found
+
+
+def test_what_ships_is_pinned_by_its_hash():
+    pinned = dict(re.findall(r"^([\w.-]+)==(\S+)", (ROOT / "constraints.txt").read_text(), re.MULTILINE))
+    pinned = {canonicalize_name(name): version for name, version in pinned.items()}
+    rows = [line for line in (ROOT / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
+    hashed = dict(re.fullmatch(r"([a-z0-9.-]+)==(\S+) --hash=sha256:[0-9a-f]{64}", row).groups() for row in rows)
+    assert needed("echousd") - {"echousd"} <= hashed.keys()
+    assert {name: version for name, version in hashed.items() if pinned.get(name, version) != version} == {}
+    text = (ROOT / "pyproject.toml").read_text()
+    direct = {canonicalize_name(Requirement(one).name) for one in tomllib.loads(text)["project"]["dependencies"]}
+    assert direct <= hashed.keys() & pinned.keys()
+
+
+@pytest.mark.parametrize(
+    ("found", "text", "code"),
+    [
+        ([{"name": "a", "version": "1", "vulns": []}], "audit: 1 of 1 audited, 0 known faults", 0),
+        ([{"name": "a", "version": "1", "vulns": [{"id": "X-1"}]}], "a 1: X-1", 1),
+        ([{"name": "a", "skip_reason": "?"}], "could not be asked about a", 2),
+        ([], "0 of 0 audited", 2),
+    ],
+)
+def test_an_audit_of_nothing_is_no_good_news(found, text, code):
+    told, ended = runpy.run_path(str(ROOT / "docs/audited.py"))["said"](found)
+    assert text in told
+    assert ended == code

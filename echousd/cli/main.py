@@ -49,6 +49,7 @@ TOPICS: tuple[str, ...] = (
 )
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
+MOST_PARTS = 500
 
 
 def _version(wanted: bool) -> None:
@@ -83,6 +84,7 @@ def run(arguments: Sequence[str]) -> int:
     debug = "--debug" in own
     arguments = [word for word in own if word != "--debug"] + arguments[len(own) :]
     try:
+        _check_depth(arguments)
         result = command().main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
         sys.stdout.flush()
         if result == INTERRUPTED:  # typer's way to pass on Ctrl-C
@@ -101,6 +103,14 @@ def run(arguments: Sequence[str]) -> int:
         for line in lines:
             _complain(line, code, debug and line == lines[-1])
         return code
+
+
+def _check_depth(arguments: Sequence[str]) -> None:
+    """Raises ValueError for a path of more folders than Python follows when it makes them."""
+    for word in arguments:
+        parts = word.count("/") + 1
+        if parts > MOST_PARTS:
+            raise ValueError(f"{word[:40]}...: a path of {parts} parts, allowed: {MOST_PARTS}")
 
 
 @cache

@@ -12,6 +12,7 @@ from pxr import Sdf, Tf, UsdUtils
 
 from echousd.assets.model_file import STAGES, ModelFile
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
+from echousd.stage.files import said
 from echousd.textures import READABLE
 
 TAKEN = (*STAGES, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")
@@ -24,6 +25,17 @@ def collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
     Files that are not there stay missing, as they are. Raises ValueError that names the file for one that lies out of
     the library's folder, is of a kind that no model needs, or where all together are too large.
     """
+    silence = UsdUtils.CoalescingDiagnosticDelegate()  # USD would print what the exception says as well
+    try:
+        return _collected(model)
+    except Tf.ErrorException as error:
+        raise ValueError(f"{model}: cannot be collected with the files that it depends on ({said(error)})") from None
+    finally:
+        silence.TakeUncoalescedDiagnostics()
+        del silence
+
+
+def _collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
     layers, others, _ = UsdUtils.ComputeAllDependencies(Sdf.AssetPath(str(model.path)))
     named = [str(layer.realPath) for layer in layers] + [str(path) for path in others]
     top, total = os.path.realpath(model.top), 0
@@ -39,11 +51,8 @@ def collected(model: ModelFile) -> tuple[str, Mapping[str, bytes]]:
     if model.suffix == ".usdz":
         return model.path.name, {model.path.name: model.path.read_bytes()}
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
-        try:
-            if not UsdUtils.LocalizeAsset(Sdf.AssetPath(str(model.path)), folder):
-                raise ValueError(f"{model}: cannot be collected with the files that it depends on")
-        except Tf.ErrorException as error:
-            raise ValueError(f"{model}: cannot be collected ({str(error).splitlines()[0]:.120})") from None
+        if not UsdUtils.LocalizeAsset(Sdf.AssetPath(str(model.path)), folder):
+            raise ValueError(f"{model}: cannot be collected with the files that it depends on")
         found = [p for p in sorted(Path(folder).rglob("*")) if p.is_file() and p.suffix.lower() in TAKEN]
         return model.path.name, {p.relative_to(folder).as_posix(): p.read_bytes() for p in found}
 
@@ -52,7 +61,7 @@ def _named_by(layers: Sequence[Sdf.Layer], path: str) -> str:
     """`<prim or property path> ` of who names a file, "" where no value does (a layer that is referred to)."""
     real = os.path.realpath(path)
     for layer in layers:
-        for where, said in asset_paths(layer):
-            if os.path.realpath(layer.ComputeAbsolutePath(said)) == real:
+        for where, name in asset_paths(layer):
+            if os.path.realpath(layer.ComputeAbsolutePath(name)) == real:
                 return f"{where} "
     return ""

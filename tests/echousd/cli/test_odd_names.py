@@ -118,3 +118,12 @@ def test_a_fault_is_one_line_whatever_names_hold(echousd_command, tmp_path, name
     assert done.code == 2
     lines = done.err.strip().split("\n")
     assert all(line.startswith(f"error: {graph}") for line in lines), done.err
+
+
+@pytest.mark.parametrize(
+    "words", [("generate", "graph.yaml", "-o"), ("edit",), ("new", "--room", "bedroom"), ("check",)]
+)
+def test_a_path_of_thousands_of_folders_is_told(echousd_command, tmp_path, words):
+    done = echousd_command(*words, f"{tmp_path}/{'a/' * 1900}room.usda")
+    assert (done.code, "parts, allowed: 500" in done.err) == (2, True)
+    assert not list(tmp_path.iterdir())

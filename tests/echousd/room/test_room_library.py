@@ -3,17 +3,19 @@ import zipfile
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 from small_models import chest, picture, seat, small_library, write_obj, write_usd
 from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.assets.choose import Asked, AssetWishes, choose
 from echousd.assets.index import index
+from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
 from echousd.checks import check
 from echousd.exporting import export
 from echousd.room.edit import edit
+from echousd.room.originals.collecting import collected
 from echousd.room.reading import read_room
 from echousd.stage import open_stage
 from echousd.store import Store
@@ -194,6 +196,21 @@ def test_nothing_out_of_the_library_is_taken(tmp_path):
         ValueError, match=r"nightstand.usda: </.+> depends on .*secret.png, allowed: files below .*models"
     ):
         echousd.generate(graph, model=StandIn(), shapes="library", assets=done.file, collect=True, **BARE)
+
+
+def test_a_model_with_a_broken_clip_is_told_in_a_line(tmp_path, capfd):
+    path = tmp_path / "chest.usda"
+    write_usd(path, chest(1.0, 2.0, 0.5))
+    stage = Usd.Stage.Open(str(path))
+    clips = Usd.ClipsAPI(stage.GetDefaultPrim())
+    clips.SetClipAssetPaths(Sdf.AssetPathArray([Sdf.AssetPath("./clip.usda")]))
+    clips.SetClipPrimPath(str(stage.GetDefaultPrim().GetPath()))
+    stage.Save()
+    (tmp_path / "clip.usda").write_text('#usda 1.0\ndef "x" { garbage\n')
+    with pytest.raises(ValueError, match=r"^\S+chest.usda: cannot be collected with the files.*Expected }") as told:
+        collected(ModelFile(path, tmp_path))
+    assert "pxrInternal" not in str(told.value)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_variants_payloads_and_materials_of_a_model_are_kept(tmp_path):
