@@ -16,7 +16,7 @@ FORBIDDEN = {
     "echousd.graph": ("pxr", "torch", "echousd.stage", "echousd.repair", "echousd.room", "echousd.checks"),
     "echousd.stage": ("torch", "echousd.repair", "echousd.room", "echousd.checks", "echousd.cli", "typer", "rich"),
     "echousd.repair": ("pxr", "echousd.stage", "echousd.room", "echousd.checks", "echousd.cli", "typer", "rich"),
-    "echousd.checks": ("echousd.room", "echousd.cli", "typer", "rich"),
+    "echousd.checks": ("echousd.cli", "typer", "rich"),
     "echousd.room": ("echousd.checks", "echousd.cli", "typer", "rich"),
     "echousd.exporting": ("echousd.room", "echousd.cli"),
 }

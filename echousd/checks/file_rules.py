@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import PurePosixPath
 
-from pxr import Sdf, Tf, UsdShade
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdPhysics, UsdShade
 
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading, specs
 from echousd.exporting.packing import Reach
 from echousd.stage.encoding import StageError
-from echousd.stage.units import unit_faults
+from echousd.stage.units import METRES, UP_AXIS, unit_faults, up_axis
 from echousd.stage.values import asset
 from echousd.textures import READABLE, TextureError, file_of, read_image
 
+KILOGRAMS = "kilogramsPerUnit"
+SAME = 1e-6  # relative difference of units that are the same
+UNLIKE = math.log(2)  # of the factor by which something may be scaled beside its unit
+LEVEL = 0.5  # cosine of the angle between a model's up and the room's
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
 
@@ -66,6 +72,8 @@ def images(reading: Reading) -> Iterator[Finding]:
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
         path = str(file.resolvedPath) if file else ""
+        if file and file.path and not path and "<" not in file.path:
+            yield Finding(prim.GetPath(), f"inputs:file is {file.path!r}, where no file is")
         if not path or PurePosixPath(path.rstrip("]")).suffix.lower() not in READABLE:
             continue
         if path not in known:
@@ -111,8 +119,46 @@ def units(reading: Reading) -> Iterator[Finding]:
         yield Finding(Sdf.Path.absoluteRootPath, message, warning=not wrong)
 
 
+def arcs(reading: Reading) -> Iterator[Finding]:
+    """What is referenced is brought to the unit and up axis of the stage; masses are told in one unit."""
+    stage = reading.stage
+    mass = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
+    for layer in reading.named_files:
+        told = layer.pseudoRoot.GetInfo(KILOGRAMS) if layer.pseudoRoot.HasInfo(KILOGRAMS) else mass
+        if not math.isclose(told, mass, rel_tol=SAME):
+            where = f"{KILOGRAMS} is {told:g} in {layer.GetDisplayName()}"
+            yield Finding(Sdf.Path.absoluteRootPath, f"{where}, {mass:g} in the stage, allowed: the same")
+    up = np.array([0.0, 0, 1] if up_axis(stage) == "Z" else [0.0, 1, 0])
+    for prim in reading.distinct:
+        for layer in _referenced(prim):
+            try:
+                world = reading.world(prim)[:3, :3]
+            except (StageError, Tf.ErrorException):  # the rules on values report it
+                continue
+            size = float(np.cbrt(abs(np.linalg.det(world)))) * reading.metres
+            unit = layer.pseudoRoot.GetInfo(METRES) if layer.pseudoRoot.HasInfo(METRES) else None
+            if unit is not None and size > 0 and abs(math.log(size / unit)) > UNLIKE:
+                told = f"{METRES} is {unit:g} in {layer.GetDisplayName()}, a unit of it is {size:.3g} m here"
+                yield Finding(prim.GetPath(), f"{told}, allowed: the same")
+            axis = layer.pseudoRoot.GetInfo(UP_AXIS) if layer.pseudoRoot.HasInfo(UP_AXIS) else None
+            turned = world[:, 2 if axis == "Z" else 1]
+            if axis is not None and turned @ up < LEVEL * np.linalg.norm(turned):
+                told = f"{UP_AXIS} is {axis} in {layer.GetDisplayName()}, but its {axis} does not point up here"
+                yield Finding(prim.GetPath(), told)
+
+
+def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
+    """The root layers of the files that a prim references itself."""
+    if not prim.HasAuthoredReferences():
+        return []
+    found = Usd.PrimCompositionQuery.GetDirectReferences(prim).GetCompositionArcs()
+    own = set(prim.GetStage().GetLayerStack())
+    return [layer for layer in dict.fromkeys(arc.GetTargetLayer() for arc in found) if layer not in own]
+
+
 RULES = (
     Rule("echo:Units", "Unit and up axis of the root layer are those of the layers below.", units),
+    Rule("echo:Arcs", "What is referenced has the unit and the up axis of the stage.", arcs),
     Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),
     Rule("echo:Images", "Images can be read.", images),
     Rule("echo:PathsInside", "Files that a room names lie below its folder.", paths_inside),

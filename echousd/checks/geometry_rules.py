@@ -30,10 +30,10 @@ def texture_coordinates(reading: Reading) -> Iterator[Finding]:
         except (StageError, Tf.ErrorException):  # the rules on values report it
             continue
         if fault:
-            yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and _of_others(prim))
+            yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and of_others(prim))
 
 
-def _of_others(prim: Usd.Prim) -> bool:
+def of_others(prim: Usd.Prim) -> bool:
     """Whether a prim is part of a model of somebody else's, which is taken as it is: `<asset>_placed/<asset>_model`."""
     above = prim.GetPath().GetPrefixes()
     return any(at.name.endswith("_model") and at.GetParentPath().name.endswith("_placed") for at in above)

@@ -13,6 +13,7 @@ from echousd.stage import encoding as usd
 from echousd.stage.dressing import read_small
 from echousd.stage.encoding import StageError
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph
+from echousd.stage.values import targets
 
 LABELS_PREFIX = "SemanticsLabelsAPI:"
 # Known to this package even in a process that opened a stage before it could register the schema plugin.
@@ -36,9 +37,15 @@ def edge_targets(reading: Reading) -> Iterator[Finding]:
         for prim in (*room.relations, *room.small_relations):
             owned.add(prim.GetPath())
             try:
-                relation_of(prim, names)
+                relation = relation_of(prim, names)
             except StageError as error:
                 yield Finding(prim.GetPath(), _without_place(str(error), prim))
+                continue
+            if relation is None:
+                gone = [
+                    str(end) for name in (usd.SUBJECT, usd.OBJECT) for end in targets(prim, name) if end not in names
+                ]
+                yield Finding(prim.GetPath(), f"does not count: <{gone[0]}> is deactivated", warning=True)
     for prim in reading.prims:
         if prim.GetTypeName() == usd.RELATION_TYPE and prim.GetPath() not in owned:
             yield Finding(
@@ -48,7 +55,7 @@ def edge_targets(reading: Reading) -> Iterator[Finding]:
 
 def consistent_graph(reading: Reading) -> Iterator[Finding]:
     """The relations of a room do not contradict each other, and its words are those of the vocabulary."""
-    if any(True for _ in edge_targets(reading)):
+    if any(not found.warning for found in edge_targets(reading)):
         return
     for room in reading.rooms:
         with warnings.catch_warnings(record=True) as told:

@@ -9,14 +9,16 @@ from pxr import Gf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.triangles import area_normals
 from echousd.checks.findings import Finding, Rule
+from echousd.checks.geometry_rules import of_others
 from echousd.checks.reading import Reading
 from echousd.stage.encoding import StageError
+from echousd.stage.layouts import ARTICULATION
 from echousd.stage.values import MeshArrays, array
 
+THIN = 1e-9  # area of a triangle in shares of the square of its longest side that is none
 UNIT = 0.05  # how far the length of a normal may be from 1
 EXTENT = 1e-3  # how far an extent may be from the points, in shares of their diagonal
 HINT = 0.1  # the same of a component, which has levels of detail
-ARTICULATION = "articulation"  # variant set of what has doors and drawers
 AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
@@ -36,6 +38,39 @@ def mesh_indices(reading: Reading) -> Iterator[Finding]:
         elif len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
             reach = f"from {indices.min()} to {indices.max()}"
             yield Finding(mesh.GetPath(), f"faceVertexIndices reach {reach}, allowed: 0 to {len(points) - 1}")
+
+
+def degenerate(reading: Reading) -> Iterator[Finding]:
+    """No face uses a point twice or has no area; models of others may, in few faces."""
+    for mesh, arrays in _readable(reading):
+        faces = corners_of(arrays)
+        if not len(faces):
+            continue
+        triangles = arrays.indices[faces]
+        twice = (triangles == np.roll(triangles, 1, axis=1)).any(1)
+        corners = arrays.points[triangles]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
+        flat = twice | (np.linalg.norm(area_normals(corners), axis=1) <= THIN * sides**2)
+        if flat.any():
+            told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
+            yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
+
+
+def subdivision(reading: Reading) -> Iterator[Finding]:
+    """A mesh with normals is no subdivision surface: clients would round its edges."""
+    for mesh in reading.meshes:
+        scheme = mesh.GetSubdivisionSchemeAttr()
+        has = UsdGeom.PrimvarsAPI(mesh).HasPrimvar("normals") or mesh.GetNormalsAttr().HasAuthoredValue()
+        if has and scheme.HasAuthoredValue() and scheme.Get() != UsdGeom.Tokens.none:
+            told = f"subdivisionScheme is {scheme.Get()!r} on a mesh with normals, allowed: none"
+            yield Finding(mesh.GetPath(), told)
+
+
+def empty_meshes(reading: Reading) -> Iterator[Finding]:
+    """A mesh has faces."""
+    for mesh, arrays in _readable(reading):
+        if not len(arrays.counts) and not reading.is_guide(mesh.GetPrim()):
+            yield Finding(mesh.GetPath(), "a mesh without faces")
 
 
 def normals(reading: Reading) -> Iterator[Finding]:
@@ -221,6 +256,9 @@ def _shown(box: np.ndarray) -> str:
 
 RULES = (
     Rule("echo:MeshIndices", "The faces of meshes can be made of their points.", mesh_indices),
+    Rule("echo:Degenerate", "Faces have an area.", degenerate),
+    Rule("echo:Subdivision", "What has normals is no subdivision surface.", subdivision),
+    Rule("echo:EmptyMeshes", "Meshes have faces.", empty_meshes),
     Rule("echo:Normals", "Normals have length 1 and are as many as needed.", normals),
     Rule("echo:Extents", "Extents are the boxes around the points.", extents),
     Rule("echo:Winding", "Faces turn outwards and agree with their normals.", winding),

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Kind, Tf, Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule
-from echousd.checks.reading import Reading
+from echomodel.data.dressing import SMALL
+from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage import encoding as usd
-from echousd.stage.contents import room_frame
+from echousd.stage.contents import components, is_seen, room_frame
 from echousd.stage.encoding import StageError
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims, value
+from echousd.stage.taxonomy import SHELL
 from echousd.stage.values import matrix, texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's
@@ -33,7 +35,7 @@ def upright(reading: Reading) -> Iterator[Finding]:
             if ups is not None and ups.max() < UPRIGHT:
                 angle = np.degrees(np.arccos(np.clip(ups.max(), -1, 1)))
                 yield Finding(prim.GetPath(), f"leans by {angle:.0f} degrees, allowed: upright")
-        for prim in _others(room):
+        for prim in components(room):
             ups = _ups(prim, to_room, cache)
             if ups is not None and ups[0] < -UPRIGHT and ups[1] < UPRIGHT:
                 yield Finding(prim.GetPath(), "stands on its head, allowed: its own +Y (or +Z) upwards")
@@ -64,7 +66,7 @@ def one_label(reading: Reading) -> Iterator[Finding]:
                 continue
             elif words and isinstance(category, str) and known_category(words[0]) != known_category(category):
                 yield Finding(prim.GetPath(), f"{usd.LABELS} is {words[0]!r}, {usd.CATEGORY} {category!r}")
-        for prim in _others(room):
+        for prim in components(room):
             try:
                 words = texts(prim.GetAttribute(usd.LABELS))
             except (StageError, Tf.ErrorException):
@@ -99,33 +101,94 @@ def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:
 
 
 def floors(reading: Reading) -> Iterator[Finding]:
-    """Every room with objects has a floor: stated by its graph or as labelled geometry."""
+    """Every room with objects has a floor, stated by its graph or as labelled geometry; nobody switched it off."""
+    for prim in reading.inactive:
+        word = next(iter(_words(prim)), "")
+        if word in SHELL:
+            yield Finding(prim.GetPath(), f"the {word} is deactivated", warning=word != "floor")
     for room in reading.rooms:
         stated = any(
             room.graph.GetAttribute(name).HasAuthoredValue() for name in FLOOR if room.graph.HasAttribute(name)
         )
-        if room.nodes and not stated and not any(map(_is_floor, Usd.PrimRange(room.room))):
+        if stated and any("wall" in _words(prim) for prim in components(room)) and not _has_floor(room, reading):
+            yield Finding(room.room.GetPath(), "the room has walls, but no floor")
+        if room.nodes and not stated and not any("floor" in _words(prim) for prim in below(room.room)):
             allowed = f"{' or '.join(FLOOR)}, or geometry labelled 'floor'"
             yield Finding(room.graph.GetPath(), f"the room has no floor, allowed: {allowed}")
 
 
-def _is_floor(prim: Usd.Prim) -> bool:
+def _has_floor(room: RoomPrims, reading: Reading) -> bool:
+    """Whether a room has geometry that is labelled as its floor, or one that is reported as switched off."""
+    return any("floor" in _words(prim) for prim in (*below(room.room), *reading.inactive))
+
+
+def _words(prim: Usd.Prim) -> tuple[str, ...]:
     try:
-        return "floor" in texts(prim.GetAttribute(usd.LABELS))
+        return texts(prim.GetAttribute(usd.LABELS))
     except (StageError, Tf.ErrorException):
-        return False
+        return ()
 
 
-def _others(room: RoomPrims) -> list[Usd.Prim]:
-    """Components of a room that are no nodes of its graph: walls, floors, small things."""
-    nodes = {prim.GetPath() for prim in room.nodes}
-    found, walk = [], iter(Usd.PrimRange(room.room, Usd.TraverseInstanceProxies()))
-    for prim in walk:
-        if prim.GetPath() in nodes or (prim.IsModel() and not prim.IsGroup()):
-            walk.PruneChildren()
-            if prim.GetPath() not in nodes:
-                found.append(prim)
-    return found
+def some_label(reading: Reading) -> Iterator[Finding]:
+    """A prim that carries semantics labels has one of each taxonomy that it applies."""
+    for prim in reading.distinct:
+        for schema in applied(prim):
+            kind, taxonomy = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)
+            attribute = prim.GetAttribute(f"semantics:labels:{taxonomy}")
+            if kind == "SemanticsLabelsAPI" and not (attribute and attribute.Get()):
+                told = f"semantics:labels:{taxonomy} is empty, allowed: a word"
+                yield Finding(prim.GetPath(), told)
+
+
+def kinds(reading: Reading) -> Iterator[Finding]:
+    """Kinds are known; components lie below groups and not in one another; furniture is components."""
+    nodes = {prim.GetPath() for room in reading.rooms for prim in room.nodes}
+    modelled = any(_kind(prim) == "component" for room in reading.rooms for prim in room.nodes)
+    groups = {prim.GetParent() for prim in reading.prims if _kind(prim) == "component"}
+    groups = {prim for prim in groups if _kind(prim) == "group"}
+    for prim in reading.prims:
+        kind = _kind(prim)
+        node = prim.GetPath() in nodes
+        above = prim.GetParent()
+        if not kind:
+            if (node and modelled) or (prim.IsA(UsdGeom.Xform) and above in groups):
+                yield Finding(prim.GetPath(), "has no kind, allowed among components: component")
+            continue
+        if not Kind.Registry.HasKind(kind):
+            yield Finding(prim.GetPath(), f"kind is {kind!r}, allowed: component, subcomponent, group, assembly")
+        elif Kind.Registry.IsA(kind, "model") and not prim.IsModel():
+            while _kind(above) in ("group", "assembly"):
+                above = above.GetParent()
+            found = _kind(above) or "none"
+            if not any(above.GetPath().HasPrefix(room.room.GetPath()) for room in reading.rooms):
+                continue  # a room below the prims of others
+            yield Finding(
+                prim.GetPath(), f"kind is {kind!r} below <{above.GetPath()}> of kind {found!r}, allowed: group"
+            )
+        elif node and prim.IsGroup() and not any(each.IsModel() and not each.IsGroup() for each in below(prim)):
+            yield Finding(prim.GetPath(), f"kind is {kind!r} of an object, allowed: component")
+
+
+def _kind(prim: Usd.Prim) -> str:
+    return str(prim.GetMetadata("kind") or "")
+
+
+def hidden(reading: Reading) -> Iterator[Finding]:
+    """Something is seen of an object that has surfaces at all."""
+    for room in reading.rooms:
+        for prim in room.nodes:
+            surfaces = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
+            if surfaces and not any(map(is_seen, surfaces)):
+                yield Finding(prim.GetPath(), "nothing of it is seen: its surfaces are invisible or guides")
+
+
+def strangers(reading: Reading) -> Iterator[Finding]:
+    """Furniture that no graph knows stands in no room that has one."""
+    for room in reading.rooms:
+        for prim in components(room) if room.nodes else ():
+            word = next(iter(_words(prim)), "")
+            if word not in SMALL and word not in SHELL and known_category(word) is not None:
+                yield Finding(prim.GetPath(), f"a {word} that is no node of the graph", warning=True)
 
 
 def _shown(size: object) -> str:
@@ -137,4 +200,8 @@ RULES = (
     Rule("echo:OneLabel", "Objects have one label, that of their category.", one_label),
     Rule("echo:StatedBoxes", "Geometry is as large and turned as the graph states.", stated_boxes),
     Rule("echo:Floor", "Rooms have floors.", floors),
+    Rule("echo:SomeLabel", "Taxonomies that are applied have a word.", some_label),
+    Rule("echo:Kinds", "Kinds are known, and components lie below groups.", kinds),
+    Rule("echo:Hidden", "Objects are seen.", hidden),
+    Rule("echo:Strangers", "All furniture is in the graph.", strangers),
 )

@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom, UsdPhysics
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
+from echomodel.vocabulary import vocabulary
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading, below
+from echousd.graph.nodes import OBSTACLE
 from echousd.stage.contents import triangulated
-from echousd.stage.encoding import LABELS, StageError
+from echousd.stage.encoding import CATEGORY, FREE, LABELS, StageError
+from echousd.stage.read import value
 from echousd.stage.units import up_axis
-from echousd.stage.values import array, texts
+from echousd.stage.values import array, targets, texts
 
+HEAVY = 3000.0  # kg in each m³ of a body's box: stone
+APART = 0.05  # metres between the anchors of a hinge, and from a centre of mass to the geometry
+DOWN = 0.9  # cosine of the angle between gravity and downwards
+SLACK = 1e-2  # relative error of what is stored in single precision and rounded
 OFF = 0.25  # metres between the boxes of geometry and colliders, which are hulls or a few boxes
 
 CONCAVE = (UsdPhysics.Tokens.none, UsdPhysics.Tokens.meshSimplification)
@@ -124,10 +131,121 @@ def gravity(reading: Reading) -> Iterator[Finding]:
             direction = array(prim.GetAttribute("physics:gravityDirection"))
         except (StageError, Tf.ErrorException):
             continue
-        if direction.shape == (3,) and direction @ up > 0:
+        length = float(np.linalg.norm(direction))
+        if direction.shape == (3,) and length > 0 and direction @ up > -DOWN * length:  # (0, 0, 0) = downwards
             shown = ", ".join(f"{value:g}" for value in direction)
             axis = up_axis(reading.stage)
             yield Finding(prim.GetPath(), f"gravity points along ({shown}), allowed: downwards on a {axis}-up stage")
+
+
+def masses(reading: Reading) -> Iterator[Finding]:
+    """A body weighs no more than stone, its centre is within its geometry, its inertia that of something."""
+    for prim in reading.prims:
+        if not prim.HasAPI(UsdPhysics.MassAPI) or prim.IsInstanceProxy():
+            continue
+        told = UsdPhysics.MassAPI(prim)
+        mass, centre = told.GetMassAttr().Get(), told.GetCenterOfMassAttr()
+        shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim) and not reading.is_guide(found)]
+        try:
+            box = _bounds(shapes, reading)
+            world = reading.world(prim)
+            at = world[:3, :3] @ np.array(centre.Get(), float) + world[:3, 3] if centre.HasAuthoredValue() else None
+        except (StageError, Tf.ErrorException, TypeError):  # the rules on values report it
+            continue
+        if box is None:
+            continue
+        box = box * reading.metres
+        volume = float(np.prod(np.maximum(box[1] - box[0], 1e-3)))
+        if isinstance(mass, float) and mass > HEAVY * volume + 1:
+            most = HEAVY * volume + 1
+            yield Finding(
+                prim.GetPath(), f"physics:mass is {mass:g} kg in a box of {volume:.3g} m³, allowed: {most:.3g}"
+            )
+        if at is not None and np.isfinite(at).all():
+            off = float(np.maximum(box[0] - at * reading.metres, at * reading.metres - box[1]).max())
+            if off > APART:
+                yield Finding(prim.GetPath(), f"its centre of mass lies {off:.2g} m outside its geometry")
+        yield from _inertia(prim, told)
+
+
+def _inertia(prim: Usd.Prim, told: UsdPhysics.MassAPI) -> Iterator[Finding]:
+    inertia, axes = told.GetDiagonalInertiaAttr().Get(), told.GetPrincipalAxesAttr()
+    if inertia is not None and 2 * max(inertia) > sum(inertia) * (1 + SLACK):
+        shown = ", ".join(f"{value:g}" for value in inertia)
+        yield Finding(prim.GetPath(), f"physics:diagonalInertia is {shown}, allowed: none larger than both others")
+    turn = axes.Get() if axes.HasAuthoredValue() else None
+    length = 0.0 if turn is None else turn.GetLength()
+    if length > 0 and abs(length - 1) > SLACK:  # (0, 0, 0, 0) = as the engine finds
+        yield Finding(prim.GetPath(), f"physics:principalAxes has length {length:.3g}, allowed: 1")
+
+
+def fixed_furniture(reading: Reading) -> Iterator[Finding]:
+    """Where most pieces of a room are bodies, all that stand on a floor or a table are, and can move."""
+    for room in reading.rooms:
+        nodes = {prim: _stands(prim) for prim in room.nodes}
+        bodies = {prim: [found for found in below(prim) if found.HasAPI(UsdPhysics.RigidBodyAPI)] for prim in nodes}
+        standing = [prim for prim, stands in nodes.items() if stands]
+        moving = [prim for prim in standing if any(_dynamic(UsdPhysics.RigidBodyAPI(each)) for each in bodies[prim])]
+        for prim in standing if 2 * len(moving) > len(standing) else ():
+            if prim not in moving:
+                what = "a rigid body that cannot move" if bodies[prim] else "no rigid body"
+                yield Finding(prim.GetPath(), f"{what}, but the furniture of its room is such")
+
+
+def _stands(prim: Usd.Prim) -> bool:
+    """Whether a node is furniture that stands somewhere, rather than hangs or is an obstacle."""
+    try:
+        word = value(prim, CATEGORY)
+    except (StageError, Tf.ErrorException):
+        return False
+    row = vocabulary().known_category(word) if isinstance(word, str) else None
+    return row is not None and row.support in ("floor", "table") and not value(prim, f"{FREE}{OBSTACLE}")
+
+
+def scenes(reading: Reading) -> Iterator[Finding]:
+    """What has bodies has a physics scene that nobody switched off."""
+    off = [prim for prim in reading.inactive if prim.GetTypeName() == "PhysicsScene"]
+    if off and not any(prim.GetTypeName() == "PhysicsScene" for prim in reading.prims):
+        yield Finding(off[0].GetPath(), "the physics scene is deactivated: engines take gravity of their own, or none")
+
+
+def joints(reading: Reading) -> Iterator[Finding]:
+    """A joint holds two different prims that are there, at one place, and its limits leave it room."""
+    for prim in reading.prims:
+        if not prim.IsA(UsdPhysics.Joint):
+            continue
+        ends = [targets(prim, f"physics:body{number}") for number in (0, 1)]
+        for number, found in enumerate(ends):
+            for path in found:
+                if not reading.stage.GetPrimAtPath(path):
+                    yield Finding(prim.GetPath(), f"physics:body{number} points to <{path}>, where no prim is")
+        if not any(ends):
+            yield Finding(prim.GetPath(), "a joint that holds nothing, allowed: physics:body0 or physics:body1")
+        elif ends[0] == ends[1]:
+            yield Finding(prim.GetPath(), f"holds <{ends[0][0]}> to itself, allowed: two different prims")
+        low, high = (prim.GetAttribute(f"physics:{word}Limit").Get() for word in ("lower", "upper"))
+        if low is not None and high is not None and low > high:
+            yield Finding(prim.GetPath(), f"its limits are {low:g} to {high:g}, allowed: from the lower to the upper")
+        if all(ends) and ends[0] != ends[1]:
+            apart = _anchors_apart(prim, ends, reading)
+            if apart is not None and apart > APART:
+                yield Finding(prim.GetPath(), f"its anchors are {apart:.2g} m apart, allowed: {APART:g} m")
+
+
+def _anchors_apart(joint: Usd.Prim, ends: list[list[Sdf.Path]], reading: Reading) -> float | None:
+    """Metres between a hinge's place on its two bodies, None for other joints (drawers stand open)."""
+    bodies = [reading.stage.GetPrimAtPath(found[0]) for found in ends]
+    if joint.GetTypeName() not in ("PhysicsRevoluteJoint", "PhysicsSphericalJoint") or not all(bodies):
+        return None
+    places = []
+    for number, body in enumerate(bodies):
+        local = joint.GetAttribute(f"physics:localPos{number}").Get()
+        try:
+            world = reading.world(body)
+        except (StageError, Tf.ErrorException):
+            return None
+        places.append(world[:3, :3] @ np.array(local if local is not None else (0, 0, 0), float) + world[:3, 3])
+    return float(np.linalg.norm(places[0] - places[1])) * reading.metres
 
 
 def _body_above(prim: Usd.Prim) -> Usd.Prim | None:
@@ -148,4 +266,8 @@ RULES = (
     Rule("echo:DynamicColliders", "Dynamic bodies have no triangle-mesh colliders.", dynamic_colliders),
     Rule("echo:Colliders", "Rigid bodies have colliders, where their geometry is.", colliders),
     Rule("echo:Gravity", "Gravity points down.", gravity),
+    Rule("echo:Masses", "Bodies weigh what such things can, and where they are.", masses),
+    Rule("echo:FixedFurniture", "Furniture that stands is a body among bodies.", fixed_furniture),
+    Rule("echo:PhysicsScene", "The physics scene is active.", scenes),
+    Rule("echo:Joints", "Joints hold two prims at one place, within limits.", joints),
 )

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.data.dressing import SMALL
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.repair.geometry import Floor, axes, floor_from_polygon, inside
 from echousd.repair.repair import DEFAULT_HEIGHT, floor_of_room
-from echousd.stage.contents import RoomContents, RoomObject
+from echousd.stage.contents import RoomContents, RoomObject, Shape, Solid, Surrounding
 
 OUTSIDE = 0.03  # metres beyond the floor's edge
 FLOATING = 0.03  # metres of air below, or depth below the floor
 HANGING = 0.06  # metres between a ceiling thing and the ceiling
 LEANING = 0.15  # metres between a wall thing and its wall
+DRAPED = 0.06  # metres of air below the edge of cloth that hangs over what it lies on
+BESIDE = 0.6  # metres that a curtain or a blind may hang beside its window
+SCREENS = ("tv", "television")
+ACROSS = np.cos(np.radians(60))  # of the angle between a screen and what it stands on
+CLOSE = 0.5  # metres before a screen that no wall stands in
+LARGE, LITTLE = 3.2, 0.25  # how often as large as its kind a small thing may be: books fill their shelf
 
 
 @dataclass(frozen=True)
 class Misplacement:
-    """An object in the wrong place: `problem` is `outside`, `floating`, `sunk` or `empty`, `distance` in metres."""
+    """An object in the wrong place, `distance` in metres.
+
+    `problem` is `outside`, `floating`, `sunk`, `empty` (nothing of it is seen), `turned` (a screen that nobody can look
+    at), `off its wall`, `off its window` or `too large` and `too small` for a thing of its kind.
+    """
 
     object: str
     problem: str
@@ -60,16 +71,122 @@ def find_misplaced(room: RoomContents) -> tuple[Misplacement, ...]:
     return tuple(found)
 
 
-def _beyond(thing: RoomObject, floor: Floor) -> float:
+def misplaced_screens(room: RoomContents, small: Sequence[Surrounding]) -> tuple[Misplacement, ...]:
+    """Screens that look at a wall, or across what they stand on."""
+    polygon = None if room.spec is None else floor_of_room(room.spec)
+    floor = None if polygon is None else floor_from_polygon(polygon)
+    screens: list[tuple[str, Solid]] = [(one.node.name, one) for one in room.objects if one.node.category in SCREENS]
+    screens += [(one.name, one.shape) for one in small if one.word in SCREENS and one.shape is not None]
+    found = []
+    for name, screen in screens:
+        front = np.array([np.sin(screen.yaw), np.cos(screen.yaw)])
+        before = screen.position[[0, 2]] + front * (screen.size[2] / 2 + CLOSE)
+        below = [one for one in room.objects if one is not screen and _carries(one, screen)]
+        across = any(np.cos(one.yaw - screen.yaw) < ACROSS for one in below)
+        if across or (floor is not None and float(inside(floor, before[None])[0][0]) < 0):
+            found.append(Misplacement(name, "turned"))
+    return tuple(found)
+
+
+def _carries(one: RoomObject, thing: Solid) -> bool:
+    """Whether a thing stands on the top of another."""
+    local = np.abs((thing.position[[0, 2]] - one.position[[0, 2]]) @ axes(np.array([one.yaw]))[0].T)
+    on_top = abs(float(one.position[1] + one.size[1] - thing.position[1])) < FLOATING
+    return on_top and bool((local <= one.size[[0, 2]] / 2).all())
+
+
+def misplaced_small(
+    room: RoomContents, small: Sequence[Surrounding], shell: Sequence[Surrounding]
+) -> tuple[Misplacement, ...]:
+    """Small things that are outside the floor, in the air, off their wall or window, hidden or of no usual size.
+
+    Arguments:
+        small: the things of a dressing. shell: what stands fixed, whose sills carry things, too.
+    """
+    polygon = None if room.spec is None else floor_of_room(room.spec)
+    if room.spec is None or polygon is None:
+        return ()
+    floor = floor_from_polygon(polygon)
+    windows = _windows(room, polygon)
+    carriers: list[Solid] = [
+        *room.objects,
+        *(one.shape for one in (*small, *shell) if one.shape is not None),
+    ]
+    found = []
+    for one in small:
+        found += [Misplacement(one.name, *told) for told in _small_faults(one, floor, carriers, windows)]
+    return tuple(found)
+
+
+def _small_faults(
+    one: Surrounding, floor: Floor, carriers: Sequence[Solid], windows: np.ndarray
+) -> Iterator[tuple[str, float | None]]:
+    kind, shape = SMALL[one.word], one.shape
+    if shape is None:
+        yield "empty", None
+        return
+    times = float((shape.size / np.array(kind.high)).max())
+    if times > LARGE:
+        yield "too large", float(shape.size.max())
+    elif float((shape.size / np.array(kind.low)).max()) < LITTLE:
+        yield "too small", float(shape.size.max())
+    beyond = _beyond(shape, floor)
+    if beyond > OUTSIDE:
+        yield "outside", beyond
+        return
+    bottom = float(shape.position[1])
+    if bottom < -FLOATING:
+        yield "sunk", -bottom
+        return
+    off = float(inside(floor, _back(shape)[None])[0][0])
+    if kind.fixed and not kind.lies:
+        if off > LEANING:
+            yield "off its wall", off
+        elif one.word in ("curtain", "blind") and len(windows):
+            beside = _beside(shape, windows)
+            if beside > BESIDE:
+                yield "off its window", beside
+        return
+    air = _air_below(shape, carriers)
+    if air > (DRAPED if kind.lies else FLOATING):
+        yield "floating", air
+
+
+def _back(shape: Shape) -> np.ndarray:
+    """(2,) float: the middle of the back of a box, in plan."""
+    return shape.position[[0, 2]] - np.array([np.sin(shape.yaw), np.cos(shape.yaw)]) * shape.size[2] / 2
+
+
+def _windows(room: RoomContents, polygon: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) float: both ends of every window, in plan."""
+    assert room.spec is not None
+    found = []
+    for opening in room.spec.openings:
+        if opening.kind == "window":
+            start, end = polygon[opening.edge % len(polygon)], polygon[(opening.edge + 1) % len(polygon)]
+            along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+            found.append([start + along * opening.offset, start + along * (opening.offset + opening.width)])
+    return np.array(found).reshape(-1, 2, 2)
+
+
+def _beside(shape: Shape, windows: np.ndarray) -> float:
+    """Metres in plan between the middle of a thing and the nearest window."""
+    start, along = windows[:, 0], windows[:, 1] - windows[:, 0]
+    away = shape.position[[0, 2]] - start
+    share = np.clip((away * along).sum(1) / np.maximum((along**2).sum(1), 1e-9), 0, 1)
+    return float(np.linalg.norm(away - share[:, None] * along, axis=1).min())
+
+
+def _beyond(thing: Solid, floor: Floor) -> float:
     points = thing.points[:, [0, 2]] if len(thing.points) else _footprint(thing)
     return float(-inside(floor, points)[0].min())
 
 
-def _footprint(thing: RoomObject) -> np.ndarray:
+def _footprint(thing: Solid) -> np.ndarray:
     return footprints(thing.size[None], thing.position[None], np.array([thing.yaw]))[0]
 
 
-def _air_below(thing: RoomObject, others: Sequence[RoomObject]) -> float:
+def _air_below(thing: Solid, others: Sequence[Solid]) -> float:
     """Height of the bottom over the floor or over the nearest surface below the middle or a corner of the object."""
     bottom = float(thing.position[1])
     air = abs(bottom)
@@ -86,7 +203,7 @@ def _air_below(thing: RoomObject, others: Sequence[RoomObject]) -> float:
     return air
 
 
-def _surface_gap(feet: np.ndarray, bottom: float, other: RoomObject) -> float:
+def _surface_gap(feet: np.ndarray, bottom: float, other: Solid) -> float:
     plan = other.points[other.faces][:, :, [0, 2]]
     low, high = plan.min(1), plan.max(1)
     best = np.inf

@@ -46,6 +46,11 @@ class Reading:
         return found
 
     @cached_property
+    def inactive(self) -> list[Usd.Prim]:
+        """The prims that somebody deactivated; what would be below them is not there."""
+        return [prim for prim in Usd.PrimRange.AllPrims(self.stage.GetPseudoRoot()) if not prim.IsActive()]
+
+    @cached_property
     def meshes(self) -> list[UsdGeom.Mesh]:
         """The meshes among the distinct prims."""
         return [UsdGeom.Mesh(prim) for prim in self.distinct if prim.IsA(UsdGeom.Mesh)]
@@ -76,11 +81,11 @@ class Reading:
 
     def contents(self, room: RoomPrims) -> RoomContents:
         """The objects of one of the rooms."""
-        return self._once("contents", room.graph, lambda: read_contents(room))
+        return self.once("contents", room.graph, lambda: read_contents(room))
 
     def world(self, prim: Usd.Prim) -> np.ndarray:
         """(4, 4) float, column vectors, prim to world; raises StageError where it is not finite."""
-        return self._once("world", prim, lambda: matrix(self.cache.GetLocalToWorldTransform(prim), prim))
+        return self.once("world", prim, lambda: matrix(self.cache.GetLocalToWorldTransform(prim), prim))
 
     def mesh(self, mesh: UsdGeom.Mesh) -> MeshArrays | None:
         """Points and faces of a mesh, None where they cannot be read, which the rules on values report."""
@@ -91,13 +96,14 @@ class Reading:
             except (StageError, Tf.ErrorException):
                 return None
 
-        return self._once("mesh", mesh.GetPrim(), read)
+        return self.once("mesh", mesh.GetPrim(), read)
 
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""
-        return self._once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)
+        return self.once("guide", prim, lambda: UsdGeom.Imageable(prim).ComputePurpose() in HIDDEN)
 
-    def _once(self, what: str, prim: Usd.Prim, read: Callable[[], Found]) -> Found:
+    def once(self, what: str, prim: Usd.Prim, read: Callable[[], Found]) -> Found:
+        """What is read of a prim, read at the first call."""
         key = what, prim.GetPath()
         if key not in self._kept:
             self._kept[key] = read()

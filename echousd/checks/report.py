@@ -8,21 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd
 
+from echomodel.data.dressing import SMALL
 from echousd.checks.collisions import find_collisions
 from echousd.checks.living import find_living
-from echousd.checks.placement import Misplacement, find_misplaced
+from echousd.checks.placement import Misplacement, find_misplaced, misplaced_screens, misplaced_small
 from echousd.checks.relations import MeasuredRelation, measured_relations
 from echousd.checks.validity import Fault, find_faults
 from echousd.repair.living import LivingFault
 from echousd.repair.report import Collision
-from echousd.stage.contents import RoomContents, read_contents
+from echousd.stage.contents import RoomContents, Surrounding, read_contents, surroundings
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
+from echousd.stage.labels import known_category
 from echousd.stage.layouts import layout_names, showing_layout
-from echousd.stage.read import find_rooms
+from echousd.stage.read import RoomPrims, find_rooms
+from echousd.stage.taxonomy import SHELL
 
 if TYPE_CHECKING:
     from echousd.settle import SettleReport
+
+DRESSED = "Dressing"  # name of the group that holds the small things of a room
 
 
 @dataclass(frozen=True)
@@ -169,7 +174,7 @@ def check(
     stage = opened(stage)
     errors, warnings = find_faults(stage)
     names: tuple[str | int | None, ...] = (layout_names(stage) or (None,)) if layout is None else (layout,)
-    found = [_check_layout(stage, name, rules) for name in names]
+    found = [check_layout(stage, name, rules) for name in names]
     rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
@@ -181,22 +186,53 @@ def check(
     return CheckReport(source(stage), rooms, tuple(report for _, report in found), errors, warnings, settled)
 
 
-def _check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
+def check_layout(stage: Usd.Stage, layout: str | int | None, rules: str) -> tuple[tuple[str, ...], LayoutReport]:
     """Prim paths of the rooms, and what is wrong with them in one layout."""
     with showing_layout(stage, layout) as name:
         try:
-            rooms = [read_contents(prims) for prims in find_rooms(stage)]
+            found = find_rooms(stage)
         except StageError:  # echo:EdgeTargets reports it
-            rooms = []
+            found = []
+        rooms = [read_contents(prims) for prims in found]
+        around = [Around.of(prims) for prims in found]
         report = LayoutReport(
             "" if layout is None else name,
             tuple(relation for room in rooms for relation in measured_relations(room, rules)),
-            tuple(hit for room in rooms for hit in find_collisions(room.objects)),
-            tuple(wrong for room in rooms for wrong in _misplaced(room)),
+            tuple(
+                hit
+                for room, other in zip(rooms, around, strict=True)
+                for hit in find_collisions(room.objects, other.strangers, other.small, other.shell)
+            ),
+            tuple(wrong for room, other in zip(rooms, around, strict=True) for wrong in _misplaced(room, other)),
             tuple(fault for room in rooms for fault in find_living(room)),
         )
         return tuple(room.path for room in rooms), report
 
 
-def _misplaced(room: RoomContents) -> tuple[Misplacement, ...]:
-    return find_misplaced(room) if room.objects else ()
+def _misplaced(room: RoomContents, other: Around) -> tuple[Misplacement, ...]:
+    if not room.objects:
+        return ()
+    screens = misplaced_screens(room, other.small)
+    return (*find_misplaced(room), *screens, *misplaced_small(room, other.small, other.shell))
+
+
+@dataclass(frozen=True)
+class Around:
+    """What is in a room besides the nodes of its furniture's graph: things of its dressing, its shell, and the rest."""
+
+    small: tuple[Surrounding, ...]
+    shell: tuple[Surrounding, ...]
+    strangers: tuple[Surrounding, ...]
+
+    @classmethod
+    def of(cls, prims: RoomPrims) -> Around:
+        """All of a room, but for floors, which carry all of it."""
+        small, shell, strangers = [], [], []
+        for one in surroundings(prims):
+            if one.word in SMALL and one.prim.GetParent().GetName() == DRESSED:
+                small.append(one)
+            elif one.word in SHELL:
+                shell.append(one)
+            elif known_category(one.word) is not None:
+                strangers.append(one)
+        return cls(tuple(small), tuple(one for one in shell if one.word != "floor"), tuple(strangers))

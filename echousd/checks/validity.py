@@ -14,27 +14,33 @@ from echousd.checks import (
     geometry_rules,
     graph_rules,
     label_rules,
+    look_rules,
     mesh_rules,
     object_rules,
     physics_rules,
+    ranges,
     value_rules,
 )
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said
+from echousd.stage.layouts import ARTICULATED, ARTICULATION, showing_variant
 
 FAMILIES = (
     graph_rules,
     object_rules,
     label_rules,
+    look_rules,
     geometry_rules,
     mesh_rules,
     physics_rules,
     file_rules,
+    ranges,
     value_rules,
 )
 RULES: tuple[Rule, ...] = tuple(rule for family in FAMILIES for rule in family.RULES)
+JOINED = tuple(rule for rule in RULES if rule.name in ("echo:Joints", "echo:PhysicsValues"))
 KEYWORD = "EchoUSD"
 ALONE = "echo:Validators"
 UNKNOWN_NODE, MATERIALX = ".MissingShaderIdInRegistry", "shaderId 'ND_"
@@ -104,6 +110,8 @@ def find_faults(stage: Usd.Stage) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]
     assert echousd.__version__  # importing the package registers the schema plugin
     reading = Reading(stage)
     own = [(rule, found) for rule in RULES for found in safely(rule, reading)]
+    with showing_variant(stage, ARTICULATION, ARTICULATED) as changed:  # doors and drawers are joined in it alone
+        own += [(rule, found) for rule in JOINED if changed for found in safely(rule, Reading(stage))]
     errors = {_fault(rule, found) for rule, found in own if not found.warning}
     warnings = {_fault(rule, found) for rule, found in own if found.warning}
     theirs = _faults_of_usd(stage)

@@ -5,19 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom
 
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading
 from echousd.stage.files import said
 from echousd.stage.values import LARGEST, misfit, shown
 
+WRAPS = ("black", "clamp", "repeat", "mirror", "useMetadata")
+WORDS = {"inputs:sourceColorSpace": ("raw", "sRGB", "auto"), "inputs:wrapS": WRAPS, "inputs:wrapT": WRAPS}
+ENGINES = {"physics:approximation": ("sdf", "sphereFill", "convexMeshSimplification")}  # words that only some know
 INVERTED = "!invert!"
 RESET = "!resetXformStack!"
 
 
 def value_types(reading: Reading) -> Iterator[Finding]:
-    """Every value can be read and is of the type of its attribute: clients read nothing, or crash, on others."""
+    """Every value can be read is of the type of its attribute and one of its words: clients read nothing, or crash."""
     for attribute in reading.authored:
         try:
             found = attribute.Get()
@@ -26,6 +29,10 @@ def value_types(reading: Reading) -> Iterator[Finding]:
             continue
         if misfit(attribute.GetTypeName(), found):
             yield Finding(attribute.GetPath(), f"holds {shown(found)}, allowed: {attribute.GetTypeName()}")
+        elif isinstance(found, str) and attribute.GetTypeName() == Sdf.ValueTypeNames.Token:
+            words = attribute.GetMetadata("allowedTokens") or WORDS.get(attribute.GetName())
+            if words and found not in (*words, *ENGINES.get(attribute.GetName(), ())):
+                yield Finding(attribute.GetPath(), f"is {found!r}, allowed: {', '.join(words)}")
 
 
 def finite_values(reading: Reading) -> Iterator[Finding]:

@@ -9,8 +9,9 @@ from echomodel.data.furniture.solids import Joint
 from echousd.room.geometry import FRAME, Geometry, Mass
 from echousd.room.masses import write_mass
 from echousd.room.paths import GEO, piece_name, piece_of, piece_path
+from echousd.stage.layouts import ARTICULATED, ARTICULATION
 
-ARTICULATION, STATIC, ARTICULATED = "articulation", "static", "articulated"
+STATIC = "static"
 Point = tuple[float, float, float]
 DAMPING = 2.0  # N s/m or N m s: a drawer that is let go stops
 

@@ -10,9 +10,10 @@ from echomodel.data.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.room.geometry import Geometry, Mass
-from echousd.room.joints import ARTICULATED, ARTICULATION, STATIC
+from echousd.room.joints import STATIC
 from echousd.room.masses import hull_volume, mass_of, write_mass
 from echousd.room.paths import MTL, SHELL, piece_path
+from echousd.stage.layouts import ARTICULATED, ARTICULATION
 
 GRAVITY = 9.81  # m/s²
 SCENE = "/Room/PhysicsScene"

@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Kind, Tf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, RoomSpec
-from echousd.stage.encoding import StageError
+from echousd.stage.encoding import LABELS, StageError
 from echousd.stage.forms import Polygons, forms, polygons
 from echousd.stage.read import RoomPrims, node_names, read_node, relation_of, room_spec
 from echousd.stage.units import metres_per_unit, up_axis
-from echousd.stage.values import matrix
+from echousd.stage.values import matrix, texts
 
 Z_TO_Y = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])  # (x, y, z) with Z up -> (x, z, -y)
 HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What is seen of a prim.
+
+    Arguments:
+        points: (v, 3) float, metres, room frame; faces: (f, 3) int.
+        size, position, yaw: its box: extents at yaw 0, centre of the bottom face (metres), radians about +Y.
+    """
+
+    points: np.ndarray
+    faces: np.ndarray
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +41,7 @@ class RoomObject:
 
     Arguments:
         node: what the graph says about it.
-        points: (v, 3) float, metres, room frame; faces: (f, 3) int. Empty where the object has no geometry.
-        size, position, yaw: its box: extents at yaw 0, centre of the bottom face (metres), radians about +Y.
+        points, faces, size, position, yaw: as in `Shape`; without points and faces where the object has no geometry.
     """
 
     node: Node
@@ -34,6 +50,33 @@ class RoomObject:
     size: np.ndarray
     position: np.ndarray
     yaw: float
+
+    @property
+    def name(self) -> str:
+        """Of its prim."""
+        return self.node.name
+
+
+Solid: TypeAlias = RoomObject | Shape
+
+
+@dataclass(frozen=True, eq=False)
+class Surrounding:
+    """A component of a room that is no node of its graph: a wall, a small thing, or what nobody told of.
+
+    Arguments:
+        prim: its prim. word: its label, "" without one.
+        shape: what is seen of it, None for nothing.
+    """
+
+    prim: Usd.Prim
+    word: str
+    shape: Shape | None
+
+    @property
+    def name(self) -> str:
+        """Of its prim."""
+        return str(self.prim.GetName())
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +157,43 @@ def _readable(read):  # type: ignore[no-untyped-def]
 def _object(
     prim: Usd.Prim, node: Node, cache: UsdGeom.XformCache, to_room: np.ndarray, others: set
 ) -> RoomObject | None:
+    found = shape_of(prim, cache, to_room, others)
+    if found is not None:
+        return RoomObject(node, found.points, found.faces, found.size, found.position, found.yaw)
+    if node.size is None or node.position is None or node.yaw is None:
+        return None
+    size, position = np.array(node.size), np.array(node.position)
+    return RoomObject(node, np.zeros((0, 3)), np.zeros((0, 3), int), size, position, node.yaw)
+
+
+def surroundings(prims: RoomPrims) -> tuple[Surrounding, ...]:
+    """The components of a room that are no nodes of its furniture's graph; what cannot be read has no shape."""
+    cache = UsdGeom.XformCache()
+    to_room = _readable(lambda: room_frame(prims.room, cache))
+    found = []
+    for prim in components(prims):
+        words = _readable(lambda prim=prim: texts(prim.GetAttribute(LABELS))) or ("",)  # type: ignore[misc]
+        shape = to_room is not None and _readable(lambda prim=prim: shape_of(prim, cache, to_room))  # type: ignore[misc]
+        found.append(Surrounding(prim, words[0], shape or None))
+    return tuple(found)
+
+
+def components(room: RoomPrims) -> list[Usd.Prim]:
+    """The prims of a room's components that are no nodes of its furniture's graph: walls, floors, small things."""
+    nodes = {prim.GetPath() for prim in room.nodes}
+    found, walk = [], iter(Usd.PrimRange(room.room, Usd.TraverseInstanceProxies()))
+    for prim in walk:
+        if prim.GetPath() in nodes or Kind.Registry.IsA(str(prim.GetMetadata("kind") or ""), Kind.Tokens.component):
+            walk.PruneChildren()
+            if prim.GetPath() not in nodes:
+                found.append(prim)
+    return found
+
+
+def shape_of(
+    prim: Usd.Prim, cache: UsdGeom.XformCache, to_room: np.ndarray, others: set | frozenset = frozenset()
+) -> Shape | None:
+    """What is seen of a prim and of all below it but for `others`, None for nothing; raises StageError."""
     own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
     points, faces = [], []
     count = 0
@@ -127,10 +207,7 @@ def _object(
         faces.append(triangles + count)
         count += len(vertices)
     if not points:
-        if node.size is None or node.position is None or node.yaw is None:
-            return None
-        size, position = np.array(node.size), np.array(node.position)
-        return RoomObject(node, np.zeros((0, 3)), np.zeros((0, 3), int), size, position, node.yaw)
+        return None
     vertices = np.concatenate(points)
     front = own[:3, :3] @ np.array([0.0, 0, 1])
     width = own[:3, :3] @ np.array([1.0, 0, 0])
@@ -144,7 +221,7 @@ def _object(
     low, high = turned.min(0), turned.max(0)
     x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     position = np.array([cos * x + sin * z, low[1], cos * z - sin * x])
-    return RoomObject(node, vertices, np.concatenate(faces), high - low, position, yaw)
+    return Shape(vertices, np.concatenate(faces), high - low, position, yaw)
 
 
 def is_seen(prim: Usd.Prim) -> bool:

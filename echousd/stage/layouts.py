@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pxr import Usd
+from pxr import Sdf, Usd
 
 from echousd.stage.encoding import StageError
 from echousd.stage.files import source
 
 VARIANTS = "layout"
+ARTICULATION, ARTICULATED = "articulation", "articulated"  # variant set of what opens, and the variant with joints
 
 
 def layout_prims(stage: Usd.Stage) -> list[Usd.Prim]:
@@ -51,14 +52,35 @@ def showing_layout(stage: Usd.Stage, layout: int | str | None) -> Iterator[str]:
     if name not in names:
         there = ", ".join(names) if names else "layout_0 (there is only one)"
         raise StageError(f"{source(stage)}: no layout {layout!r}, allowed: {there}")
-    sets = [prim.GetVariantSet(VARIANTS) for prim in layout_prims(stage)]
-    sets = [variants for variants in sets if name in variants.GetVariantNames()]
+    with _chosen(stage, layout_prims(stage), VARIANTS, name):
+        yield name
+
+
+@contextmanager
+def showing_variant(stage: Usd.Stage, variants: str, name: str) -> Iterator[bool]:
+    """Within the block, every prim that has a variant of a set shows it; yields whether some prim showed another."""
+    prims = [
+        prim for prim in stage.Traverse() if prim.HasVariantSets() and prim.GetVariantSets().HasVariantSet(variants)
+    ]
+    others = [prim for prim in prims if prim.GetVariantSet(variants).GetVariantSelection() != name]
+    if not others:
+        yield False
+        return
+    with _chosen(stage, others, variants, name):
+        yield True
+
+
+@contextmanager
+def _chosen(stage: Usd.Stage, prims: list[Usd.Prim], variants: str, name: str) -> Iterator[None]:
+    """Within the block, prims show one of their variants, those that have it."""
+    sets = [prim.GetVariantSet(variants) for prim in prims]
+    sets = [found for found in sets if name in found.GetVariantNames()]
     session = stage.GetSessionLayer()
     before = session.ExportToString()
-    with Usd.EditContext(stage, session):
-        for variants in sets:
-            variants.SetVariantSelection(name)
+    with Usd.EditContext(stage, session), Sdf.ChangeBlock():
+        for found in sets:
+            found.SetVariantSelection(name)
     try:
-        yield name
+        yield
     finally:
         session.ImportFromString(before)

@@ -60,7 +60,7 @@ def test_what_the_graph_does_not_know_is_judged_too(stage, thing):
     assert found(stage) == [("echo:Upright", path, "stands on its head, allowed: its own +Y (or +Z) upwards")]
     author(stage, f"{path}.xformOpOrder", Vt.TokenArray(["xformOp:translate"]))
     author(stage, f"{path}.{LABELS}", Vt.TokenArray(["rug", "vase"]))
-    assert found(stage) == [("echo:OneLabel", path, f"{LABELS} is rug, vase, allowed: one word")]
+    assert ("echo:OneLabel", path, f"{LABELS} is rug, vase, allowed: one word") in found(stage)
 
 
 @pytest.mark.parametrize(("angle", "scale", "wrong"), [(180, 0.1, True), (95, 100, False), (180, 0, False)])
@@ -141,10 +141,11 @@ def test_walls_are_labelled_walls(stage):
     assert found(stage) == [("echo:LabelsAgree", path, told)]
     classes.default = Vt.TokenArray([])
     prim.attributes[LABELS].default = Vt.TokenArray(["floor"])
-    assert found(stage) == [("echo:LabelsAgree", path, f"{LABELS} is 'floor', its name says 'wall'")]
-    assert [one.warning for rule in RULES for one in safely(rule, Reading(stage))] == [False]
+    assert ("echo:LabelsAgree", path, f"{LABELS} is 'floor', its name says 'wall'") in found(stage)
+    (agree,) = (rule for rule in RULES if rule.name == "echo:LabelsAgree")
+    assert [one.warning for one in safely(agree, Reading(stage))] == [False]
     prim.attributes[LABELS].default = Vt.TokenArray(["partition"])  # of somebody's own vocabulary
-    assert [one.warning for rule in RULES for one in safely(rule, Reading(stage))] == [True]
+    assert [one.warning for one in safely(agree, Reading(stage))] == [True]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,106 @@
+"""Every sabotage of the table gets a finding that names what is wrong, and where."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from pxr import Usd
+
+import echousd
+from echomodel.boxes import Boxes
+from echousd.checks import RULES, CheckReport, check
+from echousd.checks.reading import Reading
+from echousd.checks.report import check_layout
+from echousd.checks.validity import JOINED, safely
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.room.room import RoomOptions
+
+sys.path.insert(0, str(Path(__file__).parent))
+from sabotages import SABOTAGES, Sabotage
+from test_check import FOUND
+
+Named = set[tuple[str, str]]
+
+# name -> category, size, place and turn, with which the furniture branch makes and dresses a bedroom
+PLACES = {
+    "bed": ("double_bed", (1.8, 1.0, 2.1), (0, 0, -0.84), 0.0),
+    "nightstand": ("nightstand", (0.5, 0.5, 0.4), (1.25, 0, -1.68), 0.0),
+    "lamp": ("table_lamp", (0.25, 0.45, 0.25), (1.25, 0.5, -1.68), 0.0),
+    "wardrobe": ("wardrobe", (1.6, 2.2, 0.6), (-1.2, 0, 1.59), np.pi),
+    "tv_stand": ("tv_stand", (1.4, 0.5, 0.4), (0.9, 0, 1.69), np.pi),
+    "tv": ("tv", (1.0, 0.6, 0.15), (0.9, 0.5, 1.69), np.pi),
+    "pendant": ("pendant_lamp", (0.5, 0.5, 0.5), (0, 2.1, 0.4), 0.0),
+}
+RELATIONS = (
+    ("lamp", "standing_on", "nightstand"),
+    ("tv", "standing_on", "tv_stand"),
+    ("nightstand", "close_by", "bed"),
+)
+
+
+def bedroom(folder: Path) -> Path:
+    """The root layer of a room of walls, furniture and its dressing that `check` finds nothing in."""
+    graph = SceneGraph(
+        room=RoomSpec("bedroom", size=(4.4, 3.8), height=2.6),
+        nodes=tuple(Node(name, told[0]) for name, told in PLACES.items()),
+        relations=tuple(Relation(*told) for told in RELATIONS),
+    )
+    columns = zip(*(told[1:] for told in PLACES.values()), strict=True)
+    boxes = Boxes(*(torch.tensor(np.array(column), dtype=torch.float32) for column in columns))
+    options = RoomOptions(walls=True, dress="some")
+    return echousd.generate(graph, seed=1, shapes="parts", boxes=boxes, options=options).save(folder, preview=False)
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Usd.Stage:
+    return Usd.Stage.Open(str(bedroom(tmp_path_factory.mktemp("room") / "bedroom")))
+
+
+def named(report: CheckReport) -> Named:
+    """(rule or problem, prim or object) of all that a report says."""
+    found = {(fault.rule, fault.prim) for fault in (*report.errors, *report.warnings)}
+    found |= {(wrong.problem, wrong.object) for wrong in report.placement}
+    found |= {("collision", name) for hit in report.collisions for name in (hit.first, hit.second)}
+    return found | {("broken", one.relation.triple[0]) for one in report.broken}
+
+
+def after(stage: Usd.Stage, sabotage: Sabotage, judge: Callable[[Usd.Stage], Named]) -> Named:
+    """What is named once a stage is sabotaged; the stage is as it was then."""
+    try:
+        with Usd.EditContext(stage, stage.GetSessionLayer()):
+            sabotage.change(stage)
+        return judge(stage)
+    finally:
+        stage.GetSessionLayer().Clear()
+        for layer in stage.GetUsedLayers():
+            if layer.dirty:
+                layer.Reload(force=True)
+
+
+def judged(rule: str) -> Callable[[Usd.Stage], Named]:
+    """The part of a check that a finding comes from: one rule of ours, what is measured, or all."""
+    ours = next((each for each in RULES if each.name == rule), None)
+    if ours is not None and ours not in JOINED:
+        return lambda stage: {(rule, str(found.path)) for found in safely(ours, Reading(stage))}
+    if ":" in rule:
+        return lambda stage: named(check(stage))
+    return lambda stage: named(CheckReport("", (), (check_layout(stage, None, "strict")[1],), (), ()))
+
+
+def test_nothing_is_wrong_with_the_room(room: Usd.Stage) -> None:
+    assert named(check(room)) == set()
+
+
+@pytest.mark.parametrize("sabotage", SABOTAGES, ids=lambda one: one.name)
+def test_each_sabotage_is_named(room: Usd.Stage, sabotage: Sabotage) -> None:
+    assert (sabotage.rule, sabotage.prim) in after(room, sabotage, judged(sabotage.rule))
+
+
+def test_every_rule_has_a_sabotage_or_a_broken_file() -> None:
+    told = {sabotage.rule for sabotage in SABOTAGES} | set().union(*FOUND.values())
+    assert {rule.name for rule in RULES} - told == {"echo:PayloadsLoaded"}  # has a test of its own
