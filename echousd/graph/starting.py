@@ -39,7 +39,7 @@ def starting_graph(
     usual: list[Relation] = []
     for habit in vocabulary().habits:
         for category in habit.categories:
-            anchors = [anchor for word in habit.anchors for anchor in nodes.get(word, ())]
+            anchors = [anchor for word in habit.anchors if word != category for anchor in nodes.get(word, ())]
             if anchors:
                 usual += _related(habit, nodes.get(category, []), anchors)
     graph = SceneGraph(room, tuple(node for group in nodes.values() for node in group), tuple(relations))

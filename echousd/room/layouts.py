@@ -121,6 +121,8 @@ def sample_boxes(
     generator = seeded(draws.seed, "layout", draws.number)
     with timer.stage("layout") as tell, one_thread():
         found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu")
+    mounted = torch.tensor([vocabulary().category(node.category).mounted for node in nodes]).repeat(count)
+    found.position[mounted > 0, 1] = mounted[mounted > 0]
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
         for rows in torch.arange(count * len(nodes)).chunk(count)

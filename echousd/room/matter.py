@@ -51,6 +51,13 @@ PARTS: Mapping[tuple[str, str], Matter] = {
     ("back", "accent"): Matter(800.0, 0.0025),  # of a case
     ("foot", "metal"): Matter(7200.0, 0.003),  # of a lamp: cast
     ("pot", "ceramic"): Matter(2200.0, 0.005, core=400.0),  # half full of damp soil
+    ("stone", "ceramic"): Matter(2200.0, 0.015),  # of a mantel: slabs
+    ("stove", "screen"): Matter(7200.0, 0.004, core=60.0),  # cast, lined with brick
+    ("machine", "ceramic"): Matter(7850.0, 0.0008, core=150.0),  # sheet about a drum, a motor and a counterweight
+    ("cold", "metal"): Matter(7850.0, 0.0006, core=45.0),  # sheet about foam, shelves and a compressor
+    ("cold", "ceramic"): Matter(7850.0, 0.0006, core=45.0),
+    ("case", "wood"): Matter(620.0, 0.02, core=260.0),  # of a piano: an iron frame, strings and action
+    ("case", "screen"): Matter(620.0, 0.02, core=260.0),
     ("housing", "metal"): Matter(3000.0, 0.0015),  # of a screen: sheet and plastic about electronics
 }
 

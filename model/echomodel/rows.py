@@ -9,8 +9,9 @@ SUPPORTS = ("floor", "table", "wall", "ceiling")
 MEASURES = ("place", "size", None)
 UNITES = ("style", "shape")
 ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
-# at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top
-STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near")
+# at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top,
+# near, flush beside it at the same wall (fitted kitchens)
+STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near", "row")
 # below and around it, on its seat, before it, beside it, over it on the wall, in its room
 INVITES = ("rug", "cushions", "pouf", "basket", "picture", "mirror", "clock", "tall_mirror")
 
@@ -35,6 +36,7 @@ class Category:
         hangs: it may also hang on a wall.
         solid: its collider may be one hull; everything else has room below or inside that other things need.
         access: metres in front that must stay free, so that it can be opened or used.
+        mounted: metres between the floor and its lower edge, of what is fixed to a wall; 0 = as drawn.
         left_free: metres in front that the generator of rooms leaves free, as real rooms do. askew: share of such
             pieces that stand askew in real rooms.
         belongs_to: categories that it attends, the likeliest first.
@@ -68,6 +70,7 @@ class Category:
     hangs: bool = False
     solid: bool = False
     access: float = 0.0
+    mounted: float = 0.0
     left_free: float = 0.0
     askew: float = 0.0
     belongs_to: tuple[str, ...] = ()

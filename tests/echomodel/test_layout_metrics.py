@@ -196,7 +196,7 @@ def test_rays_meet_the_nearest_wall():
 def test_figures_of_a_room_by_hand():
     floor = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]], float)
     room = RoomBoxes(
-        "one", "living", floor, 2.6, ("sofa_3", "coffee_table", "piano"),
+        "one", "living", floor, 2.6, ("sofa_3", "coffee_table", "sculpture"),
         np.array([[2.0, 0.8, 1.0], [1.0, 0.4, 0.6], [1, 1, 1]]), np.array([[0, 0, -1.4], [0.2, 0, -0.2], [0, 0, 1.0]]),
         np.array([0.0, np.pi, 0.0]),
     )  # fmt: skip

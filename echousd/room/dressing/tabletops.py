@@ -22,6 +22,7 @@ BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 
 # What is put on a top, by what a row calls `top`: kinds of which one is taken, places, and whether only in full rooms.
+SHELVED = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
 TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
     "nightstand": (
         (("book_stack", "cup", "small_plant"), FRONT, False),
@@ -60,6 +61,12 @@ TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
         (("photo",), CORNERS, True),
         (("cup", "clock"), FRONT, True),
     ),
+    "worktop": (
+        (("bowl", "small_plant"), ENDS, False),
+        (("cup", "book_stack"), BACK, False),
+        (("glass", "cup"), CORNERS, True),
+    ),
+    "washbasin": ((("small_plant", "glass"), ((-0.85, -0.6), (0.85, -0.6)), False), (("candles",), CORNERS, True)),
     "dining_table": ((("flowers", "bowl", "candles"), MIDDLE, False), (("candles",), ENDS, True)),
     "sideboard": (
         (("flowers", "vase"), ENDS, False),
@@ -93,7 +100,7 @@ def tabletops(setting: Setting) -> None:
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in TOPS and tops:
             _top(setting, host, tops[0], name)
-        if host.row.role == "storage":
+        if host.row.role == "storage" and host.row.look in SHELVED:
             for surface in levels:
                 if surface is not (tops[0] if tops and name in TOPS else None):
                     _shelf(setting, host, surface)

@@ -63,7 +63,7 @@ def test_graph_keeps_relations_and_names_twins():
 
 def test_unknown_objects_are_left_out_or_told(tmp_path, capsys):
     room = RoomBoxes(
-        "r", "living", np.array([[-2, -2], [2, -2], [2, 2], [-2, 2.0]]), 2.6, ("piano", "sofa_3", "stool"),
+        "r", "living", np.array([[-2, -2], [2, -2], [2, 2], [-2, 2.0]]), 2.6, ("sculpture", "sofa_3", "stool"),
         np.ones((3, 3)), np.array([[0, 0, 0], [1, 0, 1], [-1, 0, 1.0]]), np.zeros(3),
     )  # fmt: skip
     path = tmp_path / "r.json"
@@ -72,7 +72,7 @@ def test_unknown_objects_are_left_out_or_told(tmp_path, capsys):
     assert run(["data", "from-usd", str(tmp_path / "usd" / "r.usda"), "-o", str(tmp_path / "b.json")]) == 0
     assert read_rooms(tmp_path / "b.json")[0].categories == ("multi_seat_sofa", "stool")
     assert run(["data", "to-usd", str(path), "--no-known", "-o", str(tmp_path / "none")]) == 2
-    assert "unknown category 'piano'" in capsys.readouterr().err
+    assert "unknown category 'sculpture'" in capsys.readouterr().err
 
 
 def test_sgfront_files_and_back(rooms_file, tmp_path):

@@ -286,7 +286,7 @@ def test_angles_that_cannot_be_meant(written, said):
 def test_all_faults_of_a_file_are_told_at_once(tmp_path, echousd_command):
     path = tmp_path / "x.yaml"
     path.write_text(
-        "room: bathroom\nobjects:\n  a: bedd\n  b: desk\nrelations:\n  - a left b\n  - a lefft b\n  - a left c\n"
+        "room: garage\nobjects:\n  a: bedd\n  b: desk\nrelations:\n  - a left b\n  - a lefft b\n  - a left c\n"
     )
     done = echousd_command("new", tmp_path / "out.usda", "--from", path)
     assert done.code == 2

@@ -95,7 +95,7 @@ def test_the_graph_needs_neither_pxr_nor_torch():
         ({"name": ""}, "name: '' is no identifier"),
         ({"name": "b" * 101}, "has 101 characters, allowed: 100"),
         ({"category": "bedd"}, "object 'bed': category: unknown category 'bedd': did you mean double_bed?"),
-        ({"category": "piano"}, "unknown category 'piano' (seen in real rooms, not supported): allowed: armchair,"),
+        ({"category": "sculpture"}, "'sculpture' (seen in real rooms, not supported): allowed: armchair,"),
         ({"category": None}, "category: found None, allowed: the name of a category"),
         ({"style": " "}, "style: found ' ', allowed: a non-empty text"),
         ({"size": (1, 0, 2)}, "size: found (1, 0, 2), allowed: three positive numbers [x, y, z], metres"),
@@ -122,13 +122,13 @@ def test_the_graph_needs_neither_pxr_nor_torch():
 def test_faults_of_a_node(fields, text):
     said = complaint(lambda: Node(**{"name": "bed", "category": "double_bed", **fields}))
     assert text in said
-    assert len(said) < 800
+    assert len(said) < 1100
 
 
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
-        ({"type": "bathroom"}, "room: type: unknown room type 'bathroom' (not supported): allowed: bedroom, "),
+        ({"type": "garage"}, "room: type: unknown room type 'garage' (not supported): allowed: bedroom, "),
         ({"size": (0, 3)}, "room: size: found (0, 3), allowed: two positive numbers [x, z], metres"),
         ({"height": -2}, "room: height: found -2, allowed: a positive number, metres"),
         ({"floor_polygon": [(0, 0), (1, 1)]}, "floor_polygon: 2 corners that enclose no area, allowed: at least three"),
@@ -248,7 +248,7 @@ def test_rename_goes_through_relations(bedroom):
 
 
 def test_relabel_lock_and_update(bedroom):
-    assert bedroom.relabel_node("bed", "crib").node("bed").category == "kids_bed"
+    assert bedroom.relabel_node("bed", "toddler_bed").node("bed").category == "kids_bed"
     assert bedroom.lock("bed").node("bed").locked
     assert bedroom.lock("bed").lock("bed", False) == bedroom
     assert bedroom.update_node("bed", yaw=1).node("bed").yaw == 1.0

@@ -11,10 +11,13 @@ import trimesh
 
 from echomodel.data.furniture import (
     armchairs,
+    bathrooms,
     beds,
     bunks,
     chairs,
     decor,
+    household,
+    kitchens,
     lamps,
     shelving,
     sofas,
@@ -32,7 +35,8 @@ from echomodel.vocabulary import vocabulary
 __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
-MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor)
+MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor,
+           kitchens, bathrooms, household)  # fmt: skip
 UNSAID = ("", "board")
 BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
 
