@@ -37,7 +37,7 @@ MATTER: Mapping[str, Matter] = {
     "wood": WOOD, "accent": WOOD, "frame": WOOD, "metal": STEEL, "glass": Matter(2500.0, 0.004),
     "mirror": Matter(2500.0, 0.003), "ceramic": Matter(2200.0, 0.005), "shade": Matter(1200.0, 0.0012),
     "screen": Matter(1500.0, 0.0015), "fabric": FOAM, "cushion": Matter(40.0), "linen": Matter(50.0),
-    "blanket": Matter(20.0), "accent_cloth": FOAM, "accent_plain": FOAM, "leather": Matter(300.0),
+    "blanket": Matter(20.0), "accent_cloth": Matter(40.0), "accent_plain": Matter(40.0), "leather": Matter(300.0),
     "wicker": Matter(400.0, 0.006), "leaf": Matter(120.0), "petal": Matter(120.0), "stem": Matter(500.0),
     "soil": Matter(900.0), "fruit": Matter(800.0), "wax": Matter(900.0), "paper": Matter(700.0),
     "book": Matter(650.0), "book_a": Matter(650.0), "book_b": Matter(650.0), "book_c": Matter(650.0),
