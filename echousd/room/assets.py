@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade, Vt
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
 
 from echousd.room.finishes.harmonies import HARMONIES
 from echousd.room.geometry import Geometry
@@ -17,22 +17,10 @@ from echousd.room.materials import write_looks, write_palettes
 from echousd.room.paths import CLASSES, DESCRIPTION, GEO, MTL, class_path, coarse_name, payload_name, piece_path
 from echousd.room.physics import write_asset_physics
 from echousd.room.surface import Surface, surface
+from echousd.stage.files import new_stage
 from echousd.stage.taxonomy import ade20k
 
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
-
-
-def new_stage(default_prim: str, kind: str = ".usda", data: Mapping[str, Any] | None = None) -> Usd.Stage:
-    """An empty stage in memory with the metadata that all our layers carry."""
-    stage = Usd.Stage.Open(Sdf.Layer.CreateAnonymous(kind))
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
-    layer = stage.GetRootLayer()
-    layer.defaultPrim = default_prim
-    if data:
-        layer.customLayerData = dict(data)
-    return stage
 
 
 def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.Layer:

@@ -39,7 +39,7 @@ from echousd.room.volume import room_points, room_volume
 from echousd.sight import Furniture
 from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.encoding import relation_name
-from echousd.stage.files import layer_bytes
+from echousd.stage.files import layer_bytes, new_stage
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.turning import turn_up
 
@@ -351,4 +351,4 @@ def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:
 
 def _room_stage(room: RoomData, layer: str) -> Usd.Stage:
     name = f"{room.name}_{layer}" if layer else room.name
-    return assets.new_stage("Room", ".usda", layer_data(room, name))
+    return new_stage("Room", ".usda", layer_data(room, name))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
 from pxr import Sdf, Tf, Usd, UsdUtils
 
@@ -13,8 +14,10 @@ from echousd.pictures import is_ours
 from echousd.room.folder import backup_name
 from echousd.room.journal import digest, digest_of
 from echousd.room.paths import coarse_file, component_file, payload_file
-from echousd.room.room import RoomData
 from echousd.room.within import inside
+
+if TYPE_CHECKING:
+    from echousd.room.room import RoomData
 
 LAYER_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 

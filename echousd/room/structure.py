@@ -20,6 +20,7 @@ from echousd.room.room import RoomData
 from echousd.room.shell import floor_mesh
 from echousd.room.surface import Surface, surface
 from echousd.room.walls import Piece, ShellPart, ceiling, walls
+from echousd.stage.files import new_stage
 from echousd.stage.taxonomy import ade20k
 
 LEAF = 320.0  # kg/m³ of a door's leaf
@@ -78,7 +79,7 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
 
 def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any]) -> Sdf.Layer:
     """`layers/shell.usdc`: floor, walls and what is in them, as meshes; `data`: customLayerData."""
-    stage = assets.new_stage("Room", ".usdc", data)
+    stage = new_stage("Room", ".usdc", data)
     for path in ("/Room", SHELL):
         UsdGeom.Xform.Define(stage, path)
     write_shell(stage, built)

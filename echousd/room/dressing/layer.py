@@ -15,6 +15,7 @@ from echousd.room.dressing.nodes import write_nodes
 from echousd.room.dressing.setting import Thing
 from echousd.room.materials import LOOKS
 from echousd.room.paths import DRESSING, class_path
+from echousd.stage.files import new_stage
 
 
 def dressing_layer(
@@ -36,7 +37,7 @@ def dressing_layer(
         instances: things of one asset are instances of it.
         taken: names of the prims of the furniture's relations.
     """
-    stage = assets.new_stage("Room", ".usda", data)
+    stage = new_stage("Room", ".usda", data)
     room = stage.OverridePrim("/Room")
     several = len(dressing.layouts) > 1
     users = Counter(dressing.assets[name] for things in dressing.layouts for name in things)

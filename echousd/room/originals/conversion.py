@@ -17,12 +17,11 @@ from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdShade, Vt
 
 from echomodel.files import within_memory
 from echousd.assets.model_file import Beside, ModelFile, checked_image
-from echousd.room.assets import new_stage
 from echousd.room.originals.original import CONVERTED
 from echousd.room.originals.winding import outward
 from echousd.room.surface import box_projection, creased_normals
 from echousd.srgb import to_linear
-from echousd.stage.files import layer_bytes
+from echousd.stage.files import layer_bytes, new_stage
 
 ROOT = "/model"
 FOLDER = "textures"
