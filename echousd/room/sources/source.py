@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from echousd.room.geometry import Geometry
-from echousd.room.options import FACES
+from echousd.room.meshing import FACES
 from echousd.room.progress import StageTimer
 from echousd.room.sources.retrieval import Retrieved
 from echousd.room.styles import shared_assets
