@@ -15,9 +15,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import echousd
-from echousd.rendering import render
-from echousd.room import RoomOptions
-from echousd.tracing import QUICK
+from echousd.draw.rendering import render
+from echousd.draw.tracing import QUICK
+from echousd.options import RoomOptions
 
 
 def bytes_of(folder: Path) -> float:

@@ -40,15 +40,15 @@ def main() -> None:
     asked = parser.parse_args()
     torch.set_num_threads(1)  # threads do not survive a fork
     load_model(None)
-    import echousd.room.pipeline
-    import echousd.room.save
+    import echousd.make.pipeline
+    import echousd.make.save
 
-    echousd.room.save.PREVIEW = 16
+    echousd.make.save.PREVIEW = 16
     draw, tried, wrong = random.Random(asked.seed), Counter[str](), 0
     with tempfile.TemporaryDirectory(prefix="echousd-flips-") as scratch:
         room = asked.room
         if room is None:
-            echousd.room.pipeline.load_model = lambda *_, **__: StandIn()  # type: ignore[assignment]
+            echousd.make.pipeline.load_model = lambda *_, **__: StandIn()  # type: ignore[assignment]
             made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
             room = made.save(Path(scratch) / "made/bedroom", preview=False)
         names = files_of(room)

@@ -61,7 +61,7 @@ def ran(*commands: tuple[str, ...]) -> Callable[[Path], object]:
 
 def interrupted(top: Path) -> None:
     """A room whose last run was killed when its journal was there."""
-    from echousd.room.journal import STAGING, Journal, Move, digest, digest_of, write_journal
+    from echousd.folder.journal import STAGING, Journal, Move, digest, digest_of, write_journal
 
     ran(("generate", str(GRAPH), "-o", "{top}/room", *QUICK))(top)
     staging = top / "room" / STAGING

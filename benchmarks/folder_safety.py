@@ -33,7 +33,7 @@ import echousd
 from echomodel.loading import load_model
 from echousd.cli.main import run
 from echousd.graph import load_graph
-from echousd.room.save import save_layers
+from echousd.make.save import save_layers
 
 GRAPH = Path(__file__).parents[1] / "samples/bedroom.usda"
 
@@ -186,7 +186,7 @@ def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[s
 
 def write_missing_preview(folder: Path) -> None:
     """The preview comes after the room; who was killed in between has the old one."""
-    from echousd.room.save import write_preview
+    from echousd.make.save import write_preview
 
     wait_for(start(lambda: int(write_preview(folder / "room.usda") is None)))
 

@@ -37,8 +37,8 @@ LAYOUT = PARTS[3:]  # of a layout; the others are what any run needs
 def parted() -> Iterator[dict[str, float]]:
     """CPU seconds by `PARTS` of what runs inside the block, each without the parts that run within it."""
     from echomodel.compact import layouts as sampling
+    from echousd.make import layouts
     from echousd.repair import living
-    from echousd.room import layouts
 
     repair = import_module("echousd.repair.repair")  # the package has a function of that name
 
@@ -78,10 +78,9 @@ def cold(text: str, seed: int) -> dict[str, float]:
     from echomodel.loading import load_model
     from echousd.graph import SceneGraph
     from echousd.graph.floors import with_plan
-    from echousd.room import pipeline  # noqa: F401
-    from echousd.room.layouts import Draws, best_boxes, most_drafts
-    from echousd.room.progress import StageTimer
-    from echousd.room.styles import style_groups
+    from echousd.make.layouts import Draws, best_boxes, most_drafts
+    from echousd.progress import StageTimer
+    from echousd.shapes.styles import style_groups
 
     out["imports"] = time.process_time() - sum(out.values())
     model = load_model(None)
@@ -149,10 +148,10 @@ def batch(rooms: int, first: int, product: float) -> None:
     from echomodel.loading import load_model
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
-    from echousd.room.layouts import BestDraft, DraftsWanted, Drawn, Draws, best_boxes, most_drafts
-    from echousd.room.packed import sample_round
-    from echousd.room.progress import StageTimer
-    from echousd.room.styles import style_groups
+    from echousd.make.layouts import BestDraft, DraftsWanted, Drawn, Draws, best_boxes, most_drafts
+    from echousd.make.packed import sample_round
+    from echousd.progress import StageTimer
+    from echousd.shapes.styles import style_groups
 
     model = load_model(None)
     graphs = [sampled_graph(TYPES[n % len(TYPES)], first, n // len(TYPES), 1.0) for n in range(rooms)]
@@ -193,9 +192,9 @@ def batch(rooms: int, first: int, product: float) -> None:
 def best_of_one(model: Any, graph: Any, seed: int) -> float:
     """CPU seconds of one draft of a warm model, repaired."""
     from echousd.graph.floors import with_plan
-    from echousd.room.layouts import Draws, best_boxes
-    from echousd.room.progress import StageTimer
-    from echousd.room.styles import style_groups
+    from echousd.make.layouts import Draws, best_boxes
+    from echousd.progress import StageTimer
+    from echousd.shapes.styles import style_groups
 
     planned = with_plan(graph, seed)
     began = time.process_time()

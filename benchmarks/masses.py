@@ -14,17 +14,17 @@ from collections import defaultdict
 import numpy as np
 import torch
 
-from echomodel.data.furniture import solids
-from echomodel.data.furniture.assembly import pieces_of
-from echomodel.data.furniture.description import piece_of
-from echomodel.data.rooms.generator import iterate_rooms
+from echomodel.furniture import solids
+from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.objective.sizes import usual_sizes
+from echomodel.rooms.generator import iterate_rooms
 from echomodel.vocabulary import vocabulary
-from echousd.room.matter import weighed
-from echousd.room.tensors import graph_batch
+from echousd.shapes.matter import weighed
 from echousd.stage.rooms import graph_of
+from echousd.tensors import graph_batch
 
 AT_ONCE = 50  # rooms in one batch
 

@@ -100,12 +100,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--log", type=Path, default=Path("faults.txt"))
     asked = parser.parse_args()
-    import echousd.room.pipeline
-    import echousd.room.save
+    import echousd.make.pipeline
+    import echousd.make.save
 
     if asked.room is None:
-        echousd.room.pipeline.load_model = lambda *_, **__: StandIn()  # type: ignore[assignment]
-    echousd.room.save.PREVIEW = 16
+        echousd.make.pipeline.load_model = lambda *_, **__: StandIn()  # type: ignore[assignment]
+    echousd.make.save.PREVIEW = 16
     with tempfile.TemporaryDirectory(prefix="echousd-mutations-") as place:
         scratch = Path(place)
         room = asked.room

@@ -17,7 +17,7 @@ from pxr import Usd
 
 import echousd
 from echousd.exporting import export
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 FORMS = {"text": {}, "usdc (--crate)": {"crate": True}, "text, --instances": {"instances": True}}

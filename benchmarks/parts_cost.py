@@ -13,17 +13,17 @@ import torch
 from torch.utils.flop_counter import FlopCounterMode
 
 from echomodel.boxes import Boxes
-from echomodel.data.furniture import sample_size, solids
-from echomodel.data.furniture.description import piece_of
 from echomodel.echo import EchoModel
+from echomodel.furniture import sample_size, solids
+from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.vocabulary import vocabulary
-from echousd.room import assets
-from echousd.room.geometry import Geometry, Origin
-from echousd.room.joinery import assembled
-from echousd.room.paths import piece_path
-from echousd.room.surface import surface
+from echousd.layers import assets
+from echousd.shapes.geometry import Geometry, Origin
+from echousd.shapes.joinery import assembled
+from echousd.shapes.surface import surface
 from echousd.stage.files import layer_bytes
+from echousd.stage.paths import piece_path
 
 ORIGIN = Origin("parts")
 

@@ -20,14 +20,14 @@ import trimesh
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
-from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
-from echomodel.data.furniture.description import piece_of
 from echomodel.data.mesh_sources import entries_of
 from echomodel.data.meshes import draft_table, prepared
-from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.echo import EchoModel
+from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture.description import piece_of
 from echomodel.graph import GraphBatch
 from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 
 POINTS, WIDTH, STEPS, BATCH, FOLDS, JUDGES = 256, 96, 240, 32, 3, 2

@@ -27,8 +27,8 @@ from echomodel.vocabulary import vocabulary
 from echousd import generate
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.starting import starting_graph
+from echousd.make.finished import Room
 from echousd.repair.living import living_faults
-from echousd.room import Room
 
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
 SETS = ("samples", "new", "people", "more")

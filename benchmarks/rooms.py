@@ -20,8 +20,8 @@ import torch
 from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig
-from echomodel.data.rooms import generate_rooms
 from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.rooms import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.rooms import PackedRooms

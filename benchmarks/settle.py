@@ -18,9 +18,9 @@ import torch
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import SceneGraph
-from echousd.room import RoomOptions
-from echousd.room.reading import read_room
-from echousd.room.verdicts import relation_verdicts
+from echousd.make.reading import read_room
+from echousd.make.verdicts import relation_verdicts
+from echousd.options import RoomOptions
 from echousd.settle import SettleReport, settle
 
 SAMPLES = Path(__file__).parents[1] / "samples"

@@ -12,7 +12,6 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.compact.wholeness import wholeness
 from echomodel.data.shapeset import ShapeSet
-from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
@@ -22,6 +21,7 @@ from echomodel.metrics.shapes import surface_points
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS
+from echomodel.tsdf import mesh_from_tsdf
 
 RULES = "sgfront"
 POINTS = 1024

@@ -10,7 +10,7 @@ import echousd
 from echomodel.rows import Predicate
 from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
-from echousd.room.finishes.harmonies import HARMONIES
+from echousd.shapes.finishes.harmonies import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")
 ORDER = ("generate", "edit", "check", "render", "export", "load_model", "Room", "RoomOptions")

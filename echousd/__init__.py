@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from echomodel.vocabulary import vocabulary
     from echousd.batches.batch import batch, generate_many
     from echousd.checks import check
+    from echousd.draw.rendering import render
     from echousd.exporting import export
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
-    from echousd.rendering import render
-    from echousd.room import Room, RoomOptions, generate
-    from echousd.room.edit import edit
+    from echousd.make.edit import edit
+    from echousd.make.finished import Room
+    from echousd.make.pipeline import generate
+    from echousd.options import RoomOptions
     from echousd.stage import read_dressing, read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
     from echousd.texturing import export_job as export_texture_job
     from echousd.texturing import import_look
@@ -39,18 +41,18 @@ _HOME = {
     "relations_from_boxes": "echousd.stage",
     "update_graph": "echousd.stage",
     "write_graph": "echousd.stage",
-    "Room": "echousd.room",
+    "Room": "echousd.make.finished",
     "batch": "echousd.batches.batch",
-    "generate": "echousd.room",
+    "generate": "echousd.make.pipeline",
     "generate_many": "echousd.batches.batch",
-    "RoomOptions": "echousd.room",
+    "RoomOptions": "echousd.options",
     "check": "echousd.checks",
-    "edit": "echousd.room.edit",
+    "edit": "echousd.make.edit",
     "export": "echousd.exporting",
     "export_texture_job": "echousd.texturing:export_job",
     "import_look": "echousd.texturing",
     "load_model": "echomodel.loading",
-    "render": "echousd.rendering",
+    "render": "echousd.draw.rendering",
     "vocabulary": "echomodel.vocabulary",
 }
 __all__ = [

@@ -9,8 +9,8 @@ import torch
 import trimesh
 from scipy import ndimage
 
-from echomodel.data.tsdf import RESOLUTION, truncated, voxels_from_points
 from echomodel.echo import EchoModel
+from echomodel.tsdf import RESOLUTION, truncated, voxels_from_points
 from echousd.assets.record import AssetRecord
 from echousd.assets.shape import sampled
 

@@ -13,7 +13,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, UsdUtils
 from echomodel.triangles import area_normals
 from echousd.assets.colors import Coat, flat, texels
 from echousd.assets.measured import Measured
-from echousd.drawables import Paint, fans, paints_of
+from echousd.draw.drawables import Paint, fans, paints_of
 from echousd.stage.contents import triangles_of
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage

@@ -28,15 +28,15 @@ from echousd.batches.plan import (
 )
 from echousd.batches.remote import Remote, complete
 from echousd.batches.run import Run, RunOptions
+from echousd.folder.folder import check_writable
+from echousd.folder.lock import locked
+from echousd.folder.within import inside
 from echousd.naming import free_name
-from echousd.room.folder import check_writable
-from echousd.room.lock import locked
-from echousd.room.within import inside
 
 if TYPE_CHECKING:
     from echousd.batches.work import Best, Job
     from echousd.graph import SceneGraph
-    from echousd.room import Room
+    from echousd.make.finished import Room
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def generate_many(
 def _judged(job: Job) -> Room | Best:
     """The room of a job, or the best of its drafts where it wants further ones."""
     from echousd.batches.work import best_of, generated
-    from echousd.room.layouts import DraftsWanted
+    from echousd.make.layouts import DraftsWanted
 
     try:
         found: Room = generated(job, here=True)

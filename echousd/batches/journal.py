@@ -11,10 +11,10 @@ from typing import Any
 
 from echousd.batches.plan import STATE, STORE
 from echousd.batches.rows import LONGEST, is_row
+from echousd.folder.lock import LOCK
+from echousd.folder.manifest import find_manifest
+from echousd.folder.within import check_links, inside
 from echousd.pending import STAGING
-from echousd.room.lock import LOCK
-from echousd.room.manifest import find_manifest
-from echousd.room.within import check_links, inside
 from echousd.store import Store
 
 JOURNAL = "journal.jsonl"

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, ValidationError
 
 from echousd.graph.nodes import PlainModel
-from echousd.room.options import FILES, MAX_SEED, ROOM, RoomOptions, row, told
+from echousd.options import FILES, MAX_SEED, ROOM, RoomOptions, row, told
 
 
 class BatchOptions(RoomOptions):

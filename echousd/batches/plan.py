@@ -17,9 +17,9 @@ from echomodel.files import bounded_lines, whole_file
 from echousd.batches.options import BatchOptions, BatchRequest
 from echousd.batches.rows import ID, LONGEST, is_text
 from echousd.batches.sources import find_graphs
+from echousd.folder.manifest import MAX_SEED
+from echousd.folder.within import inside
 from echousd.naming import as_identifier
-from echousd.room.manifest import MAX_SEED
-from echousd.room.within import inside
 
 STATE = ".batch"  # folder of plan and journals
 STORE = "store"  # folder of the assets that the rooms share

@@ -7,7 +7,7 @@ import re
 from pathlib import PurePosixPath
 from typing import Any
 
-from echousd.room.manifest import MAX_SEED
+from echousd.folder.manifest import MAX_SEED
 
 ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,254}")  # name of a room's folder and root layer
 ROOTS = (".usda", ".usdc", ".usd")

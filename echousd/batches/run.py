@@ -13,7 +13,7 @@ from echousd.batches import work
 from echousd.batches.executor import Executor, Outcome, Task
 from echousd.batches.journal import Journal
 from echousd.batches.plan import PACK, STORE, Entry, Plan
-from echousd.room.within import inside
+from echousd.folder.within import inside
 
 MEMORY = 4096  # MiB that a worker may hold
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up

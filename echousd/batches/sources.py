@@ -55,7 +55,7 @@ def _anchored(found: Found, folder: Path, outside: Sequence[str]) -> Found:
     if '"asset"' not in found.text:
         return found
     from echousd.assets.choose import AssetWishes
-    from echousd.room.sources.retrieval import anchored, check_files
+    from echousd.shapes.sources.retrieval import anchored, check_files
 
     graph = anchored(SceneGraph.from_json(found.text), folder)
     try:
@@ -75,8 +75,8 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.data.rooms import generate_room
-    from echomodel.data.rooms.generator import drawn_shares
+    from echomodel.rooms import generate_room
+    from echomodel.rooms.generator import drawn_shares
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
     from echomodel.vocabulary import vocabulary

@@ -10,8 +10,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from echomodel.files import read_bounded, read_json, whole_file
-from echousd.room.manifest import LARGEST
-from echousd.room.within import inside
+from echousd.folder.manifest import LARGEST
+from echousd.folder.within import inside
 from echousd.textures import MAX_BYTES
 
 FOLDER = "webdataset"

@@ -18,14 +18,14 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
-from echousd.room.layouts import BestDraft, DraftsWanted, Drawn, most_drafts
+from echousd.make.layouts import BestDraft, DraftsWanted, Drawn, most_drafts
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
 
 
 @dataclass(frozen=True)
 class Best:
-    """`echousd.room.layouts.BestDraft` in numbers that any process can be sent."""
+    """`echousd.make.layouts.BestDraft` in numbers that any process can be sent."""
 
     of: str
     boxes: Rows
@@ -83,7 +83,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
     A graph that the network refuses does not cost the others theirs: all are sampled alone then.
     """
     from echomodel.loading import load_model
-    from echousd.room.packed import sample_round
+    from echousd.make.packed import sample_round
 
     graphs: dict[int, SceneGraph] = {}
     out = [Sampled() for _ in jobs]
@@ -118,7 +118,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
 def samples(asks: tuple[Job, Wanted]) -> bytes:
     """What the network of a job's options makes of what it wants."""
     from echomodel.loading import load_model
-    from echousd.room.reproducible import one_thread
+    from echousd.reproducible import one_thread
 
     asked, wanted = asks[0].options, asks[1]
     with one_thread():
@@ -162,7 +162,7 @@ def generated(job: Job, *, here: bool = False) -> Any:
         here: this process has the device; else SamplesWanted is raised for what another one must sample.
     """
     from echomodel.loading import load_model
-    from echousd.room.pipeline import generate
+    from echousd.make.pipeline import generate
 
     drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
     found = job.best
@@ -190,7 +190,7 @@ def _checked(job: Job) -> Any:
     """The graph, if a room can be made of it; raises ValueError."""
     from echousd.graph.doors import check_doors
     from echousd.graph.floors import check_space, without_openings
-    from echousd.room.layouts import check_objects
+    from echousd.make.layouts import check_objects
 
     if job.draw is not None and not job.text:
         graph = sampled_graph(*job.draw, job.options.relations)

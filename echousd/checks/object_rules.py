@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Kind, Tf, Usd, UsdGeom
 
-from echomodel.data.dressing import SMALL
+from echomodel.dressing import SMALL
 from echousd.checks.findings import Finding, Rule, applied
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.dressing import SMALL
+from echomodel.dressing import SMALL
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.repair.geometry import Floor, axes, floor_from_polygon, inside

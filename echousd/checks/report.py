@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from pxr import Usd
 
-from echomodel.data.dressing import SMALL
+from echomodel.dressing import SMALL
 from echousd.checks.collisions import find_collisions
 from echousd.checks.living import find_living
 from echousd.checks.placement import Misplacement, find_misplaced, misplaced_screens, misplaced_small

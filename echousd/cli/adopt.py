@@ -39,17 +39,17 @@ def adopt(
     from echousd.cli.generate import progress_bar
     from echousd.cli.output import say
     from echousd.cli.report import report, telling_faults
-    from echousd.room.options import RoomOptions
-    from echousd.room.output import check_output, writing
+    from echousd.folder.output import check_output, writing
+    from echousd.options import RoomOptions
 
     started = time.perf_counter()
     options = RoomOptions(**given)
     check_output(output, flat=False, force=force)
     with writing(output, flat=False, force=force, wait=wait), telling_faults(), progress_bar() as listen:
-        from echousd.room.adopting import adopted, seen_in_theirs
-        from echousd.room.pipeline import generate
-        from echousd.room.progress import StageTimer
-        from echousd.room.written import write_room
+        from echousd.make.adopting import adopted, seen_in_theirs
+        from echousd.make.pipeline import generate
+        from echousd.make.written import write_room
+        from echousd.progress import StageTimer
         from echousd.stage.apart import check_apart
 
         check_apart(stage)

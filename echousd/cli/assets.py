@@ -123,8 +123,8 @@ def pack(
 
     Needs the extra render.
     """
-    from echousd.room.found import room_at
-    from echousd.room.simready import pack as write
+    from echousd.folder.found import room_at
+    from echousd.layers.simready import pack as write
 
     started = time.perf_counter()
     done = write(room_at(room), output, names=asset or (), author=author, force=force)

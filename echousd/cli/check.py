@@ -43,7 +43,7 @@ def check(
     Of several rooms each gets a line, with --json an entry of one list, those that cannot be read as well.
     """
     from echomodel.rules import rule_set
-    from echousd.room.found import rooms_at
+    from echousd.folder.found import rooms_at
 
     rule_set(rules)  # known, before each room tells that it is not
     found = [path for place in room for path in rooms_at(place)]

@@ -91,10 +91,10 @@ def sheet(
 
     Example: echousd data sheet chair dining_table -o chairs.png
     """
-    from echomodel.data.furniture import mesh_of
     from echomodel.data.shapeset import ShapeSet, piece
     from echomodel.data.sheet import contact_sheet
-    from echomodel.data.tsdf import mesh_from_tsdf
+    from echomodel.furniture import mesh_of
+    from echomodel.tsdf import mesh_from_tsdf
     from echomodel.vocabulary import vocabulary
 
     words = vocabulary()

@@ -56,9 +56,9 @@ def edit(
 
     Every option may be given several times.
     """
-    from echousd.room.found import room_at
-    from echousd.room.reading import read_room
-    from echousd.room.wishes import Wishes, wished
+    from echousd.folder.found import room_at
+    from echousd.make.reading import read_room
+    from echousd.make.wishes import Wishes, wished
 
     if not recover:
         room = room_at(room)
@@ -96,8 +96,8 @@ def update(
 
     What the layer moves is the artist's wish: it stays where it was put, locked, and the others make way.
     """
-    from echousd.room.found import layer_over
-    from echousd.room.wishes import artists_wishes
+    from echousd.folder.found import layer_over
+    from echousd.make.wishes import artists_wishes
 
     layer = layer_over(layer)
 
@@ -115,15 +115,15 @@ def update(
 
 def _name_of(*asked: object) -> str:
     """A word that tells a run from those of which something else was asked."""
-    from echousd.room.journal import digest
+    from echousd.folder.journal import digest
 
     return digest(repr(asked).encode())
 
 
 def _step(room: Path, wait: bool, json: bool, run: str) -> None:
     """Take the last edit of a room back (`undo`), or make it again (`redo`), and say what it was."""
-    from echousd.room import history
-    from echousd.room.folder import held
+    from echousd.folder import history
+    from echousd.folder.folder import held
 
     started = time.perf_counter()
     step = {"undo": history.undo, "redo": history.redo}[run]
@@ -135,9 +135,9 @@ def _step(room: Path, wait: bool, json: bool, run: str) -> None:
 
 def _recover(room: Path, wait: bool, json: bool) -> None:
     """Finish what an interrupted run has begun, and say what it was."""
-    from echousd.room import history
-    from echousd.room.folder import held
-    from echousd.room.found import room_at
+    from echousd.folder import history
+    from echousd.folder.folder import held
+    from echousd.folder.found import room_at
 
     started, folder = time.perf_counter(), room if room.is_dir() else room.parent
     if not folder.is_dir():
@@ -149,7 +149,7 @@ def _recover(room: Path, wait: bool, json: bool) -> None:
 
 def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) -> None:
     """Draw a room whose run was finished, and say what it did; exit code 1 where it has faults."""
-    from echousd.room.manifest import find_manifest
+    from echousd.folder.manifest import find_manifest
 
     _say_steps(room, _drawn(room), "finished", steps, started, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
@@ -159,7 +159,7 @@ def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) 
 
 def _drawn(room: Path) -> list[Path]:
     """The pictures of a room, drawn as it is now."""
-    from echousd.room.save import write_preview, write_sheet
+    from echousd.make.save import write_preview, write_sheet
 
     return [path for path in (write_preview(room), write_sheet(room)) if path]
 
@@ -192,14 +192,14 @@ def _change(
     The `run` that did the same and was interrupted is finished instead.
     """
     from echousd.cli.generate import progress_bar
-    from echousd.room.edit import edit as change
-    from echousd.room.edit import touched
-    from echousd.room.found import room_at
-    from echousd.room.history import told
-    from echousd.room.output import check_output, writing
-    from echousd.room.progress import StageTimer
-    from echousd.room.reading import read_room
-    from echousd.room.written import write_room
+    from echousd.folder.found import room_at
+    from echousd.folder.history import told
+    from echousd.folder.output import check_output, writing
+    from echousd.make.edit import edit as change
+    from echousd.make.edit import touched
+    from echousd.make.reading import read_room
+    from echousd.make.written import write_room
+    from echousd.progress import StageTimer
 
     started = time.perf_counter()
     check_output(folder, flat=False, force=force)

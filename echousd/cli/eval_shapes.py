@@ -150,7 +150,7 @@ def _parts(
 
 def _cleaned(shapes: dict[str, list[tuple[np.ndarray, np.ndarray]]]) -> tuple[dict, dict[str, list[trimesh.Trimesh]]]:
     """Generated shapes as the meshes that a room would get, and how many of them are closed."""
-    from echousd.room.meshing import mesh_from_shape
+    from echousd.shapes.meshing import mesh_from_shape
 
     made: dict[str, list[trimesh.Trimesh]] = {}
     scores = {"objects": 0, "empty": 0, "watertight": 0}

@@ -46,7 +46,7 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting import export as write
-    from echousd.room.found import room_at
+    from echousd.folder.found import room_at
 
     started = time.perf_counter()
     room = room_at(room)

@@ -17,8 +17,8 @@ from echousd.cli.report import report, telling_faults
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
-    from echousd.room.house import Place
-    from echousd.room.written import Written
+    from echousd.layers.house import Place
+    from echousd.make.written import Written
 
 TITLES = {
     "read": "Reading the graph",
@@ -60,8 +60,8 @@ def generate(
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians
     about +Y: at 0 a front looks along +Z.
     """
-    from echousd.room.options import RoomOptions
-    from echousd.room.output import check_output, writing
+    from echousd.folder.output import check_output, writing
+    from echousd.options import RoomOptions
 
     started = time.perf_counter()
     options = RoomOptions(**given)
@@ -80,9 +80,9 @@ def generate(
         listen = held.enter_context(progress_bar())
         gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
         try:
-            from echousd.room.pipeline import generate as make
-            from echousd.room.progress import StageTimer
-            from echousd.room.written import write_room, write_rooms
+            from echousd.make.pipeline import generate as make
+            from echousd.make.written import write_room, write_rooms
+            from echousd.progress import StageTimer
         finally:
             gc.enable()
         spent = {"imports": time.perf_counter() - started}
@@ -124,7 +124,7 @@ def rooms_of(graph: Path) -> Sequence[Place]:
     """The rooms of a stage that holds several; text is not worth loading USD for."""
     if graph.suffix.lower() not in (".usda", ".usdc", ".usd", ".usdz"):
         return ()
-    from echousd.room.house import places
+    from echousd.layers.house import places
 
     return places(graph)
 

@@ -79,7 +79,7 @@ def click_options(*flags: Parameter) -> list[Any]:
 
 def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
     from echousd.batches.options import BatchOptions
-    from echousd.room.options import GROUPS, OF_NEW, RoomOptions
+    from echousd.options import GROUPS, OF_NEW, RoomOptions
 
     rows: dict[str, Any] = dict((BatchOptions if batch else RoomOptions).model_fields)
     chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
@@ -89,7 +89,7 @@ def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
 
 def _flag(name: str, row: Any) -> Parameter:
     """The flag of a row: None where it is not given, so that a file's value or the default stands."""
-    from echousd.room.options import words_of
+    from echousd.options import words_of
 
     kind = next(kind for kind in (bool, int, float, str) if _is(row.annotation, kind))
     word, said = f"--{name.replace('_', '-')}", f"{row.description[0].upper()}{row.description[1:]}"

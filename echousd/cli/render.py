@@ -50,10 +50,10 @@ def render(
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
     """Draw a room from above, from a corner, from inside, from all around, or through each of its cameras."""
-    from echousd.pictures import gif, png
-    from echousd.rendering import VIEWS, render_cameras, render_turn
-    from echousd.rendering import render as draw
-    from echousd.room.found import room_at
+    from echousd.draw.pictures import gif, png
+    from echousd.draw.rendering import VIEWS, render_cameras, render_turn
+    from echousd.draw.rendering import render as draw
+    from echousd.folder.found import room_at
     from echousd.stage.files import write_all
 
     started = time.perf_counter()

@@ -14,7 +14,7 @@ import typer
 from echousd.cli.output import say, say_json
 
 if TYPE_CHECKING:
-    from echousd.room.written import Written
+    from echousd.make.written import Written
 
 
 @contextmanager

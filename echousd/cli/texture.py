@@ -47,7 +47,7 @@ def export(
     json: AsJson = False,
 ) -> None:
     """Write meshes with texture coordinates, cameras, prompts, a script to run the tool, and job.json."""
-    from echousd.room.found import room_at
+    from echousd.folder.found import room_at
     from echousd.texturing import export_job
 
     started = time.perf_counter()
@@ -77,7 +77,7 @@ def import_(
     json: AsJson = False,
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
-    from echousd.room.found import room_at
+    from echousd.folder.found import room_at
     from echousd.texturing import import_look
 
     started = time.perf_counter()

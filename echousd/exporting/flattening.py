@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from echousd.drawables import rgb
+from echousd.draw.drawables import rgb
 from echousd.exporting.packing import Package, take_assets
 from echousd.exporting.strip_physics import without_physics
 from echousd.stage.files import source

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux
 
-from echousd.drawables import Drawable, Paint, Texture, own_category, paint_image, read_drawables, world_frame
+from echousd.draw.drawables import Drawable, Paint, Texture, own_category, paint_image, read_drawables, world_frame
 from echousd.exporting.packing import Reach
 from echousd.stage import values
 from echousd.stage.layouts import selected_layout

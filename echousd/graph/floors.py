@@ -85,7 +85,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
         boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands already.
         seed: decides between places that are equally good.
     """
-    from echomodel.openingplaces import place_openings
+    from echomodel.rooms.openings import place_openings
 
     corners = graph.room.corners
     if graph.room.openings or corners is None:

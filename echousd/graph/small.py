@@ -12,7 +12,7 @@ from echousd.graph.nodes import PlainModel, Relation
 
 
 def _small_word(value: str) -> str:
-    from echomodel.data.dressing import SMALL
+    from echomodel.dressing import SMALL
 
     if value not in SMALL:
         raise ValueError(f"found {field.shown(value)}, allowed of a small thing: {', '.join(sorted(SMALL))}")
@@ -24,7 +24,7 @@ class SmallNode(PlainModel):
 
     Arguments:
         name: valid USD identifier, unique among all nodes of the room.
-        category: a category of small things (`echomodel.data.dressing.SMALL`).
+        category: a category of small things (`echomodel.dressing.SMALL`).
         size: (x, y, z) extents in its own frame, metres.
         position: (x, y, z) centre of the bottom face in the room frame, metres.
         yaw: radians about +Y; at 0 the front looks along +Z.

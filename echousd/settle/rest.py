@@ -8,12 +8,12 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echousd.room.finished import Room
-from echousd.room.paths import OBJECTS
-from echousd.room.reproducible import rounded_boxes
-from echousd.room.room import LayoutOutcome
-from echousd.room.verdicts import relation_verdicts
+from echousd.make.finished import Room
+from echousd.make.verdicts import relation_verdicts
+from echousd.reproducible import rounded_boxes
+from echousd.room import LayoutOutcome
 from echousd.settle.settle import SettleReport, settle_layouts
+from echousd.stage.paths import OBJECTS
 
 UPRIGHT = 1.0  # degrees: what leans further at rest is no pose that a layout can hold
 

@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from echousd.room.geometry import Mass
-from echousd.room.masses import read_mass
+from echousd.shapes.geometry import Mass
+from echousd.shapes.masses import read_mass
 from echousd.stage.contents import triangulated
 from echousd.stage.encoding import StageError
 from echousd.stage.units import metres_per_unit, up_axis

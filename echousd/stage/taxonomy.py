@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from echomodel.data.dressing import SMALL
+from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node
 from echousd.graph.nodes import OBSTACLE

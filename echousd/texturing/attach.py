@@ -9,13 +9,14 @@ from pathlib import Path
 
 from pxr import Sdf
 
-from echousd.room import folder as folders
-from echousd.room import ownership, paintings
-from echousd.room.manifest import find_manifest
-from echousd.room.save import write_preview
+from echousd.draw.surfaces import Surfaces, read_surfaces
+from echousd.folder import folder as folders
+from echousd.folder import ownership
+from echousd.folder.manifest import find_manifest
+from echousd.layers import paintings
+from echousd.make.save import write_preview
 from echousd.stage.files import layer_bytes, open_stage
 from echousd.stage.values import reading
-from echousd.surfaces import Surfaces, read_surfaces
 from echousd.texturing.job import Job, read_job
 from echousd.texturing.painted import look_files
 from echousd.texturing.results import read_results

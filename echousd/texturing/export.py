@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from echousd.draw.surfaces import Painted, Surfaces, read_surfaces
 from echousd.stage.contents import room_frame
 from echousd.stage.files import open_stage
 from echousd.stage.layouts import showing_layout
 from echousd.stage.read import the_room
 from echousd.stage.values import reading
-from echousd.surfaces import Painted, Surfaces, read_surfaces
 from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
 from echousd.texturing.glb import glb_bytes
@@ -185,7 +185,7 @@ def _moved(triangles: np.ndarray, frame: np.ndarray) -> np.ndarray:
 
 def _picture(stage: Usd.Stage, thing: Painted) -> bytes:
     """PNG of the object alone, as it looks now."""
-    from echousd.rendering import render_stage
+    from echousd.draw.rendering import render_stage
 
     mask = Usd.StagePopulationMask([thing.path])
     alone = Usd.Stage.OpenMasked(stage.GetRootLayer(), stage.GetSessionLayer(), mask)

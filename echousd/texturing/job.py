@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echousd.room.within import inside
+from echousd.folder.within import inside
 from echousd.texturing.atlas import Unwrapped, layout_digest
 from echousd.texturing.obj import read_obj
 

@@ -8,10 +8,10 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 import echousd
-from echousd.room.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
+from echousd.draw.surfaces import Painted, Surfaces
+from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.stage.files import layer_bytes
 from echousd.stage.units import set_units
-from echousd.surfaces import Painted, Surfaces
 from echousd.texturing.results import Result, Results
 
 ROUGHNESS = 0.75

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from echousd.surfaces import Painted, Surfaces
+from echousd.draw.surfaces import Painted, Surfaces
 
 
 def room_prompt(surfaces: Surfaces) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echousd.room.within import check_links
+from echousd.folder.within import check_links
 from echousd.textures import TextureError, decoded, texture_bytes
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.glb import read_glb

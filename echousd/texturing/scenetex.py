@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import yaml
 
-from echousd.surfaces import Painted
+from echousd.draw.surfaces import Painted
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.obj import obj_bytes
 from echousd.texturing.viewpoints import AZIMUTHS, ELEVATIONS, FIELDS

@@ -10,9 +10,9 @@ import shapely
 from scipy.spatial import cKDTree
 
 from echomodel.triangles import area_normals
-from echousd.surfaces import Painted, Surfaces
+from echousd.draw.surfaces import Painted, Surfaces
+from echousd.draw.views import view_matrix
 from echousd.texturing.atlas import Unwrapped, texel_faces
-from echousd.views import view_matrix
 
 HEIGHT = 1.4  # metres, of the point that cameras look through
 SPHERE = 0.5  # metres from it

@@ -122,7 +122,7 @@ class ShapeConfig:
 
 @dataclass(frozen=True)
 class FurnitureConfig:
-    """Denoiser of descriptions of furniture (`echomodel.data.furniture.description`).
+    """Denoiser of descriptions of furniture (`echomodel.furniture.description`).
 
     Arguments:
         kinds: words of every kind that a description tells, in order.

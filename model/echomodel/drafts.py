@@ -9,12 +9,12 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.data.rooms.arranging import arranged
-from echomodel.data.rooms.floor import Floor
-from echomodel.data.rooms.outline import floor_of
 from echomodel.floors import known
 from echomodel.graph import GraphBatch
 from echomodel.randomness import Randomness, whole_numbers
+from echomodel.rooms.arranging import arranged
+from echomodel.rooms.floor import Floor
+from echomodel.rooms.outline import floor_of
 from echomodel.rules import measured, verdicts
 from echomodel.vocabulary import vocabulary
 

@@ -252,7 +252,7 @@ class EchoModel:
         noise: Tensor | None = None,
         progress: StepListener | None = None,
     ) -> Tensor:
-        """Descriptions of all pieces of furniture of S scenes (`echomodel.data.furniture.description`).
+        """Descriptions of all pieces of furniture of S scenes (`echomodel.furniture.description`).
 
         Arguments:
             graph, boxes: N nodes and their boxes; only the sizes matter.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.rooms.statistics import quantile, room_type_statistics
 from echomodel.openings import Opening
+from echomodel.rooms.statistics import quantile, room_type_statistics
 from echomodel.sizes import size_statistics, usual_range
 from echomodel.vocabulary import Category, vocabulary
 

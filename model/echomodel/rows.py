@@ -24,7 +24,7 @@ class Category:
         coarse, sgfront: its SG-FRONT classes, simple and fine.
         support: what it rests on, one of `SUPPORTS`.
         role: what people use it for, one of `ROLES`.
-        look: how its materials are laid out (`echousd.room.looks.BANDS`).
+        look: how its materials are laid out (`echousd.shapes.looks.BANDS`).
         density: mass over the volume of the whole box, kg/m³ (furniture is mostly hollow).
         kg: (lightest, heaviest) of real ones, with what belongs to them (mattress, books, soil); docs/MASSES.md says
             who weighed them.
@@ -49,7 +49,7 @@ class Category:
         round: it is as wide as deep. aspect: least and greatest width over height, () = any.
         like: the category that weights take it for which do not know it, whose sizes and furniture it borrows where it
             has none of its own, and whose models in libraries may stand for it, "" = its SG-FRONT class.
-        top: the category whose small things stand on its top (`echousd.room.dressing.tabletops.TOPS`), "" = none.
+        top: the category whose small things stand on its top (`echousd.dressing.tabletops.TOPS`), "" = none.
         invites: small things that go with it, of `INVITES`.
         aliases: what people call it.
     """

@@ -17,7 +17,7 @@ from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
 import echousd
 from echousd.exporting import export
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.room.simready import pack
+from echousd.layers.simready import pack
 from echousd.stage import read_graph
 
 pytestmark = pytest.mark.clients

@@ -15,11 +15,11 @@ from second_device import SECOND, second_device
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig, from_dict
-from echomodel.data.furniture.description import WIDTH
-from echomodel.data.rooms.generator import generate_rooms
 from echomodel.echo import EchoModel
+from echomodel.furniture.description import WIDTH
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.training import parts_stage
 from echomodel.training import run as training_run

@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.data.rooms import generate_rooms
-from echomodel.data.rooms.outline import floor_of
 from echomodel.drafts import drafted
 from echomodel.floors import footprint, signed_distance
 from echomodel.graph import GraphBatch
 from echomodel.openingrows import ROW, clearances, opening_rows
+from echomodel.rooms import generate_rooms
+from echomodel.rooms.outline import floor_of
 from echomodel.rules import label_relations, verdicts
 from echomodel.rules.telling import told_relations
 from echomodel.samplers import sample

@@ -8,9 +8,9 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echomodel.data.rooms.floor import sample_floor
-from echomodel.data.rooms.statistics import room_type_statistics
 from echomodel.floors import GRID, extents, footprint, padded, plan_features, rectangle, signed_distance, wall_distances
+from echomodel.rooms.floor import sample_floor
+from echomodel.rooms.statistics import room_type_statistics
 
 UNKNOWN = torch.full((1, 4, 2), torch.nan)
 

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
-from echomodel.data.furniture.assembly import pieces_of
-from echomodel.data.furniture.choices import OPEN
-from echomodel.data.furniture.description import GROUPS, STYLE, WIDTH, described, draw_styles, piece_of
-from echomodel.data.furniture.solids import FINEST
+from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.choices import OPEN
+from echomodel.furniture.description import GROUPS, STYLE, WIDTH, described, draw_styles, piece_of
+from echomodel.furniture.solids import FINEST
 from echomodel.metrics.pieces import loose_solids
 from echomodel.vocabulary import vocabulary
 

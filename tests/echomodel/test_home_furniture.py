@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.vocabulary import vocabulary
 
 HOME = (

@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.data.rooms import generate_rooms
 from echomodel.metrics.layout import kolmogorov_smirnov, relation_scores, size_rows, touched_triplets
 from echomodel.metrics.layout_evaluation import OPPOSITE, LayoutEvaluation, evaluate_layout
 from echomodel.metrics.report import compare, section_means
 from echomodel.metrics.room_figures import ray_lengths, room_figures, with_known_words
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms import generate_rooms
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from echomodel.data.meshes import (
     write_table,
 )
 from echomodel.data.shapeset import ShapeSet
-from echomodel.data.tsdf import tsdf_from_mesh
+from echomodel.tsdf import tsdf_from_mesh
 from echomodel.vocabulary import vocabulary
 
 CATALOGUE = """# comment

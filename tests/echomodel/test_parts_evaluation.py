@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.data.furniture import Choices, Style
-from echomodel.data.furniture.description import described
+from echomodel.furniture import Choices, Style
+from echomodel.furniture.description import described
 from echomodel.metrics.parts_evaluation import PartsEvaluation, style_scores, usual_size
 from echomodel.objective.sizes import size_range
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-from echomodel.openingplaces import place_openings
 from echomodel.openings import Opening, check_openings, free_area, rectangle, signed_area, swing_area
 from echomodel.plans import filled_area, floor_extents, floor_outline, footprint, used_area
+from echomodel.rooms.openings import place_openings
 
 BEDROOM = ["double_bed", "nightstand", "nightstand", "wardrobe", "pendant_lamp"]
 LOUNGE = ["multi_seat_sofa", "coffee_table", "tv_stand", "armchair"]

@@ -5,16 +5,16 @@ import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
-from echomodel.data.rooms import generate_room, generate_rooms
-from echomodel.data.rooms.arranging import arranged
-from echomodel.data.rooms.builder import Item, overlaps
-from echomodel.data.rooms.floor import sample_floor
-from echomodel.data.rooms.outline import floor_of
-from echomodel.data.rooms.recipes import SOFA_KINDS
-from echomodel.data.rooms.statistics import room_requests, room_statistics, room_type_statistics
 from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures
 from echomodel.openingrows import ROW
+from echomodel.rooms import generate_room, generate_rooms
+from echomodel.rooms.arranging import arranged
+from echomodel.rooms.builder import Item, overlaps
+from echomodel.rooms.floor import sample_floor
+from echomodel.rooms.outline import floor_of
+from echomodel.rooms.recipes import SOFA_KINDS
+from echomodel.rooms.statistics import room_requests, room_statistics, room_type_statistics
 from echomodel.sizes import size_score
 from echomodel.vocabulary import vocabulary
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf
 from echomodel.metrics.shapes import (
     reconstruction_scores,
     set_scores,
@@ -13,6 +12,7 @@ from echomodel.metrics.shapes import (
     surface_scores,
     watertight_share,
 )
+from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf
 
 
 def box_grid(half, shift=0.0):

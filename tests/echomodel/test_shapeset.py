@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from echomodel.data import shapeset
-from echomodel.data.furniture import tsdf_of
 from echomodel.data.shapeset import LEVELS, ShapeSet, build_shapes, piece, quantised
+from echomodel.furniture import tsdf_of
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from echomodel.data.furniture import Choices, solids
-from echomodel.data.furniture.assembly import pieces_of
-from echomodel.data.furniture.decor import PANEL
-from echomodel.data.furniture.solids import Ball
-from echomodel.data.furniture.style import Style
+from echomodel.furniture import Choices, solids
+from echomodel.furniture.assembly import pieces_of
+from echomodel.furniture.decor import PANEL
+from echomodel.furniture.solids import Ball
+from echomodel.furniture.style import Style
 from echomodel.objective.sizes import EDGE, FEET, fitting_loads, in_proportion, size_range, usual_sizes
 from echomodel.sizes import usual_range
 from echomodel.vocabulary import vocabulary

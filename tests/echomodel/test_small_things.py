@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.data.dressing import KINDS, thing, usual_size
-from echomodel.data.furniture.assembly import pieces_of
+from echomodel.dressing import KINDS, thing, usual_size
+from echomodel.furniture.assembly import pieces_of
 
 
 @pytest.mark.parametrize("kind", KINDS)

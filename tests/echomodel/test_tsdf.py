@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from echomodel.data.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf, tsdf_from_mesh
+from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf, tsdf_from_mesh
 
 
 def voxel_centres():

@@ -13,21 +13,21 @@ from small_room import BARE
 
 import echousd
 from echomodel.boxes import Boxes
-from echomodel.data.furniture import decor
-from echomodel.data.furniture.carpentry import box
-from echomodel.data.rooms.generator import drawn_shares, generate_rooms
+from echomodel.furniture import decor
+from echomodel.furniture.carpentry import box
 from echomodel.habits import Habit
+from echomodel.rooms.generator import drawn_shares, generate_rooms
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
 from echousd.batches.batch import batch
 from echousd.checks import check
 from echousd.cli.main import command
+from echousd.dressing.dress import placed
+from echousd.dressing.tabletops import TOPS
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
 from echousd.repair import repair_boxes
-from echousd.room.dressing.dress import placed
-from echousd.room.dressing.tabletops import TOPS
-from echousd.room.finishes.slots import SLOTS
+from echousd.shapes.finishes.slots import SLOTS
 from echousd.stage.foreign import foreign_graph
 
 LEVEL = 0.05  # metres

@@ -16,9 +16,10 @@ from echousd.checks import check
 from echousd.exporting import export
 from echousd.exporting.packing import Reach
 from echousd.graph import load_graph
-from echousd.room import RoomOptions, generate
-from echousd.room.edit import edit
-from echousd.room.reading import read_room
+from echousd.make.edit import edit
+from echousd.make.pipeline import generate
+from echousd.make.reading import read_room
+from echousd.options import RoomOptions
 from echousd.store import MARK, Store, key_of, store_of
 
 SAMPLES = Path(__file__).parents[2] / "samples"

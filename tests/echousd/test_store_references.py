@@ -8,11 +8,11 @@ import pytest
 from pxr import Sdf, Usd
 
 import echousd
+from echousd.folder import folder as folders
+from echousd.folder import history
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.room import folder as folders
-from echousd.room import history
-from echousd.room.edit import edit
-from echousd.room.reading import read_room
+from echousd.make.edit import edit
+from echousd.make.reading import read_room
 from echousd.store import Store, keys_named
 
 
@@ -179,7 +179,7 @@ def two(*more):
 @pytest.mark.parametrize("crate", [False, True])
 def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
     store = tmp_path / "store"
-    options = echousd.room.RoomOptions(crate=crate)
+    options = echousd.RoomOptions(crate=crate)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         made = echousd.generate(two(), model=None, shapes="boxes", drafts=1, steps=2, repair=False, options=options)

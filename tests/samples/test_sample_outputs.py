@@ -20,7 +20,7 @@ from numpy._core._multiarray_umath import __cpu_features__
 from pxr import Usd
 
 import echousd
-from echousd.room.compose import room_files
+from echousd.layers.compose import room_files
 
 SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.yaml"))
 OUTPUTS = Path(__file__).with_name("sample_outputs.json")
@@ -51,7 +51,7 @@ def machine():
 
 def output(sample):
     """What a sample gives: width, height, depth, x, y, z in 0.1 mm and turn in 0.01 degrees of every object, which is
-    what stages hand on (`echousd/room/reproducible.py`), and of the layers that are text the numbers and a digest of
+    what stages hand on (`echousd/reproducible.py`), and of the layers that are text the numbers and a digest of
     what stands between them."""
     room = echousd.generate(sample, seed=SEED, shapes="boxes", walls=False, dress="none")
     size, position, yaw = (np.asarray(value, float) for value in (room.boxes.size, room.boxes.position, room.boxes.yaw))

@@ -77,7 +77,7 @@ def errors_in_texels(room: Path, job: Job, samples: int = 400) -> np.ndarray:
 
     What eight bits cannot tell is taken off.
     """
-    from echousd.drawables import paint_image, read_drawables
+    from echousd.draw.drawables import paint_image, read_drawables
     from echousd.stage import open_stage
 
     rng = np.random.default_rng(0)

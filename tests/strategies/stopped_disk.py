@@ -3,7 +3,7 @@
 import contextlib
 from pathlib import Path
 
-from echousd.room import folder as folders
+from echousd.folder import folder as folders
 
 
 @contextlib.contextmanager

@@ -6,11 +6,11 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from echomodel.data.rooms.generator import STYLES
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.data.shapeset import ShapeSet, build_shapes
 from echomodel.files import write_json
 from echomodel.progress import StageListener, StepListener
+from echomodel.rooms.generator import STYLES
 
 
 @dataclass(frozen=True)

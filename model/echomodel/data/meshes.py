@@ -19,9 +19,9 @@ import trimesh
 from echomodel.data.catalogues import Loader, MeshEntry, load_mesh
 from echomodel.data.shapeset import ShapeRecord, ShapeSet, finish_set, write_shard
 from echomodel.data.sheet import thumbnail
-from echomodel.data.tsdf import tsdf_from_mesh
 from echomodel.files import whole_file, write_picture, write_text
 from echomodel.progress import StepListener
+from echomodel.tsdf import tsdf_from_mesh
 from echomodel.vocabulary import vocabulary
 
 HELD_OUT = 0.2

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.data.folders import claim, read_note
-from echomodel.data.rooms import generate_rooms, untidied
 from echomodel.files import whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms import generate_rooms, untidied
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
@@ -67,7 +67,7 @@ def build_rooms(
         directory: folder of the set; shards that are complete there are kept.
         count: number of rooms, at least 1. seed: seed of the world. styles: number of style groups of the shape set.
         progress: called with (rooms done, rooms in all).
-        untidy: share of the rooms to train on that are shaken (see `echomodel.data.rooms.untidied`), 0 to 1.
+        untidy: share of the rooms to train on that are shaken (see `echomodel.rooms.untidied`), 0 to 1.
         halls: share of large rooms of several zones, 0 to 1.
 
     Raises:

@@ -16,11 +16,11 @@ import numpy as np
 import zstandard
 
 from echomodel.data.folders import claim, read_note
-from echomodel.data.furniture import Choices, Style, sample_size, solids, tsdf_of
-from echomodel.data.furniture.solids import Solid
-from echomodel.data.tsdf import RESOLUTION, TRUNCATION
 from echomodel.files import whole_file, write_json
+from echomodel.furniture import Choices, Style, sample_size, solids, tsdf_of
+from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener
+from echomodel.tsdf import RESOLUTION, TRUNCATION
 from echomodel.vocabulary import vocabulary
 
 # Magnitudes of the 16 levels in voxels: finest about the surface, where the zero crossing is read off.

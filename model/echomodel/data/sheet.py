@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from PIL import Image, ImageDraw
 
-from echomodel.data.furniture.assembly import MATERIALS
+from echomodel.furniture.assembly import MATERIALS
 
 PALETTE = {
     "wood": (181, 137, 94),

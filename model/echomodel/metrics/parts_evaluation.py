@@ -13,18 +13,18 @@ import trimesh
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.data.furniture import Choices, Style, mesh_of, sample_size, solids
-from echomodel.data.furniture.description import GROUPS, HOT, STYLE, piece_of
-from echomodel.data.furniture.solids import Solid
-from echomodel.data.rooms import generate_rooms
-from echomodel.data.tsdf import mesh_from_tsdf
+from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
+from echomodel.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.furniture.solids import Solid
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
 from echomodel.metrics.shape_evaluation import FIRST_ROOM
 from echomodel.metrics.shapes import set_scores, surface_points
 from echomodel.objective.sizes import size_range
 from echomodel.progress import StageListener
+from echomodel.rooms import generate_rooms
 from echomodel.rules import label_relations
+from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from echomodel.data.furniture.solids import Array, Solid
+from echomodel.furniture.solids import Array, Solid
 from echomodel.triangles import area_normals
 
 TOUCH = 0.006  # metres between solids that still count as joined

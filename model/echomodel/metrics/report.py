@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.data.rooms.statistics import room_statistics
 from echomodel.metrics.room_figures import room_figures, with_known_words
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms.statistics import room_statistics
 
 LEAST = 25  # figures of fewer real or generated samples say little and are left out
 

@@ -12,9 +12,7 @@ import torch
 import trimesh
 
 from echomodel.boxes import Boxes
-from echomodel.data.furniture import sample_size
-from echomodel.data.rooms import generate_rooms
-from echomodel.data.tsdf import mesh_from_tsdf
+from echomodel.furniture import sample_size
 from echomodel.graph import GraphBatch
 from echomodel.metrics.shapes import (
     reconstruction_scores,
@@ -24,7 +22,9 @@ from echomodel.metrics.shapes import (
     watertight_share,
 )
 from echomodel.progress import StageListener
+from echomodel.rooms import generate_rooms
 from echomodel.rules import label_relations
+from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:

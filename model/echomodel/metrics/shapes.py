@@ -13,8 +13,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from echomodel.data.tsdf import mesh_from_tsdf
 from echomodel.progress import StepListener
+from echomodel.tsdf import mesh_from_tsdf
 
 THRESHOLD = 1 / 64
 SAMPLES = 8_000  # points whose distance is scored

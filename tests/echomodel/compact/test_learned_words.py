@@ -14,10 +14,10 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.learned import WordTable, places
 from echomodel.compact.model import CompactModel, WeightsError, load_weights, save_weights
 from echomodel.config import CompactConfig, from_dict
-from echomodel.data.rooms import generate_rooms
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
+from echomodel.rooms import generate_rooms
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.start import started

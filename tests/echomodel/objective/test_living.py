@@ -10,10 +10,10 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.data.rooms.generator import generate_rooms
 from echomodel.objective import TERMS, faults, faults_of, missed, plan_of
 from echomodel.objective.ways import ways
 from echomodel.openings import Opening
+from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])

@@ -12,12 +12,12 @@ import torch
 from echomodel.boxes import Boxes
 from echomodel.compact.model import WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.data.rooms.generator import generate_rooms
 from echomodel.data.roomset import RoomSet
 from echomodel.echo import EchoModel
 from echomodel.floors import known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.training.layout_stage import measure_distance
 from echomodel.training.living_loss import heading_distance, living_loss

@@ -20,8 +20,8 @@ from echousd.batches.sheet import write_sheet
 from echousd.batches.sources import find_graphs, sampled_graph
 from echousd.batches.verify import finish, status, verify
 from echousd.batches.webdataset import write_webdataset
+from echousd.folder.lock import locked
 from echousd.graph import SceneGraph
-from echousd.room.lock import locked
 from echousd.store import Store
 
 SAMPLES = Path(__file__).parents[3] / "samples"
@@ -101,7 +101,7 @@ def test_further_drafts_of_a_pack_are_drawn_together_whatever_was_ended(tmp_path
     # one room is pleased with anything, one with the third draft, one with nothing
     limit = {1: 9.0, 2: 0.3, 3: -9.0}
     monkeypatch.setattr(
-        "echousd.room.layouts._wishes",
+        "echousd.make.layouts._wishes",
         lambda graph, found, proposed: (max(float(found[0].position[0, 0]) - limit[len(graph.nodes)], 0.0),),
     )
     options, out = {**QUICK, "drafts": 5}, tmp_path / "run"

@@ -18,7 +18,7 @@ from echousd.checks.reading import Reading
 from echousd.checks.report import check_layout
 from echousd.checks.validity import JOINED, safely
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.room.room import RoomOptions
+from echousd.room import RoomOptions
 
 sys.path.insert(0, str(Path(__file__).parent))
 from sabotages import SABOTAGES, Sabotage

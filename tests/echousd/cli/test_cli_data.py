@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from echomodel.data.rooms import generate_rooms
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
+from echomodel.rooms import generate_rooms
 from echomodel.rules import label_relations
 from echousd.cli.main import run
 from echousd.stage.rooms import graph_of, room_of

@@ -57,8 +57,8 @@ def watch(monkeypatch) -> Iterator[None]:
     def stop(*_: object) -> None:
         raise Hang
 
-    monkeypatch.setattr("echousd.room.pipeline.load_model", lambda *_, **__: StandIn())
-    monkeypatch.setattr("echousd.room.save.PREVIEW", 16)
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
     before = signal.signal(signal.SIGALRM, stop)
     yield
     signal.alarm(0)

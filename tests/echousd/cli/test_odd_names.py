@@ -8,7 +8,7 @@ import pytest
 from pxr import Sdf
 from small_room import StandIn
 
-from echousd.room.folder import claim
+from echousd.folder.folder import claim
 
 GRAPH = """room: {type: bedroom, size: [4.0, 3.4]}
 objects: {bed: {category: double_bed, style: STYLE}, pendant: pendant_lamp}
@@ -19,8 +19,8 @@ REFUSED = ("room:SDF_FORMAT_ARGS:a=b", "ro\\om", "ro\tom", "ro\nom", "ro\x1b[31m
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr("echousd.room.pipeline.load_model", lambda *_, **__: StandIn())
-    monkeypatch.setattr("echousd.room.save.PREVIEW", 16)
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
 
 
 def make(echousd_command, folder, style="plain"):

@@ -11,7 +11,7 @@ from small_room import BARE, OBJECTS, StandIn, small_graph
 
 import echousd
 from echousd.exporting import export
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import echousd
 from echomodel.openings import Opening
 from echousd.exporting import export
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 
 DOOR = Opening("door", "door", 3, 0.4, 0.9, 2.0, hinge="right")
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)

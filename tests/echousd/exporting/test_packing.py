@@ -12,7 +12,7 @@ import trimesh
 from PIL import Image
 from pxr import Usd
 
-from echousd.drawables import read_drawables
+from echousd.draw.drawables import read_drawables
 from echousd.exporting import export
 from echousd.exporting.packing import LeftOut
 from echousd.textures import read_image

@@ -11,7 +11,7 @@ from pxr import Gf, Usd, UsdGeom, UsdPhysics
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 from echousd.settle import SettleUnavailable, settle
 from echousd.settle.solids import convex_parts, read_world
 

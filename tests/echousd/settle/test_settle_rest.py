@@ -9,7 +9,7 @@ from small_room import StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 from echousd.settle import settled
 
 pytestmark = pytest.mark.skipif("not __import__('importlib.util').util.find_spec('mujoco')", reason="extra sim")

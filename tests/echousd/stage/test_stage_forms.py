@@ -7,7 +7,7 @@ from pxr import Gf, Usd, UsdGeom
 from small_room import BARE, StandIn, small_graph
 
 import echousd
-from echousd.drawables import read_drawables
+from echousd.draw.drawables import read_drawables
 from echousd.stage.contents import read_contents
 from echousd.stage.forms import SkippedForms, polygons
 from echousd.stage.read import find_rooms

@@ -6,7 +6,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics
 import echousd
 from echousd.checks import check
 from echousd.graph import SceneGraph
-from echousd.room import RoomOptions
+from echousd.options import RoomOptions
 from echousd.stage import StageError, foreign_graph, foreign_rooms, open_stage, read_graph, relations_from_boxes
 from echousd.stage.files import MissingMaterials
 from echousd.stage.foreign import SkippedPrims

@@ -9,7 +9,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.checks import check
-from echousd.drawables import read_drawables
+from echousd.draw.drawables import read_drawables
 from echousd.exporting import export
 from echousd.stage import read_graph, update_graph
 from echousd.stage.read import StatedTwice

@@ -1,6 +1,6 @@
 """What we call things in ADE20K are names of its 150 scene-parsing classes."""
 
-from echomodel.data.dressing import SMALL
+from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage.taxonomy import SHELL, ade20k

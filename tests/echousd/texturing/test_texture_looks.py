@@ -15,9 +15,9 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echousd.checks import check
-from echousd.room.edit import edit
-from echousd.room.history import redo, undo
-from echousd.room.reading import read_room
+from echousd.folder.history import redo, undo
+from echousd.make.edit import edit
+from echousd.make.reading import read_room
 from echousd.stage import open_stage, read_graph
 from echousd.texturing import atlas, export_job, import_look
 from echousd.texturing.atlas import Unwrapped

@@ -14,8 +14,8 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.checks import check
 from echousd.exporting import export
-from echousd.room import RoomOptions
-from echousd.room.paintings import primvar
+from echousd.layers.paintings import primvar
+from echousd.options import RoomOptions
 from echousd.stage import open_stage
 from echousd.texturing import export as texturing_export
 from echousd.texturing import export_job, import_look, scenetex

@@ -1,0 +1,1 @@
+"""Stages drawn: meshes to draw, where to look from, renderings and pictures."""

@@ -1,0 +1,145 @@
+"""Pictures of any stage without a GPU or a display: one view, a sheet of several, or a turn around the room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from echousd.draw.scenery import Scenery, read_scenery
+from echousd.draw.tracing import FINE, QUICK, trace
+from echousd.draw.viewpoints import corner_views, eye_view, stage_views, top_view, turning_views
+
+if TYPE_CHECKING:
+    from PIL import Image
+    from pxr import Usd
+
+EVERY, CONTACT = "every-camera", "sheet"
+VIEWS = ("top", "perspective", "eye", EVERY, CONTACT)
+COLORS = ("materials", "class")
+SHEET = ("eye", "top")  # beside the best corner in the first row; below, the views from the others
+LARGEST = 4096
+FRAMES = (2, 360)  # pictures that a turn may have
+
+
+def render(
+    path: str | Path,
+    *,
+    view: str = "perspective",
+    size: int = 512,
+    colors: str = "materials",
+    rays: int = FINE,
+    layout: int | str | None = None,
+) -> Image.Image:
+    """A picture of the room in a file, in one of its layouts (None: the one that it shows); see `render_stage`.
+
+    Raises ValueError where it cannot be opened, or has no such layout.
+    """
+    from echousd.stage import open_stage
+    from echousd.stage.layouts import showing_layout
+
+    stage = open_stage(path)
+    with showing_layout(stage, layout):
+        return render_stage(stage, view=view, size=size, colors=colors, rays=rays)
+
+
+def render_cameras(
+    path: str | Path, *, size: int = 512, colors: str = "materials", rays: int = FINE, layout: int | str | None = None
+) -> dict[str, Image.Image]:
+    """A picture of the room in a file through each of its cameras, by the camera's name; see `render`.
+
+    Raises ValueError as `render` does, and where the stage holds no camera.
+    """
+    from echousd.stage import open_stage
+    from echousd.stage.layouts import showing_layout
+
+    stage = open_stage(path)
+    with showing_layout(stage, layout):
+        scenery = _scenery(stage, size, colors)
+        return {name: _image(trace(scenery, view, size, rays=rays)) for name, view in stage_views(stage).items()}
+
+
+def render_stage(
+    stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
+) -> Image.Image:
+    """A square picture of everything visible on a stage; `every-camera` and `sheet` are several of them.
+
+    Arguments:
+        stage: any stage; its up axis and units are taken care of.
+        view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner), or
+            `eye` (from a corner inside, at the height of a standing person's eyes), or `every-camera` (through every
+            camera of the stage, in the order of their paths), or `sheet` (perspective, eye, top; below from the other
+            corners).
+        size: pixels on each side, 16 to 4096.
+        colors: `materials`, or `class` for one flat colour per category.
+        rays: along each side of a pixel.
+
+    Raises:
+        ValueError: unknown view, colours or size, nothing to see, no camera for `every-camera`, or Embree missing.
+    """
+    if view not in VIEWS:
+        raise ValueError(f"view is {view!r}, allowed: {', '.join(VIEWS)}")
+    scenery = _scenery(stage, size, colors)
+    if view == EVERY:
+        cameras = stage_views(stage).values()
+        return _image(np.concatenate([trace(scenery, camera, size, rays=rays) for camera in cameras], axis=1))
+    if view != CONTACT:
+        return _image(_seen(scenery, view, size, rays))
+    corner, *others = (trace(shown, camera, size, rays=rays) for camera, shown in corner_views(scenery))
+    first = [corner, *(_seen(scenery, word, size, rays) for word in SHEET)]
+    return _image(np.concatenate([np.concatenate(row, axis=1) for row in (first, others)]))
+
+
+def render_turn(
+    path: str | Path,
+    *,
+    frames: int = 24,
+    size: int = 320,
+    colors: str = "materials",
+    rays: int = QUICK,
+    layout: int | str | None = None,
+) -> list[Image.Image]:
+    """Pictures of the room in a file from all around, the walls towards the camera left out; see `render`.
+
+    Raises ValueError as `render` does, and for a number of frames outside `FRAMES`.
+    """
+    from echousd.stage import open_stage
+    from echousd.stage.layouts import showing_layout
+
+    if not FRAMES[0] <= frames <= FRAMES[1]:
+        raise ValueError(f"frames is {frames}, allowed: {FRAMES[0]} to {FRAMES[1]}")
+    stage = open_stage(path)
+    with showing_layout(stage, layout):
+        scenery = _scenery(stage, size, colors)
+    return [
+        _image(trace(scenery.without_near_walls(view.matrix[:3, 3]), view, size, rays=rays))
+        for view in turning_views(scenery, frames)
+    ]
+
+
+def _seen(scenery: Scenery, view: str, size: int, rays: int) -> np.ndarray:
+    """(size, size, 3) what one of the views `top`, `perspective` and `eye` shows."""
+    if view == "perspective":
+        camera, scenery = next(corner_views(scenery))
+    else:
+        camera = {"top": top_view, "eye": eye_view}[view](scenery)
+    return trace(scenery, camera, size, rays=rays)
+
+
+def _scenery(stage: Usd.Stage, size: int, colors: str) -> Scenery:
+    """What there is to draw; raises ValueError for colours or a size that there is not."""
+    from echousd.stage.values import reading
+
+    if colors not in COLORS:
+        raise ValueError(f"colors is {colors!r}, allowed: {', '.join(COLORS)}")
+    if not 16 <= size <= LARGEST:
+        raise ValueError(f"size is {size} pixels, allowed: 16 to {LARGEST}")
+    with reading(stage):
+        return read_scenery(stage, by_class=colors == "class")
+
+
+def _image(pixels: np.ndarray) -> Image.Image:
+    from PIL import Image
+
+    return Image.fromarray((np.clip(pixels, 0, 1) * 255 + 0.5).astype(np.uint8))

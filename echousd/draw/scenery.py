@@ -1,0 +1,222 @@
+"""What a picture needs to know of a stage: world-space triangles with normals, colours and textures (Y-up, metres)."""
+
+from __future__ import annotations
+
+import colorsys
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pxr import Usd
+
+from echousd.draw.drawables import Drawable, Paint, paint_image, read_drawables
+from echousd.draw.sight import Furniture
+
+GOLDEN = 0.61803398875
+LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
+SHELL = ("floor", "wall", "ceiling", "door", "window")
+SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
+SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
+HUNG = ("picture", "mirror", "curtain", "blind", "wall_shelf", "wall_clock", "coats")  # goes with its wall
+
+
+@dataclass(frozen=True, eq=False)
+class Scenery:
+    """Triangles in the world, y up, metres.
+
+    Arguments:
+        triangles, normals: (f, 3, 3) float32 corners and their normals.
+        flat_colors, emissive: (f, 3) float32 linear RGB.
+        gloss: (f,) float32 in [0, 1].
+        st: (f, 3, 2) float32 texture coordinates.
+        texture: (f,) int, which of `images` colours the face, -1 for none.
+        images: (h, w, 3) float32 linear RGB each.
+        furniture: boxes of the objects. hung: of what hangs on walls.
+        wall: (f,) int, which wall a face belongs to, -1 for none.
+        panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
+        pane_wall: (p,) int, the walls of the panes.
+    """
+
+    triangles: np.ndarray
+    normals: np.ndarray
+    flat_colors: np.ndarray
+    emissive: np.ndarray
+    gloss: np.ndarray
+    st: np.ndarray
+    texture: np.ndarray
+    images: tuple[np.ndarray, ...]
+    furniture: Furniture
+    hung: Furniture
+    wall: np.ndarray
+    panes: np.ndarray
+    pane_wall: np.ndarray
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner, (3,) float each."""
+        corners = self.triangles.reshape(-1, 3).astype(float)
+        return corners.min(0), corners.max(0)
+
+    def without_near_walls(self, eye: np.ndarray) -> Scenery:
+        """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
+        lower, upper = self.bounds
+        middle = (lower + upper) / 2
+        keep, seen = np.ones(len(self.triangles), bool), np.ones(len(self.panes), bool)
+        for number in range(int(self.wall.max(initial=-1)) + 1):
+            faces = self.wall == number
+            corners = self.triangles[faces].reshape(-1, 3)
+            away = (corners.min(0) + corners.max(0)) / 2 - middle
+            if (away * (eye - middle))[[0, 2]].sum() > 0:
+                keep &= ~faces
+                seen &= self.pane_wall != number
+        if keep.all() or not keep.any():
+            return self
+        names = ("triangles", "normals", "flat_colors", "emissive", "gloss", "st", "texture", "wall")
+        fewer = {name: getattr(self, name)[keep] for name in names}
+        return replace(self, panes=self.panes[seen], pane_wall=self.pane_wall[seen], **fewer)
+
+    def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
+        """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
+        out = self.flat_colors[face]
+        texture = self.texture[face]
+        order = np.argsort(texture, kind="stable")
+        ends = np.searchsorted(texture[order], np.arange(len(self.images) + 1))
+        for image, start, end in zip(self.images, ends, ends[1:], strict=False):
+            if start < end:
+                here = order[start:end]
+                st = (self.st[face[here]] * bary[here, :, None]).sum(1)
+                height, width = image.shape[:2]
+                column = (st[:, 0] % 1.0 * width).astype(int) % width
+                row = ((1 - st[:, 1] % 1.0) * height).astype(int) % height
+                out[here] = image[row, column]
+        return out
+
+
+def class_color(category: str) -> tuple[float, float, float]:
+    """One linear colour per word, spread around the colour circle, the same in every run."""
+    from echomodel.vocabulary import vocabulary
+
+    if category in SHELL:
+        return (0.72, 0.71, 0.69)
+    names = [entry.name for entry in vocabulary().categories]
+    number = names.index(category) if category in names else sum(category.encode())
+    hue = (number * GOLDEN) % 1.0
+    red, green, blue = colorsys.hsv_to_rgb(hue, 0.55 + 0.2 * (number % 3) / 2, 0.9 - 0.25 * (number % 4) / 3)
+    return red**2.2, green**2.2, blue**2.2
+
+
+def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
+    """Collect every visible mesh of a stage.
+
+    Arguments:
+        stage: any stage; Z-up and other units are converted.
+        by_class: colour by the nearest `SemanticsLabelsAPI:category` instead of by material.
+
+    Raises ValueError when there is no mesh to see.
+    """
+    parts: list[dict[str, np.ndarray]] = []
+    images: dict[tuple, tuple[int, np.ndarray]] = {}
+    boxes, curtains = [], []
+    hung: list[int] = []
+    words: list[str] = []
+    walls: dict[str, int] = {}  # component -> number; doors and windows belong to their wall
+    panes: list[tuple[str, np.ndarray]] = []
+    for mesh in read_drawables(stage):
+        if mesh.category == "ceiling":  # pictures look in from above
+            continue
+        if mesh.category == "window" and not by_class and all(p.opacity < SEEN_THROUGH for p, _ in mesh.paints):
+            panes.append((mesh.component, _pane(mesh)))
+            continue  # light goes through
+        if mesh.category == "wall":
+            walls.setdefault(mesh.component, len(walls))
+        count = len(mesh.triangles)
+        turned = mesh.normals @ np.linalg.inv(mesh.world[:3, :3])  # inverse transpose, as rows
+        part = {
+            "triangles": (mesh.triangles @ mesh.world[:3, :3].T + mesh.world[:3, 3]).astype(np.float32),
+            "normals": (turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12)).astype(np.float32),
+            "st": np.zeros((count, 3, 2), np.float32) if mesh.st is None else mesh.st.astype(np.float32),
+            "flat_colors": np.zeros((count, 3), np.float32),
+            "emissive": np.zeros((count, 3), np.float32),
+            "gloss": np.zeros(count, np.float32),
+            "texture": np.full(count, -1),
+            "wall": np.full(count, walls.get(mesh.component, -1)),
+        }
+        plain = Paint(color=class_color(mesh.category), roughness=1.0)
+        for paint, faces in ((plain, np.arange(count)),) if by_class else mesh.paints:
+            part["flat_colors"][faces], part["emissive"][faces] = paint.color, paint.emissive
+            part["gloss"][faces] = min(1.0, 0.5 * (1 - paint.roughness) + 0.35 * paint.metallic)
+            part["texture"][faces] = -1
+            if paint.texture:
+                key = (paint.texture, paint.tint)
+                if key not in images:
+                    linear = LINEAR[paint_image(paint)]
+                    images[key] = (len(images), linear * np.array(paint.tint, np.float32))
+                part["texture"][faces] = images[key][0]
+        parts.append(part)
+        words.append(mesh.category)
+        if mesh.category not in (*SHELL, *HUNG, "rug"):
+            box = _box(mesh)
+            boxes += [box] if box[:3].max() > SMALL else []
+        if mesh.category in HUNG:
+            hung.append(len(parts) - 1)
+            curtains.append(_box(mesh))
+    _hang(parts, [*hung, *_on_shelves(parts, words)], len(walls))
+    if not parts:
+        raise ValueError(f"{stage.GetRootLayer().identifier}: nothing to draw, found no visible mesh")
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    furniture, at_walls = (
+        Furniture(found[:, :3], found[:, 3:6], found[:, 6])
+        for found in (np.array(each).reshape(-1, 7) for each in (boxes, curtains))
+    )
+    return Scenery(
+        images=tuple(image for _, image in images.values()),
+        furniture=furniture,
+        hung=at_walls,
+        panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
+        pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
+        **joined,
+    )
+
+
+def _pane(mesh: Drawable) -> np.ndarray:
+    """(3, 3) float: middle, half of the width and half of the height of an upright pane, metres."""
+    points = mesh.triangles.reshape(-1, 3) @ mesh.world[:3, :3].T + mesh.world[:3, 3]
+    low, high = points.min(0), points.max(0)
+    middle, flat = (low + high) / 2, points[:, [0, 2]] - (low + high)[[0, 2]] / 2
+    far = flat[int(np.argmax((flat**2).sum(1)))]
+    return np.array([middle, [far[0], 0.0, far[1]], [0.0, (high[1] - low[1]) / 2, 0.0]])
+
+
+def _on_shelves(parts: list[dict[str, np.ndarray]], words: list[str]) -> list[int]:
+    """Numbers of the parts that stand on shelves that hang on a wall."""
+    corners = [part["triangles"].reshape(-1, 3) for part in parts]
+    bounds = [(points.min(0), points.max(0)) for points in corners]
+    out = []
+    for low, high in (bounds[n] for n, word in enumerate(words) if word == "wall_shelf"):
+        for number, (least, most) in enumerate(bounds):
+            middle = (least + most) / 2
+            inside = (middle[[0, 2]] > low[[0, 2]]).all() and (middle[[0, 2]] < high[[0, 2]]).all()
+            if inside and abs(least[1] - high[1]) < 0.03:
+                out.append(number)
+    return out
+
+
+def _hang(parts: list[dict[str, np.ndarray]], hung: list[int], count: int) -> None:
+    """Give what hangs on a wall the number of the nearest one."""
+    bounds = []
+    for number in range(count):
+        corners = np.concatenate([p["triangles"][p["wall"] == number].reshape(-1, 3) for p in parts])
+        bounds.append((corners.min(0), corners.max(0)))
+    for index in hung if bounds else ():
+        middle = parts[index]["triangles"].reshape(-1, 3).mean(0)
+        apart = [np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0)) for low, high in bounds]
+        parts[index]["wall"][:] = int(np.argmin(apart))
+
+
+def _box(mesh: Drawable) -> np.ndarray:
+    """(7,) float: size and bottom centre in metres and yaw of the box around a mesh in its own frame."""
+    points = mesh.triangles.reshape(-1, 3)
+    low, high = points.min(0), points.max(0)
+    turn, shift = mesh.world[:3, :3], mesh.world[:3, 3]
+    bottom = turn @ [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2] + shift
+    size = (high - low) * np.linalg.norm(turn, axis=0)
+    return np.concatenate([size, bottom, [np.arctan2(turn[0, 2], turn[2, 2])]])

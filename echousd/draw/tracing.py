@@ -1,0 +1,222 @@
+"""Light in a picture: rays through Embree, soft sun, occluded sky, one bounce, and the noise smoothed away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from echousd.draw.scenery import Scenery
+from echousd.draw.viewpoints import View
+
+FINE, QUICK = 3, 2  # squared: rays per pixel
+SKY_RAYS = 3  # per ray: rays towards the sky
+
+
+class RenderUnavailable(ImportError, ValueError):
+    """Embree is not installed; the message says how to get it."""
+
+
+def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
+    """The picture as (size, size, 3) float sRGB in [0, 1].
+
+    Every pixel sends `rays`² rays; together they cover the sun's disc and the sky evenly, each pixel with another
+    shift (randomised quasi-Monte Carlo), so that little noise is left.
+
+    Arguments:
+        scenery: triangles and their colours.
+        view: the camera.
+        size: pixels on each side.
+        rays: along each side of a pixel.
+        seed: of the shifts; the same seed gives the same picture.
+    """
+    rng = np.random.default_rng(seed)
+    scene = _embree(scenery)
+    shift = rng.random((size, size, 4)).astype(np.float32)
+    layers = np.zeros((size, size, LAYERS), np.float32)
+    rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
+    for start in range(0, size, rows):
+        block = slice(start, min(size, start + rows))
+        for sample in range(rays**2):
+            layers[block] += _shade(scene, scenery, view, size, rays, block, sample, shift[block])
+    layers /= rays**2
+    light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
+    color = layers[..., ALBEDO] * light + layers[..., GLOW]
+    return _tone(color) ** (1 / 2.2)
+
+
+# What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
+ALBEDO, LIGHT, GLOW, NORMAL, POINT, LAYERS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), 15
+RINGS = (1, 2, 4)  # pixels between neighbours, pass by pass
+
+
+def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Mean of the light over neighbours on the same flat piece of surface (joint bilateral filter), (h, w, 3) each."""
+    height, width = light.shape[:2]
+    light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))
+    here = _along(normal, point)
+    for apart in RINGS:  # passes with ever wider holes reach far with few neighbours ("a trous")
+        edge = ((0, 0), (apart, apart), (apart, apart))
+        padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
+        total, weight = np.zeros_like(light), np.zeros((height, width), np.float32)
+        for down in (0, apart, 2 * apart):
+            for across in (0, apart, 2 * apart):
+                there = slice(None), slice(down, down + height), slice(across, across + width)
+                other_light, other_normal, other_point = (a[there] for a in padded)
+                turn = np.clip(_along(normal, other_normal), 0, 1)
+                step = np.abs(_along(normal, other_point) - here)
+                for _ in range(4):  # to the 16th power
+                    turn *= turn
+                share = turn * (step < 0.02)
+                total += share * other_light
+                weight += share
+        light = np.where(weight > 1e-6, total / np.maximum(weight, 1e-6), light)
+    return light.transpose(1, 2, 0)
+
+
+def _along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h, w) scalar products of vectors whose components are planes, (3, h, w) each."""
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
+
+
+SUN = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
+SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
+SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
+SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
+BACKGROUND = np.array([0.90, 0.905, 0.915], np.float32) ** 2.2
+OUTSIDE = (  # what is seen through a window: height in it from -1 to 1, linear colours
+    np.array([-1.0, -0.55, -0.3, 0.2, 1.0]),
+    np.array([(0.33, 0.42, 0.25), (0.47, 0.55, 0.40), (0.80, 0.84, 0.84), (0.74, 0.83, 0.92), (0.47, 0.65, 0.88)]),
+)
+R2 = np.array([0.7548776662, 0.5698402910], np.float32)
+
+
+def _embree(scenery: Scenery) -> Any:
+    try:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+    except ImportError as error:
+        raise RenderUnavailable(f'drawing needs Embree ({error}): pip install "echousd[render]"') from None
+    scene = rtcore_scene.EmbreeScene()
+    TriangleMesh(scene, np.ascontiguousarray(scenery.triangles, np.float32))
+    return scene
+
+
+def _shade(
+    scene: Any, scenery: Scenery, view: View, size: int, rays: int, rows: slice, sample: int, shift: np.ndarray
+) -> np.ndarray:
+    """(rows, size, LAYERS) what one ray for each pixel of some rows brings back."""
+    across, down = sample % rays, sample // rays
+    x = (np.arange(size, dtype=np.float32) + (across + 0.5) / rays) / size * 2 - 1
+    y = 1 - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
+    u, v = (g.ravel() * view.half for g in np.meshgrid(x, y))
+    axes, eye = view.matrix[:3, :3].astype(np.float32), view.matrix[:3, 3].astype(np.float32)
+    if view.orthographic:
+        origin = eye + u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1]
+        direction: np.ndarray = np.broadcast_to(-axes[:, 2], origin.shape)
+    else:
+        direction = u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1] - axes[:, 2]
+        direction = _unit(direction)
+        origin = np.broadcast_to(eye, direction.shape)
+    hit = scene.run(_f32(origin), _f32(direction), output=1)
+    seen = np.flatnonzero(hit["primID"] >= 0)
+    out = np.zeros((len(u), LAYERS), np.float32)
+    out[:, GLOW] = BACKGROUND
+    missed = np.flatnonzero(hit["primID"] < 0)
+    out[missed, GLOW] = outside(scenery.panes, origin[missed], direction[missed])
+    if not len(seen):
+        return out.reshape(-1, size, LAYERS)
+    face = hit["primID"][seen]
+    bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
+    point = origin[seen] + hit["tfar"][seen, None] * direction[seen]
+    normal = np.einsum("ncx,nc->nx", scenery.normals[face], bary)
+    normal = _unit(normal)
+    toward = -direction[seen]
+    normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
+    lifted = point + 2e-3 * normal
+    light, shine = _light(scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen])
+    glow = 0.5 * shine[:, None] + scenery.emissive[face]
+    out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
+    return out.reshape(-1, size, LAYERS)
+
+
+def outside(panes: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n, 3) colour that rays which meet nothing see: sky over fields through a window's pane, else the paper."""
+    out: np.ndarray = np.broadcast_to(BACKGROUND, direction.shape).copy()
+    for middle, side, rise in panes:
+        normal = np.cross(side, rise)
+        along = direction @ normal
+        reach = ((middle - origin) @ normal) / np.where(np.abs(along) < 1e-9, 1e-9, along)
+        point = origin + reach[:, None] * direction - middle
+        u, v = point @ side / (side @ side), point @ rise / (rise @ rise)
+        here = (reach > 0) & (np.abs(u) <= 1) & (np.abs(v) <= 1)
+        out[here] = np.stack([np.interp(v[here], OUTSIDE[0], tone) for tone in OUTSIDE[1].T], 1)
+    return out
+
+
+def _light(
+    scene: Any,
+    scenery: Scenery,
+    point: np.ndarray,
+    normal: np.ndarray,
+    toward: np.ndarray,
+    face: np.ndarray,
+    sample: int,
+    shift: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
+    count = len(point)
+    sun = SUN + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
+    sun = _unit(sun)
+    facing = np.clip(normal @ SUN, 0, None)
+    lit = np.zeros(count, np.float32)
+    ask = np.flatnonzero(facing > 0)
+    lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
+    direct = (facing * lit)[:, None] * SUN_LIGHT
+    sky = np.zeros((count, 3), np.float32)
+    for ray in range(SKY_RAYS):
+        away = normal + _on_sphere(_even(sample * SKY_RAYS + ray, shift[:, 2:]))  # cosine-weighted
+        away = _unit(away)
+        other = scene.run(_f32(point), _f32(away), output=1)
+        blocked = other["primID"] >= 0
+        # What a sky ray meets sends back a little of its own colour: one crude bounce.
+        bounce = 0.9 * scenery.flat_colors[np.clip(other["primID"], 0, None)]
+        near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
+        open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
+        sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
+    sky /= SKY_RAYS
+    half = _unit(toward + SUN)
+    gloss = scenery.gloss[face]
+    shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
+    return 0.55 * direct + 1.05 * sky, shine
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("nx,nx->n", a, b)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.sqrt(np.maximum(_dot(vectors, vectors), 1e-18))[:, None]
+
+
+def _even(number: int, shift: np.ndarray) -> np.ndarray:
+    """Point `number` of the R2 sequence, which fills the unit square evenly, moved by a shift per pixel."""
+    return (shift + R2 * (number + 1) % 1.0) % 1.0
+
+
+def _on_sphere(square: np.ndarray) -> np.ndarray:
+    """Points of the unit square, spread evenly over the unit sphere."""
+    height = 2 * square[:, 0] - 1
+    radius, angle = np.sqrt(np.clip(1 - height**2, 0, 1)), 2 * np.pi * square[:, 1]
+    return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], 1)
+
+
+def _tone(color: np.ndarray) -> np.ndarray:
+    """Roll bright values off towards 1 instead of clipping them."""
+    knee = 0.72
+    over = np.clip(color - knee, 0, None)
+    return np.where(color > knee, knee + (1 - knee) * over / (over + (1 - knee)), color)
+
+
+def _f32(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, np.float32)

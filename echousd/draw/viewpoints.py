@@ -1,0 +1,92 @@
+"""The viewpoints of a picture: a stage's own cameras, or one from above, from a corner or from inside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pxr import UsdGeom
+from scipy.spatial import ConvexHull
+
+from echousd.draw.scenery import Scenery
+from echousd.draw.views import APERTURE, FOCAL_LENGTH, framed, inside_view, perspective_views, turning_matrices
+from echousd.naming import free_name
+from echousd.stage.units import metres_per_unit, up_axis
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective)."""
+
+    matrix: np.ndarray
+    half: float
+    orthographic: bool
+
+
+def stage_views(stage: Usd.Stage) -> dict[str, View]:
+    """What every camera of a stage sees, by its name, in a y-up world in metres; ValueError where there is none."""
+    unit, turn = metres_per_unit(stage), np.eye(4)
+    if up_axis(stage) == "Z":
+        turn[1:3, 1:3] = ((0, 1), (-1, 0))
+    views: dict[str, View] = {}
+    for prim in stage.Traverse():
+        if not prim.IsA(UsdGeom.Camera):
+            continue
+        camera = UsdGeom.Camera(prim).GetCamera(0)
+        matrix = turn @ np.array(camera.transform).T
+        matrix[:3, 3] *= unit
+        matrix[:3, :3] /= np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+        flat = camera.projection == camera.Orthographic
+        wide = camera.horizontalAperture
+        half = wide / 2 * camera.APERTURE_UNIT * unit if flat else wide / 2 / max(camera.focalLength, 1e-6)
+        views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat)
+    if not views:
+        raise ValueError(
+            f"{stage.GetRootLayer().identifier}: no camera, which --cameras and the view every-camera need"
+        )
+    return views
+
+
+def top_view(scenery: Scenery) -> View:
+    """Straight down on the whole scene."""
+    lower, upper = scenery.bounds
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = (1, 0, 0), (0, 0, -1), (0, 1, 0)
+    centre = (lower + upper) / 2
+    matrix[:3, 3] = (centre[0], upper[1] + 1.0, centre[2])
+    return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)
+
+
+def eye_view(scenery: Scenery) -> View:
+    """From a corner inside the room, where least is hidden, at the height of a standing person's eyes."""
+    lower, upper = scenery.bounds
+    x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
+    floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
+    matrix, lens = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
+    return View(matrix, APERTURE / 2 / lens, False)
+
+
+def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:
+    """From above each corner, the view where least is hidden first, and what it shows: near walls are left out."""
+    for matrix in perspective_views(_outermost(scenery), scenery.furniture):
+        shown = scenery.without_near_walls(matrix[:3, 3])
+        if shown is not scenery:
+            matrix = framed(_outermost(shown), matrix[:3, 2])
+        yield View(matrix, APERTURE / 2 / FOCAL_LENGTH, False), shown
+
+
+def turning_views(scenery: Scenery, count: int) -> list[View]:
+    """`count` views around the whole scene, all from as far away, each as far on as the last from the one before."""
+    matrices = turning_matrices(_outermost(scenery), count)
+    return [View(matrix, APERTURE / 2 / FOCAL_LENGTH, False) for matrix in matrices]
+
+
+def _outermost(scenery: Scenery) -> np.ndarray:
+    """(n, 3) float corners of the scene; nothing else reaches the border of a picture of all of it."""
+    points = scenery.triangles.reshape(-1, 3).astype(float)
+    return np.asarray(points[ConvexHull(points, qhull_options="QJ").vertices])

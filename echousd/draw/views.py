@@ -1,0 +1,252 @@
+"""Where a camera stands to see a room: from a corner outside, or inside between the walls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from echomodel.openings import inward_normal
+from echomodel.triangles import cross
+from echousd.draw.sight import RAYS, Furniture
+
+APERTURE = 36.0  # mm, width of the picture in the camera
+FOCAL_LENGTH = 30.0  # mm: 62 degrees across
+LENSES = (24.0, 28.0, 35.0)  # mm, of a camera inside: 74 to 54 degrees across
+EYES = (0.5, 0.6)  # of the height of the walls: where a camera inside is
+SLOPES = (0.05, 0.15, 0.25, 0.36)  # metres that it looks down for a metre ahead
+PANS = (0.0, -0.15, 0.15, -0.35, 0.35)  # radians that it may turn aside from what it looks at
+WHOLE, CLEAR = 200.0, 30.0  # metres of depth that the whole main piece in the picture is worth, and nothing before it
+TRIED = 128  # views of all that are looked at closely
+LOW = 1.4  # metres: over what is so high one looks
+BARE, BAREST, DEEP = (
+    60.0,
+    0.28,
+    0.02,
+)  # bare walls: what all of a picture costs, from which share on, metres of rounding
+BEFORE, WALLED = 2.0, 0.9  # metres: what is nearer to the eye fills the picture, and which walls do
+FILLED = 60.0  # metres of depth that a picture full of what is near is worth
+SHOWN, FAR = 20.0, 5.0  # and a picture full of furniture; metres of depth from which on more is no gain
+TOUCHED = 0.86  # nearness of what the eye must not be at: a quarter of a metre
+STEPS = (0.3, 0.5, 0.8, 1.6, 2.6, 3.8)  # metres from a corner that a camera inside may stand
+APART = 3.0  # metres from the middle that it keeps where it stands further from its corner
+ALONG, OFF = (0.2, 0.35, 0.5, 0.65, 0.8), 0.25  # or along a wall, as shares of its length, and metres from it
+MARGIN = 1.06
+RISE = 0.62  # of a camera outside over the room's middle, for a metre that it is away
+FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than their sides is worth
+
+
+class Shot(NamedTuple):
+    """A camera inside: what it costs at first sight, camera to world (4, 4), mm, metres down for a metre ahead."""
+
+    cost: float
+    view: np.ndarray
+    lens: float
+    slope: float
+
+
+def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world, column vectors; the camera looks along its -Z with +Y up."""
+    back = eye - target
+    back = back / np.linalg.norm(back)
+    right = cross(np.array([0.0, 1.0, 0.0]), back)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, cross(back, right), back, eye
+    return matrix
+
+
+def perspective_view(points: np.ndarray, furniture: Furniture) -> np.ndarray:
+    """(4, 4) float camera to world: the first of `perspective_views`."""
+    return perspective_views(points, furniture)[0]
+
+
+def perspective_views(points: np.ndarray, furniture: Furniture) -> list[np.ndarray]:
+    """(4, 4) float camera to world of the views from the four corners, least hidden first, fronts preferred.
+
+    Arguments:
+        points: (n, 3) float, metres, what must be in the picture.
+        furniture: what shall be seen.
+    """
+    corners = np.array([(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)])
+    facing = corners @ (furniture.facing + np.array([1e-3, 2e-3]))
+    views = [framed(points, np.array([0.55 * x, RISE, 0.85 * z])) for x, z in corners]
+    hidden = [furniture.hidden(view[:3, 3]) for view in views]
+    return [views[corner] for corner in np.argsort(np.array(hidden) - FRONTS * facing, kind="stable")]
+
+
+def turning_matrices(points: np.ndarray, count: int) -> list[np.ndarray]:
+    """(4, 4) float camera to world of `count` views around the points (n, 3), metres, all from as far away."""
+    middle = (points.min(0) + points.max(0)) / 2
+    reach = float(np.linalg.norm((points - middle)[:, [0, 2]], axis=1).max())
+    turn = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+    x, z = middle[0] + reach * np.cos(turn), middle[2] + reach * np.sin(turn)
+    drum = np.concatenate([np.stack([x, np.full(48, y), z], 1) for y in (points[:, 1].min(), points[:, 1].max())])
+    nearest = framed(drum, np.array([1.0, RISE, 0.0]))
+    away, eye = float(nearest[0, 3] - middle[0]), float(nearest[1, 3])
+    target = np.array([middle[0], eye - away * RISE, middle[2]])
+    spots = [(away * np.cos(t), away * RISE, away * np.sin(t)) for t in 2 * np.pi * np.arange(count) / count]
+    return [view_matrix(target + np.array(spot), target) for spot in spots]
+
+
+def framed(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(4, 4) float camera to world: the nearest in a direction (3,) that has all points (n, 3) in its picture."""
+    direction = direction / np.linalg.norm(direction)
+    target = (points.min(0) + points.max(0)) / 2
+    half = APERTURE / 2 / FOCAL_LENGTH / MARGIN
+    for _ in range(4):  # the middle of the picture moves a little with the distance
+        axes = view_matrix(target + direction, target)[:3, :3]
+        local = (points - target) @ axes
+        distance = max(float((np.abs(local[:, :2]).max(1) / half + local[:, 2]).max()), 1.0)
+        seen = local[:, :2] / (distance - local[:, 2:])
+        target = target + axes[:, :2] @ (seen.max(0) + seen.min(0)) / 2 * distance
+    return view_matrix(target + direction * distance, target)
+
+
+def inside_view(
+    floor: np.ndarray,
+    furniture: Furniture,
+    height: float,
+    hung: Furniture | None = None,
+    openings: Furniture | None = None,
+    main: int | None = None,
+) -> tuple[np.ndarray, float]:
+    """Camera to world (4, 4) float and focal length in mm of a view inside a room with walls, its main piece whole.
+
+    Of all eyes, headings and lenses those count that have the main piece whole in the picture; of these the one that
+    hides and cuts off least, has most furniture and depth in its picture and no bare wall over a third of it.
+
+    Arguments:
+        floor: (k, 2) float, x and z of the corners, metres.
+        furniture: what shall be seen, its fronts rather than its backs.
+        height: of the walls, metres.
+        hung: what hangs or stands at the walls: none of it shall be right before the eye.
+        openings: doors and windows as boxes in the walls, which are then not bare.
+        main: row of the furniture that must be whole in the picture; None = the largest that one looks over.
+    """
+    floor = np.asarray(floor, float)
+    room = shapely.Polygon(floor)
+    middle = np.asarray(room.representative_point().coords[0])
+    things = [some for some in (furniture, hung) if some is not None and len(some.size)]
+    walls = _walls(floor, height)
+    near = [*((some, BEFORE) for some in things), (walls, WALLED)]
+    at_walls = [*things, *([openings] if openings is not None and len(openings.size) else [])]
+    main = _main(furniture) if main is None else main
+    aim = middle if main is None else furniture.position[main, [0, 2]]
+    around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
+    best, most = (_view(middle + 0.1, middle, EYES[0] * height, SLOPES[-1]), LENSES[0]), -np.inf
+    shots: list[Shot] = []
+    seen: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # eye -> points of the furniture, and which are hidden
+    for spot in _spots(floor, middle):
+        for level in EYES:
+            eye = np.array([spot[0], level * height, spot[1]])
+            if any(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things):
+                continue
+            points, blocked = seen[eye.tobytes()] = furniture.blocked(eye)
+            hidden = 0.0 if main is None else _hidden(room, points[main], blocked[main], eye)
+            corners = np.empty((0, 3)) if main is None else furniture.corners[main]
+            for way in (aim - spot, around - spot):
+                for pan, slope in product(PANS, SLOPES):
+                    turned = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ way
+                    view = _view(spot, spot + turned, eye[1], slope)
+                    off = _aside(corners, view)
+                    for number, lens in enumerate(LENSES):
+                        cut = float((off > APERTURE / 2 / lens / MARGIN).mean()) if len(off) else 0.0
+                        shots.append(Shot(WHOLE * cut + CLEAR * hidden + abs(pan) + 0.1 * number, view, lens, slope))
+    shots.sort(key=lambda shot: shot.cost)
+    for first, view, lens, _ in _varied(shots)[:TRIED]:
+        eye, half = view[:3, 3], APERTURE / 2 / lens
+        way = -view[[0, 2], 2]
+        merit = min(_depth(room, eye[[0, 2]], way), FAR) - first
+        merit -= FILLED * sum(some.filled(view, half, reach) for some, reach in near)
+        merit -= BARE * max(0.0, bare_share(floor, height, at_walls, view, half) - BAREST)
+        if len(furniture.size):
+            points, blocked = seen[eye.tobytes()]
+            unseen = blocked | (_aside(points, view) > half)
+            merit += float((eye[[0, 2]] - middle) @ furniture.facing - unseen.mean(1).sum())
+            merit += SHOWN * np.isfinite(furniture.away(view, half)).mean()
+        if merit > most:
+            best, most = (view, lens), merit
+    return best
+
+
+def _varied(shots: list[Shot]) -> list[Shot]:
+    """The shots in their order, of each eye the first for each slope."""
+    out: dict[tuple[bytes, float], Shot] = {}
+    for shot in shots:
+        out.setdefault((shot.view[:3, 3].tobytes(), shot.slope), shot)
+    return list(out.values())
+
+
+def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
+    """Share of a square picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
+
+    Arguments:
+        floor: (k, 2) float, metres; height: of the walls, metres. view, half: as `Furniture.away`.
+    """
+    wall = _walls(floor, height).away(view, half)
+    before = np.min([some.away(view, half) for some in things], axis=0) if things else np.inf
+    way = RAYS[:, 1] * half * view[1, 1] - view[1, 2]  # up, over the length of the ray
+    way = way / np.linalg.norm(RAYS * (half, half, 1.0), axis=1)
+    with np.errstate(divide="ignore"):
+        level = np.where(way < 0, -view[1, 3] / way, (height - view[1, 3]) / np.maximum(way, 1e-12))
+    return float((wall < np.minimum(before, level) - DEEP).mean())
+
+
+def _main(furniture: Furniture) -> int | None:
+    """The largest piece that one looks over, of all where there is none; None where there is nothing."""
+    if not len(furniture.size):
+        return None
+    low = furniture.size[:, 1] + furniture.position[:, 1] < LOW
+    area = furniture.size[:, [0, 2]].prod(1) * np.where(low | ~low.any(), 1.0, 0.0)
+    return int(area.argmax())
+
+
+def _hidden(room: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye: np.ndarray) -> float:
+    """Share of the points (p, 3) of a piece that furniture (`blocked`) or a corner of the room hides from an eye."""
+    lines = shapely.linestrings([[eye[[0, 2]], point] for point in points[:, [0, 2]]])
+    return float((blocked | ~shapely.covers(room.buffer(0.05), lines)).mean())
+
+
+def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """(...) float: how far points (..., 3) are from the middle of a picture, at distance 1; inf behind the camera."""
+    x, y, z = np.moveaxis((points - view[:3, 3]) @ view[:3, :3], -1, 0)
+    return np.asarray(np.where(z < 0, np.maximum(np.abs(x), np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
+
+
+def _walls(floor: np.ndarray, height: float) -> Furniture:
+    """The walls as thin boxes that stand outside of a floor (k, 2)."""
+    way = np.roll(floor, -1, 0) - floor
+    outwards = -np.array([inward_normal(floor, edge) for edge in range(len(floor))])
+    middle = floor + way / 2 + 0.05 * outwards
+    size = np.stack([np.linalg.norm(way, axis=1), np.full(len(floor), height), np.full(len(floor), 0.1)], 1)
+    return Furniture(size, np.insert(middle, 1, 0.0, axis=1), np.arctan2(outwards[:, 0], outwards[:, 1]))
+
+
+def _spots(floor: np.ndarray, middle: np.ndarray) -> list[np.ndarray]:
+    """Where a camera inside may stand, (2,) x and z each, metres: in the corners, then along the walls."""
+    spots = []
+    for corner in floor:
+        away = max(float(np.linalg.norm(middle - corner)), 1e-9)
+        spots += [corner + step / away * (middle - corner) for step in STEPS if step < max(away - APART, 0.9)]
+    for edge in range(len(floor)):
+        start, end = floor[edge], floor[(edge + 1) % len(floor)]
+        spots += [start + share * (end - start) + OFF * inward_normal(floor, edge) for share in ALONG]
+    return spots
+
+
+def _view(spot: np.ndarray, aim: np.ndarray, level: float, slope: float) -> np.ndarray:
+    """(4, 4) float camera to world over `spot` at a level towards `aim`, `slope` metres down for a metre ahead."""
+    away = float(np.linalg.norm(aim - spot))
+    return view_matrix(np.array([spot[0], level, spot[1]]), np.array([aim[0], level - slope * away, aim[1]]))
+
+
+def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:
+    """Metres that one sees from a spot in the mean of a wide picture, up to the walls."""
+    turn = np.arctan2(way[1], way[0]) + np.linspace(-0.7, 0.7, 15)
+    ends = spot + 50.0 * np.stack([np.cos(turn), np.sin(turn)], 1)
+    lines = shapely.linestrings([[spot, end] for end in ends])
+    return float(shapely.distance(shapely.Point(spot), shapely.intersection(lines, room.boundary)).mean())

@@ -1,0 +1,118 @@
+"""What lies and stands on the floor: rugs under groups, shoes by the door, a basket."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from echomodel.dressing import usual_size
+from echomodel.openings import hinge_point, inward_normal
+from echousd.dressing.setting import Setting, Standing, Thing, rectangle
+
+PILE = 0.008  # metres; furniture stands on the floor below, through the rug
+FROM_WALL = 0.12
+LARGEST = (4.0, 3.0)
+AROUND = 1.2  # metres from a table: a seat that belongs to it
+SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
+SHRUNK = sorted(((x, z) for x in SHARES for z in SHARES), key=lambda share: -share[0] * share[1])
+
+
+def rugs(setting: Setting) -> None:
+    """One rug below every sofa group, bed and dining table that has room for it; else below the table that armchairs
+    stand around, below an armchair or a desk."""
+    done: list[shapely.Polygon] = []
+    hosts = setting.inviting("rug")
+    seats = [o for o in hosts if o.row.role == "seat"]
+    desks = [o for o in hosts if o.row.role == "board" and o.row.access]
+    near = {o.name: sum(o.footprint.distance(s.footprint) < AROUND for s in seats) for o in setting.stands("before")}
+    shared = [o for o in setting.stands("before") if near[o.name] > 1]
+    groups = [o for o in hosts if o not in seats and o not in desks] or shared or seats or desks
+    for host in sorted(groups, key=lambda o: -float(o.size[0] * o.size[2])):
+        rng = setting.rng(host.name, "rug")
+        variant = int(rng.integers(1 << 30))
+        group, centre, size = _under(setting, host)
+        if np.prod(size) < 1.2:
+            continue
+        for share in SHRUNK:
+            extents = np.round(np.minimum(np.array(size) * share, LARGEST), 2)
+            spot = host.on_floor(*centre)
+            plan = rectangle(spot[[0, 2]], extents, host.yaw)
+            if _lies(setting, plan, group) and not any(plan.intersects(other) for other in done):
+                done.append(plan.buffer(0.1))
+                whole = np.array([extents[0], PILE, extents[1]])
+                setting.placed.append(Thing("rug", whole, spot, host.yaw, host.name, variant))
+                break
+
+
+def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, float], tuple[float, float]]:
+    """Who stands on the rug of a group, the rug's middle in the host's frame and its wished extents."""
+    w, _, d = (float(v) for v in host.size)
+    if host.row.role == "bed":
+        wide, long = w + 1.3, min(d * 0.75 + 0.5, 2.4)
+        near = {o.name for o in (*setting.of("seat"), *setting.stands("head"))}
+        return {host.name, *near}, (0.0, d / 2 + 0.45 - long / 2), (wide, long)
+    if host.row.role == "seat":
+        wide, long = w + 0.9, d + 0.8
+        near = {o.name for o in (*setting.of("seat", "light", "decor"), *setting.stands("before", "beside"))}
+        return {host.name, *near}, (0.0, 0.25), (wide, long)
+    if host.row.role == "sofa":
+        front = d / 2
+        tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
+        reach = 1.7
+        for table in tables[:1]:
+            cos, sin = np.cos(host.yaw), np.sin(host.yaw)
+            away = table.position - host.position
+            reach = float(np.clip(sin * away[0] + cos * away[2] - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
+        around = {o.name for o in (*setting.of("seat", "sofa", "light", "decor"), *setting.stands("before", "beside"))}
+        long = reach + 0.3
+        return {host.name, *around}, (0.0, front - 0.3 + long / 2), (w + 0.5, long)
+    seats = {o.name for o in setting.of("seat")}
+    return {host.name, *seats}, (0.0, 0.0), (w + 1.2, d + 1.2)
+
+
+def _lies(setting: Setting, plan: shapely.Polygon, group: set[str]) -> bool:
+    """Inside the room, away from doors, and below nobody but its group."""
+    if not setting.room.buffer(-FROM_WALL).contains(plan):
+        return False
+    if any(way.intersects(plan) for way, _ in setting.ways):
+        return False
+    return not any(
+        other.footprint.intersects(plan)
+        for other in setting.objects.values()
+        if other.name not in group and other.position[1] < 0.05
+    )
+
+
+def by_doors(setting: Setting) -> None:
+    """A pair of shoes beside a door, toes to the wall."""
+    for _, door in setting.ways:
+        if door.kind != "door" or not setting.walls:
+            continue
+        rng = setting.rng(door.name, "shoes")
+        size = usual_size("shoes", rng)
+        hinge, closed = hinge_point(setting.floor, door)
+        inside = inward_normal(setting.floor, door.edge)
+        yaw = float(np.arctan2(-inside[0], -inside[1])) + float(rng.uniform(-0.15, 0.15))
+        along = (door.width + 0.3, door.width + 0.45, door.width + 0.65, -0.3, -0.5)
+        middles = [hinge + closed * share + inside * (size[2] / 2 + 0.05) for share in along]
+        pairs = (
+            Thing("shoes", size, np.array([x, 0.0, z]), yaw, variant=int(rng.integers(1 << 30))) for x, z in middles
+        )
+        if setting.put_first(pairs, margin=0.03):
+            return
+
+
+def baskets(setting: Setting) -> None:
+    """A basket beside a sofa, a bed or a shelf, in full rooms."""
+    if not setting.full:
+        return
+    for host in setting.inviting("basket"):
+        rng = setting.rng(host.name, "basket")
+        size = usual_size("basket", rng)
+        variant = int(rng.integers(1 << 30))
+        x = host.size[0] / 2 + size[0] / 2 + 0.06
+        back, front = -host.size[2] / 2 + size[2] / 2 + 0.05, host.size[2] / 2 - size[2] / 2
+        spots = [(side * x, z) for side in (1, -1) for z in (back, 0.0, front)]
+        wanted = (Thing("basket", size, host.on_floor(*spot), host.yaw, "", variant) for spot in spots)
+        if setting.put_first(wanted, margin=0.03):
+            return

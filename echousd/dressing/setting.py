@@ -1,0 +1,222 @@
+"""What the dressing of a room looks at, and what it decides: things in their places; no pxr here."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from echomodel.dressing import KINDS
+from echomodel.openings import Opening, free_area
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import Category, vocabulary
+from echousd.shapes.geometry import Geometry
+
+SKIN = 1e-4  # metres that count as nothing
+APART = 0.008  # metres of air between a small thing and everything else
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """One small thing in its place.
+
+    Arguments:
+        kind: a word of `echomodel.dressing.KINDS`.
+        size: (3,) float extents, metres. position: (3,) centre of its bottom, room frame. yaw: radians about +Y.
+        on: the object that it belongs to, "" for floor and walls.
+        variant: seed of its program; things of one kind, size and variant share an asset.
+        count: how many things a person would count.
+    """
+
+    kind: str
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
+    on: str = ""
+    variant: int = 0
+    count: int = 1
+
+    @cached_property
+    def footprint(self) -> shapely.Polygon:
+        """Its box in plan."""
+        return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """One object of the graph in its place."""
+
+    name: str
+    row: Category
+    size: np.ndarray
+    position: np.ndarray
+    yaw: float
+    geometry: Geometry
+
+    @cached_property
+    def footprint(self) -> shapely.Polygon:
+        """Its box in plan."""
+        return rectangle(self.position[[0, 2]], self.size[[0, 2]], self.yaw)
+
+    @cached_property
+    def pieces(self) -> list[np.ndarray]:
+        """(n, 3, 3) triangles of its mesh and of each collider, in the room, metres."""
+        meshes = [self.geometry.mesh, *(collider.mesh for collider in self.geometry.colliders)]
+        return [self.to_room(mesh.vertices)[mesh.faces] for mesh in meshes]
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """(p, 2, 3) lower and upper corner of each of its pieces, metres."""
+        return np.array([(piece.min((0, 1)), piece.max((0, 1))) for piece in self.pieces])
+
+    @property
+    def top(self) -> float:
+        """Height of its highest point, metres."""
+        return float(self.position[1] + self.size[1])
+
+    def to_room(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) points of the object's frame in the room's."""
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        x, y, z = np.asarray(points, float).T
+        return np.stack([cos * x + sin * z, y, cos * z - sin * x], 1) + self.position
+
+    def on_floor(self, x: float, z: float) -> np.ndarray:
+        """(3,) the point of the room's floor below or above a point (x, z) of the object's frame."""
+        spot = self.to_room(np.array([[x, 0.0, z]]))[0]
+        spot[1] = 0.0
+        return spot
+
+
+@dataclass(eq=False)
+class Setting:
+    """The room as the rules see it, and the things placed so far.
+
+    Arguments:
+        objects: what the graph put there.
+        floor: (k, 2) float corners, metres. openings: in its edges.
+        height: of the room, metres. walls: whether there are any to hang things on.
+        full: place as much as looks good, not only a little.
+        seed: of all choices.
+        placed: the things so far. carriers: those of them that others stand on.
+        curtained: names of the windows that have curtains.
+    """
+
+    objects: Mapping[str, Standing]
+    floor: np.ndarray
+    openings: tuple[Opening, ...]
+    height: float
+    walls: bool
+    full: bool
+    seed: int
+    placed: list[Thing] = field(default_factory=list)
+    carriers: dict[str, Standing] = field(default_factory=dict)
+    curtained: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.room = shapely.Polygon(self.floor)
+        self.ways = [(shapely.Polygon(free_area(self.floor, o)), o) for o in self.openings if o.kind != "window"]
+
+    def rng(self, *words: str) -> np.random.Generator:
+        """Numbers of its own for everything that is decided, so that one thing less changes no other."""
+        key = "/".join((str(self.seed), "dressing", *words)).encode()
+        return np.random.default_rng(int.from_bytes(hashlib.blake2b(key, digest_size=8).digest(), "big"))
+
+    def of(self, *roles: str) -> list[Standing]:
+        """The objects of some roles, in the order of the graph."""
+        return [o for o in self.objects.values() if o.row.role in roles]
+
+    def inviting(self, *words: str) -> list[Standing]:
+        """The objects that some small things go with (`echomodel.rows.INVITES`), in the order of the graph."""
+        return [o for o in self.objects.values() if any(word in o.row.invites for word in words)]
+
+    @property
+    def plants(self) -> int:
+        """How many plants the graph has."""
+        return sum(o.row.look == "plant" for o in self.objects.values())
+
+    def stands(self, *stances: str) -> list[Standing]:
+        """The objects that stand so to what they attend, in the order of the graph."""
+        return [o for o in self.objects.values() if o.row.stands in stances]
+
+    def clear(self, thing: Thing, *, host: str = "", margin: float = APART, floor: bool = True) -> bool:
+        """Whether a thing stands in the room, in nobody's way, and meets neither an object but its host nor a thing."""
+        plan = thing.footprint
+        if floor and not self.room.buffer(0.005).contains(plan):
+            return False
+        low, high = float(thing.position[1]), float(thing.position[1] + thing.size[1])
+        around = plan.buffer(margin)
+        if any(way.intersects(around) for way, o in self.ways if low < o.height):
+            return False
+        for other in self.objects.values():
+            if other.name == host or other.top < low + 1e-4 or other.position[1] > high + margin:
+                continue
+            if other.footprint.intersects(around) and meets(other, low, high, around):
+                return False
+        return not any(
+            other.footprint.intersects(around)
+            for other in self.placed
+            if KINDS[other.kind].name != "rug"
+            and other.position[1] < high
+            and other.position[1] + other.size[1] > low + 1e-4
+        )
+
+    def put_first(
+        self, things: Iterable[Thing], *, host: str = "", margin: float = APART, floor: bool = True
+    ) -> Thing | None:
+        """Place the first of some things that is clear, and give it back; None where none is.
+
+        Arguments:
+            things: taken one by one, those after the first clear one not at all.
+            others: as `clear`.
+        """
+        found = next((one for one in things if self.clear(one, host=host, margin=margin, floor=floor)), None)
+        if found is not None:
+            self.placed.append(found)
+        return found
+
+
+def standing(
+    name: str, category: str, size: np.ndarray, position: np.ndarray, yaw: float, geometry: Geometry
+) -> Standing:
+    """An object with its row of the vocabulary."""
+    row = vocabulary().category(category)
+    return Standing(name, row, np.asarray(size, float), np.asarray(position, float), float(yaw), geometry)
+
+
+def rectangle(centre: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
+    """A rectangle in plan (x, z), `size` along its own x and z, turned by `yaw` about +Y."""
+    (wide, deep), (x, z) = size, centre
+    plan = footprints(np.array([[wide, 0.0, deep]]), np.array([[x, 0.0, z]]), np.array([yaw]))
+    return shapely.Polygon(plan[0])
+
+
+def meets(thing: Standing, low: float, high: float, plan: shapely.Geometry) -> bool:
+    """Whether what an object covers in plan between two heights, the hull of its mesh there and its colliders, meets a
+    shape; a foot that stands at the lower height reaches over it.
+    """
+    least, most = np.array(plan.bounds).reshape(2, 2)
+    near = (thing.spans[:, 0, [0, 2]] <= most).all(1) & (thing.spans[:, 1, [0, 2]] >= least).all(1)
+    near &= (thing.spans[:, 0, 1] < high) & (thing.spans[:, 1, 1] > low)
+    return any(_section(thing.pieces[n], low + SKIN, high - SKIN).intersects(plan) for n in np.flatnonzero(near))
+
+
+def _section(corners: np.ndarray, low: float, high: float) -> shapely.Geometry:
+    """The hull in plan of triangles (n, 3, 3) between two heights."""
+    y = corners[..., 1]
+    corners = corners[(y.max(1) > low) & (y.min(1) < high)]
+    points = corners.reshape(-1, 3)
+    found = [points[(points[:, 1] > low) & (points[:, 1] < high)]]
+    start, end = corners.reshape(-1, 3), np.roll(corners, -1, axis=1).reshape(-1, 3)
+    for level in (low, high):  # where the sides of long triangles pass through
+        over = (start[:, 1] - level) * (end[:, 1] - level) < 0
+        share = (level - start[over, 1]) / (end[over, 1] - start[over, 1])
+        found.append(start[over] + share[:, None] * (end[over] - start[over]))
+    inside = np.concatenate(found)[:, [0, 2]]
+    if not len(inside):
+        return shapely.Polygon()
+    # a line has the hull of its points and is one object rather than thousands
+    return shapely.convex_hull(shapely.linestrings(np.concatenate([inside, inside[:1]])))

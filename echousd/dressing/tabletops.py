@@ -1,0 +1,212 @@
+"""What lies and stands on furniture: books, vessels, plants, what is used at desks and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from echomodel.dressing import KINDS, usual_size
+from echomodel.dressing.books import BOUND, books_in, bound
+from echousd.dressing.setting import Setting, Standing, Thing
+from echousd.dressing.surfaces import Surface, surfaces
+
+Places = Sequence[tuple[float, float]]
+ENDS: Places = ((-0.85, 0.0), (0.85, 0.0), (-0.6, 0.0), (0.6, 0.0), (0.0, 0.0))
+OTHER: Places = tuple((-x, z) for x, z in ENDS)
+BACK: Places = ((-0.8, -0.6), (0.8, -0.6), (-0.4, -0.6), (0.4, -0.6), (0.0, -0.6))
+FRONT: Places = ((0.5, 0.6), (-0.5, 0.6), (0.0, 0.7), (0.7, 0.2), (-0.7, 0.2), (0.0, 0.0))
+MIDDLE: Places = ((0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.6, 0.3), (-0.6, -0.3))
+CORNERS: Places = ((0.9, -0.8), (-0.9, -0.8), (0.9, 0.8), (-0.9, 0.8), (0.0, -0.8))
+BETWEEN = 0.002  # metres from book to book
+EYE = 1.7  # metres: what is put higher cannot be seen
+
+# What is put on a top, by what a row calls `top`: kinds of which one is taken, places, and whether only in full rooms.
+SHELVED = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
+TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
+    "nightstand": (
+        (("book_stack", "cup", "small_plant"), FRONT, False),
+        (("clock", "candles", "photo"), BACK, False),
+        (("glass",), FRONT, True),
+        (("photo", "small_plant", "vase"), BACK, True),
+        (("notebook",), FRONT, True),
+    ),
+    "coffee_table": (
+        (("bowl", "flowers", "tray", "small_plant"), ((-0.35, 0.0), *MIDDLE), False),
+        (("book_stack", "magazine"), ((0.6, 0.2), *ENDS), False),
+        (("remote",), ((0.2, 0.8), *FRONT), False),
+        (("candles",), OTHER, True),
+        (("cup",), ((-0.2, 0.8), *FRONT), True),
+        (("cup",), ((0.5, -0.8), *BACK), True),
+        (("magazine",), CORNERS, True),
+    ),
+    "side_table": (
+        (("flowers", "small_plant", "vase", "book_stack"), ((-0.2, -0.2), *MIDDLE), False),
+        (("cup", "candles"), FRONT, False),
+        (("book_stack", "photo"), CORNERS, True),
+        (("glass",), FRONT, True),
+    ),
+    "desk": (
+        (("laptop",), ((0.0, 0.0), (0.0, 0.2), (-0.3, 0.0), (0.3, 0.0)), False),
+        (("cup",), ((0.62, 0.2), (-0.62, 0.2), (0.8, 0.6)), False),
+        (("pens",), CORNERS, False),
+        (("notebook",), ((-0.62, 0.5), (0.62, 0.5), *FRONT), False),
+        (("small_plant",), ((-0.95, -0.9), *CORNERS), True),
+        (("book_stack",), ((0.95, -0.6), *CORNERS), True),
+        (("photo",), BACK, True),
+    ),
+    "dressing_table": (
+        (("vase", "flowers"), CORNERS, False),
+        (("candles", "tray"), BACK, False),
+        (("photo",), CORNERS, True),
+        (("cup", "clock"), FRONT, True),
+    ),
+    "worktop": (
+        (("bowl", "small_plant"), ENDS, False),
+        (("cup", "book_stack"), BACK, False),
+        (("glass", "cup"), CORNERS, True),
+    ),
+    "washbasin": ((("small_plant", "glass"), ((-0.85, -0.6), (0.85, -0.6)), False), (("candles",), CORNERS, True)),
+    "dining_table": ((("flowers", "bowl", "candles"), MIDDLE, False), (("candles",), ENDS, True)),
+    "sideboard": (
+        (("flowers", "vase"), ENDS, False),
+        (("book_stack", "bowl", "candles"), OTHER, False),
+        (("photo",), ((0.45, -0.4), (-0.45, -0.4), *BACK), False),
+        (("small_plant",), ((-0.35, 0.0), *MIDDLE), True),
+        (("candles", "clock"), MIDDLE, True),
+        (("tray", "bowl"), MIDDLE, True),
+        (("photo",), BACK, True),
+    ),
+    "tv_stand": (
+        (("small_plant", "vase"), ENDS, False),
+        (("book_stack", "candles"), OTHER, False),
+        (("remote",), FRONT, True),
+        (("photo",), ENDS, True),
+    ),
+}
+SHELVED = ("book_stack", "vase", "small_plant", "bowl", "photo", "candles", "basket", "clock")
+
+
+def tabletops(setting: Setting) -> None:
+    """Things on everything that carries."""
+    for host in setting.of("board", "storage"):
+        levels = surfaces(host)
+        if not levels:
+            continue
+        name = host.row.top
+        if name == "dining_table" and setting.full:
+            _laid(setting, host, levels[0])
+        footprint = float(host.size[0] * host.size[2])
+        tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
+        if name in TOPS and tops:
+            _top(setting, host, tops[0], name)
+        if host.row.role == "storage" and host.row.look in SHELVED:
+            for surface in levels:
+                if surface is not (tops[0] if tops and name in TOPS else None):
+                    _shelf(setting, host, surface)
+
+
+def _top(setting: Setting, host: Standing, surface: Surface, name: str) -> None:
+    rng = setting.rng(host.name, "top")
+    taken: set[str] = set()
+    if name == "tv_stand" and not setting.of("screen"):
+        _television(setting, host, surface)
+    for number, (kinds, places, only_full) in enumerate(TOPS[name]):
+        order = [str(k) for k in rng.permutation(kinds)]
+        turn = float(rng.uniform(-0.12, 0.12))
+        if only_full and not setting.full:
+            continue
+        for kind in [k for k in order if k not in taken] or order:
+            straight = kind in ("laptop", "tray") or surface.area.area < 0.1
+            if surface.put(setting, kind, places, turn=0.0 if straight else turn, word=str(number)):
+                taken.add(kind)
+                break
+
+
+def _television(setting: Setting, host: Standing, surface: Surface) -> None:
+    """A television in the middle of its stand, as wide as looks good on it."""
+    for share in (0.6, 0.5, 0.4):
+        wide = round(min(share * float(host.size[0]), KINDS["television"].high[0]), 2)
+        size = np.array([wide, round(0.56 * wide + 0.045, 3), 0.2])
+        if surface.put(setting, "television", ((0.0, -0.3), (0.0, 0.0), (0.2, 0.0), (-0.2, 0.0)), size=size, variant=0):
+            return
+
+
+def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
+    """A plate and a glass before every seat at a table."""
+    rng = setting.rng(host.name, "laid")
+    plate, glass = usual_size("plate", rng), usual_size("glass", rng)
+    x0, z0, x1, z1 = surface.bounds
+    middle, half = np.array([x0 + x1, z0 + z1]) / 2, np.array([x1 - x0, z1 - z0]) / 2
+    for seat in setting.of("seat"):
+        away = seat.position - host.position
+        cos, sin = np.cos(host.yaw), np.sin(host.yaw)
+        local = np.array([cos * away[0] - sin * away[2], sin * away[0] + cos * away[2]]) - middle
+        beyond = np.abs(local) - half
+        if np.max(beyond) > 0.6 or np.min(beyond) > 0:
+            continue
+        side = int(np.argmax(beyond))
+        share, edge = local / half, np.zeros(2)
+        edge[side] = np.sign(local[side])
+        share[side] = 0.97 * edge[side]
+        along = share[1 - side]
+        turn = float(np.arctan2(-edge[0], -edge[1]))
+        room = half[1 - side] - plate[0] / 2
+        spot = share.copy()
+        spot[1 - side] = np.clip(along * half[1 - side] / max(room, 1e-6), -0.98, 0.98)
+        if surface.put(setting, "plate", [(spot[0], spot[1])], size=plate, turn=turn, variant=1, word=seat.name):
+            beside = spot.copy()
+            beside[1 - side] += 0.2 / max(room, 1e-6) * (1 if edge[side] * (1 if side == 1 else -1) > 0 else -1)
+            beside[side] *= 0.72
+            surface.put(setting, "glass", [(beside[0], beside[1])], size=glass, variant=1, word=seat.name)
+
+
+def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
+    """A row of books against one side of a shelf, and something beside it."""
+    if not 0.1 < host.position[1] + surface.y < EYE or surface.area.area < 0.03 or surface.closed:
+        return
+    rng = setting.rng(host.name, "shelf", f"{surface.y:.2f}")
+    x0, z0, x1, z1 = surface.bounds
+    wide, deep = x1 - x0, z1 - z0
+    side = 1.0 if rng.random() < 0.5 else -1.0
+    if rng.random() < (0.95 if setting.full else 0.75):
+        length = wide * rng.uniform(0.35, 0.65)
+        for share in (1.0, 0.6, 0.35):
+            if length * share < 0.1:
+                break
+            tall = min(surface.air - 0.015, rng.uniform(0.2, 0.27))
+            size = np.round([length * share, tall, min(deep - 0.03, rng.uniform(0.15, 0.2))], 3)
+            if tall < 0.14 or size[2] < 0.1:
+                break
+            at = [(x, 0.9) for x in (-0.99 * side, 0.99 * side, -0.5 * side, 0.5 * side, 0.0)]
+            row = surface.put(setting, "book_row", at, size=size, count=books_in(float(size[0])), word="row")
+            if row:
+                if setting.full:
+                    shelved_books(setting, row, rng)
+                break
+    wanted = [str(kind) for kind in rng.permutation(SHELVED)]
+    for number in range(2 if setting.full else 1):
+        if rng.random() < 0.75:
+            places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
+            for kind in wanted[number * 4 : number * 4 + 4]:
+                if surface.put(setting, kind, places, word=str(number)):
+                    break
+
+
+def shelved_books(setting: Setting, row: Thing, rng: np.random.Generator) -> None:
+    """Put single books in the place of a row that stands already, each a thing of its own."""
+    setting.placed.remove(row)
+    wide, tall, deep = (float(v) for v in row.size)
+    at, front = -wide / 2, deep / 2
+    cos, sin = np.cos(row.yaw), np.sin(row.yaw)
+    fitting = [n for n in range(BOUND) if bound(n)[1] <= tall and bound(n)[2] <= deep]
+    while fitting:
+        number = int(rng.choice(fitting))
+        size = bound(number)
+        if at + size[0] > wide / 2:
+            return
+        x, z = at + size[0] / 2, front - size[2] / 2
+        place = row.position + np.array([cos * x + sin * z, 0.0, cos * z - sin * x])
+        setting.placed.append(Thing("book", size, place, row.yaw, row.on, number))
+        at += size[0] + BETWEEN
+    setting.placed.append(row)

@@ -1,0 +1,225 @@
+"""Cushions on sofas, armchairs and beds, throws over the foot of beds."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from echomodel.dressing import usual_size
+from echomodel.triangles import area_normals
+from echousd.dressing.setting import Setting, Standing, Thing
+from echousd.shapes.nofit import forbidden_moves
+
+ASIDE = 0.15  # metres that a cushion moves at most so that it stands in nothing
+PILLOW = 3.2  # exponent of the outline of a cushion
+STEP = 0.02  # metres from place to place
+WIDE_BED = 1.3  # metres
+LEVEL = 0.005  # metres: what is as high as that is one height
+
+
+def cushions(setting: Setting) -> None:
+    """Cushions in the corners of sofas, one on an armchair."""
+    for host in setting.inviting("cushions"):
+        rng = setting.rng(host.name, "cushion")
+        size = usual_size("cushion", rng)
+        wide = float(host.size[0])
+        ends = [-1.0, 1.0] if wide > 1.3 else [float(rng.choice([-0.6, 0.6]))]
+        if setting.full and wide > 1.7:
+            ends.append(-0.62)
+        variant = int(rng.integers(3))
+        seat = _Seat.of(host)
+        if seat is None:
+            continue
+        for end in ends:
+            spot = seat.resting(end, size)
+            if spot is None:
+                continue
+            turn = -0.12 * end * float(rng.uniform(0.3, 1.6))
+            spot = _clear_of(host, spot, turn, size)
+            if spot is None:
+                continue
+            place, yaw = host.to_room(spot[None])[0], host.yaw + turn
+            thing = Thing("cushion", size, place, yaw, host.name, variant)
+            setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+
+
+def bed_cushions(setting: Setting) -> None:
+    """Two cushions before the pillows of a wide bed; in full rooms one on a narrow bed, too."""
+    for host in setting.of("bed"):
+        rng = setting.rng(host.name, "bed cushion")
+        size, variant, seat = usual_size("cushion", rng), int(rng.integers(3)), _Seat.of(host)
+        wide = float(host.size[0])
+        if seat is None or not (setting.full or wide > WIDE_BED):
+            continue
+        for side in (-1.0, 1.0) if wide > WIDE_BED else (0.0,):
+            turn = float(rng.uniform(-0.12, 0.12))
+            spot = seat.before_pillows(side * 0.21 * wide, size)
+            spot = None if spot is None else _lying(host, seat, spot, turn, size)
+            if spot is not None:
+                thing = Thing("cushion", size, host.to_room(spot[None])[0], host.yaw + turn, host.name, variant)
+                setting.put_first([thing], host=host.name, margin=0.0, floor=False)
+
+
+def folded(setting: Setting) -> None:
+    """A folded blanket on the seat of the largest sofa of a full room."""
+    if not setting.full:
+        return
+    for host in sorted(setting.of("sofa"), key=lambda o: -float(o.size[0]))[:1]:
+        rng = setting.rng(host.name, "folded")
+        size, variant, seat = usual_size("folded_throw", rng), int(rng.integers(4)), _Seat.of(host)
+        if seat is None:
+            continue
+        spots = (spot for end in (0.25, -0.3, 0.0) if (spot := seat.resting(end, size)) is not None)
+        places = (host.to_room(spot[None] + np.array([0.0, 0.002, 0.0]))[0] for spot in spots)
+        wanted = (Thing("folded_throw", size, place, host.yaw, host.name, variant) for place in places)
+        setting.put_first(wanted, host=host.name, margin=0.0, floor=False)
+
+
+def _clear_of(host: Standing, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
+    """The spot (3,) or one near it where a turned cushion reaches into no solid of its seat; None = nowhere."""
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], 1)
+    ring = np.sign(ring) * np.abs(ring) ** (2 / PILLOW) / 2
+    pillow = np.concatenate([
+        np.stack([ring[:, 0] * size[0], np.full(24, y), ring[:, 1] * size[2]], 1) for y in (0.0, size[1])
+    ])  # fmt: skip
+    cos, sin = np.cos(turn), np.sin(turn)
+    stood = pillow @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]) + spot
+    taken = forbidden_moves([stood], [collider.mesh.vertices for collider in host.geometry.colliders], ASIDE)
+    free = shapely.Point(0, 0).buffer(ASIDE).difference(taken)
+    if free.is_empty:
+        return None
+    way = shapely.get_coordinates(shapely.shortest_line(shapely.Point(0, 0), free))[1]
+    return spot + np.array([way[0], 0.0, way[1]])
+
+
+def _lying(host: Standing, seat: _Seat, spot: np.ndarray, turn: float, size: np.ndarray) -> np.ndarray | None:
+    """A place near a spot (3,) that is clear of the host, at the height of what is below; None where there is none."""
+    for _ in range(3):
+        clear = _clear_of(host, spot, turn, size)
+        down = None if clear is None else seat.below(clear, size)
+        if clear is None or down is None:
+            return None
+        if abs(down - clear[1]) < LEVEL:
+            return clear
+        spot = np.array([clear[0], down, clear[2]])
+    return None
+
+
+class _Seat:
+    """Heights of an upholstered piece on a grid, object frame."""
+
+    def __init__(self, x: np.ndarray, z: np.ndarray, height: np.ndarray, level: float) -> None:
+        self.x, self.z, self.height, self.level = x, z, height, level
+
+    @classmethod
+    def of(cls, host: Standing) -> _Seat | None:
+        """The seat of an object, None where nothing of it looks like one."""
+        mesh = host.geometry.mesh
+        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        normal = area_normals(corners)
+        double = np.linalg.norm(normal, axis=1)
+        y = corners[..., 1].mean(1)
+        top = 0.75 * float(host.size[1])
+        up = (normal[:, 1] > 0.85 * double) & (y > 0.2) & (y < min(0.62, top)) & (double > 0)
+        if double[up].sum() / 2 < 0.12:
+            return None
+        order = np.argsort(y[up])
+        share = np.cumsum(double[up][order])
+        level = float(y[up][order][np.searchsorted(share, 0.6 * share[-1])])
+        half = host.size[[0, 2]] / 2
+        x = np.arange(-half[0], half[0], STEP) + STEP / 2
+        z = np.arange(-half[1], half[1], STEP) + STEP / 2
+        return cls(x, z, _heights(corners[normal[:, 1] > 0.05 * double], x, z), level)
+
+    def before_pillows(self, x: float, size: np.ndarray) -> np.ndarray | None:
+        """(3,) a place at `x` right before what lies at the head; None where it would not lie flat."""
+        rows = np.abs(self.x - x) < size[0] / 2
+        deep = int(np.ceil(size[2] / STEP))
+        head = self.z < 0.1 * self.z[0]  # the half of the head and a little more
+        raised = np.flatnonzero(head & (self.height[rows].max(0) > self.level + 0.08))
+        first = int(raised[-1]) + 1 if len(raised) else len(self.z)
+        under = self.height[rows, first : first + deep]
+        if under.shape[1] < deep or np.ptp(under) > 0.05:
+            return None
+        return np.array([x, float(under.max()), self.z[first] + (deep - 1) * STEP / 2])
+
+    def below(self, spot: np.ndarray, size: np.ndarray) -> float | None:
+        """Height of the level surface below most of what lies at a spot (3,); None where it is not level."""
+        rows, columns = np.abs(self.x - spot[0]) < 0.4 * size[0], np.abs(self.z - spot[2]) < 0.4 * size[2]
+        under = self.height[np.ix_(rows, columns)]
+        if not under.size or not np.isfinite(under).any():
+            return None
+        top = float(under.max())
+        return top if (under > top - 2 * LEVEL).mean() > 0.6 else None
+
+    def resting(self, end: float, size: np.ndarray) -> np.ndarray | None:
+        """(3,) a place on the seat against the back, towards one end (-1 to 1); None where there is none."""
+        free = np.abs(self.height - self.level) < 0.07
+        wide, deep = (max(1, int(np.ceil(size[k] / STEP))) for k in (0, 2))
+        if wide > len(self.x) or deep > len(self.z):
+            return None
+        total = np.cumsum(np.cumsum(np.pad(free.astype(int), ((1, 0), (1, 0))), 0), 1)
+        count = total[wide:, deep:] - total[:-wide, deep:] - total[wide:, :-deep] + total[:-wide, :-deep]
+        fits = np.argwhere(count >= 0.93 * wide * deep)
+        if not len(fits):
+            return None
+        wish = end * (len(self.x) - wide) / 2 + (len(self.x) - wide) / 2
+        cost = fits[:, 1] * 1.5 + np.abs(fits[:, 0] - wish)
+        i, k = fits[int(np.argmin(cost))]
+        under = self.height[i : i + wide, k : k + deep]
+        return np.array([self.x[i] + (wide - 1) * STEP / 2, float(np.median(under)),
+                         self.z[k] + (deep - 1) * STEP / 2])  # fmt: skip
+
+
+def _heights(corners: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(len(x), len(z)) float: height of the highest surface over each cell of a grid, -inf where there is none."""
+    out = np.full((len(x), len(z)), -np.inf)
+    # Small triangles fill the cells that their corners and middles lie in; large ones are drawn cell by cell.
+    points = np.concatenate(
+        [corners.reshape(-1, 3), corners.mean(1), (corners[:, :2] + corners[:, 1:]).reshape(-1, 3) / 2]
+    )
+    i, k = ((points[:, axis] - line[0]) / STEP + 0.5 for axis, line in ((0, x), (2, z)))
+    inside = (i >= 0) & (i < len(x)) & (k >= 0) & (k < len(z))
+    np.maximum.at(out, (i[inside].astype(int), k[inside].astype(int)), points[inside, 1])
+    flat = corners[:, :, [0, 2]]
+    one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    low, high = flat.min(1), flat.max(1)
+    for n in np.flatnonzero((np.abs(area) > 1e-10) & ((high - low).max(1) > 1.5 * STEP)):
+        rows, columns = (slice(*np.searchsorted(line, (low[n, a], high[n, a]))) for a, line in ((0, x), (1, z)))
+        if rows.start == rows.stop or columns.start == columns.stop:
+            continue
+        px, pz = x[rows, None] - flat[n, 0, 0], z[None, columns] - flat[n, 0, 1]
+        u = (px * two[n, 1] - pz * two[n, 0]) / area[n]
+        v = (one[n, 0] * pz - one[n, 1] * px) / area[n]
+        y0, y1, y2 = corners[n, :, 1]
+        y = np.where((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9), y0 + u * (y1 - y0) + v * (y2 - y0), -np.inf)
+        np.maximum(out[rows, columns], y, out=out[rows, columns])
+    return out
+
+
+def throws(setting: Setting) -> None:
+    """A blanket across the foot of every bed that lets it lie flat and hang down."""
+    for host in setting.of("bed"):
+        rng = setting.rng(host.name, "throw")
+        mesh = host.geometry.mesh
+        corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces)]
+        deep = float(np.clip(0.3 * host.size[2], 0.4, 0.75))
+        depths = (float(host.size[2]) / 2 - back - deep / 2 for back in (0.12, 0.2, 0.3))
+        wanted = (thing for z in depths if (thing := _across(host, corners, z, deep, rng)) is not None)
+        setting.put_first(wanted, host=host.name, margin=0.0)
+
+
+def _across(host: Standing, corners: np.ndarray, z: float, deep: float, rng: np.random.Generator) -> Thing | None:
+    """A throw across a bed, its middle at `z`; None where nothing of a bed's height lies there."""
+    here = corners[(corners[..., 2].min(1) < z + deep / 2) & (corners[..., 2].max(1) > z - deep / 2)]
+    lying = here[..., 2].min(1) > z - 3 * deep  # boards along the whole bed end where the bed ends
+    top = float(here[lying][..., 1].max()) if lying.any() else 0.0
+    if not 0.25 < top < 0.85:
+        return None
+    side = here[here[..., 1].max(1) > top - 0.2]
+    half = float(np.abs(side[..., 0]).max())
+    size = np.round([2 * half + 0.05, 0.012 + rng.uniform(0.16, 0.22), deep], 3)
+    spot = host.to_room(np.array([[0.0, top + 0.014 - size[1], z]]))[0]
+    return Thing("throw", size, spot, host.yaw, host.name, int(rng.integers(1 << 30)))

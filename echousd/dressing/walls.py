@@ -1,0 +1,233 @@
+"""What hangs on walls: curtains at windows, pictures and mirrors at eye height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from echomodel.dressing import usual_size
+from echomodel.openings import Opening, direction, edge_lengths, inward_normal
+from echousd.dressing.setting import Setting, Standing, Thing
+from echousd.shapes.fittings import RAIL
+
+EYE = 1.52  # metres, height of a picture's middle on an empty wall
+OVER = 0.22  # metres between furniture and what hangs over it
+NEAR = 0.45  # metres: furniture whose back is so near to a wall stands at it
+SIDE = 0.32  # metres that curtains take beside a window
+BLIND = 0.016  # metres, thickness of a roller blind, which hangs between a window's jambs
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """One wall from inside: its first corner, unit vectors along it and into the room (x, z), its length in metres."""
+
+    edge: int
+    start: np.ndarray
+    along: np.ndarray
+    inside: np.ndarray
+    length: float
+
+    @property
+    def yaw(self) -> float:
+        """Of what hangs on it and looks into the room."""
+        return float(np.arctan2(self.inside[0], self.inside[1]))
+
+    def at(self, along: float, off: float, y: float) -> np.ndarray:
+        """(3,) a point before the wall."""
+        x, z = self.start + self.along * along + self.inside * off
+        return np.array([x, y, z])
+
+
+def walls_of(setting: Setting) -> list[Wall]:
+    """All walls of a room."""
+    floor, lengths = setting.floor, edge_lengths(setting.floor)
+    return [
+        Wall(k, np.asarray(floor[k], float), direction(floor, k), inward_normal(floor, k), float(lengths[k]))
+        for k in range(len(floor))
+        if lengths[k] > 0.3
+    ]
+
+
+def curtains(setting: Setting) -> None:
+    """A curtain on either side of every window, down to the floor, the sill or what stands there.
+
+    Where there is no room for two, a roller blind in the window.
+    """
+    if not setting.walls:
+        return
+    above, before, beyond = RAIL
+    for wall in walls_of(setting):
+        for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
+            rail = window.sill + window.height + above
+            if rail > setting.height - 0.05:
+                _blind(setting, wall, window)
+                continue
+            rng = setting.rng(window.name, "curtain")
+            wide, variant = round(min(0.45, 0.16 + 0.14 * window.width), 3), int(rng.integers(4))
+            left = max(window.offset - beyond + wide / 2, 0.02 + wide / 2)
+            right = min(window.end + beyond - wide / 2, wall.length - 0.02 - wide / 2)
+            inner = np.linspace(
+                0.0, 0.5 * (right - left) - wide / 2, 4
+            )  # drawn over the pane where something is beside
+            for foot in (0.015, max(0.3, window.sill - 0.15), window.sill - 0.02, window.sill + 0.2):
+                size = np.array([wide, round(rail + 0.005 - foot, 3), 0.085])
+                sides = [
+                    next((one for one in hung if setting.clear(one, margin=0.0, floor=False)), None)
+                    for hung in (
+                        [
+                            Thing("curtain", size, wall.at(end + way * off, before, foot), wall.yaw, "", variant)
+                            for off in inner
+                        ]
+                        for end, way in ((left, 1), (right, -1))
+                    )
+                ]
+                if None not in sides:  # one alone looks forgotten
+                    setting.placed += [one for one in sides if one is not None]
+                    setting.curtained.add(window.name)
+                    break
+            else:
+                _blind(setting, wall, window)
+
+
+def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
+    """A roller blind, let down over a part of the pane."""
+    rng = setting.rng(window.name, "blind")
+    tall = round(window.height * float(rng.choice((0.2, 0.3, 0.4))), 3)
+    size = np.array([round(window.width - 0.012, 3), tall, BLIND])
+    middle = (window.offset + window.end) / 2
+    place = wall.at(middle, -BLIND / 2 - 0.003, window.sill + window.height - 0.004 - tall)
+    setting.placed.append(Thing("blind", size, place, wall.yaw))
+
+
+def pictures(setting: Setting) -> None:
+    """A picture or a mirror over what stands at a wall; on an empty wall of a full room, too."""
+    if not setting.walls:
+        return
+    every = walls_of(setting)
+    for host in setting.inviting("picture", "mirror"):
+        behind = _behind(host, every)
+        if behind is None:
+            continue
+        wall, along = behind
+        rng = setting.rng(host.name, "picture")
+        for kind, size in _over(host, setting, rng):
+            if setting.full and kind == "picture" and _group(setting, wall, along, host, rng):
+                break
+            thing = _hung(setting, wall, along, kind, size, host.top + OVER, int(rng.integers(1 << 30)), host.name)
+            if thing:
+                setting.placed.append(thing)
+                _companion(setting, wall, along, thing, host)
+                break
+    if setting.full:
+        for wall in every:
+            rng = setting.rng(f"wall {wall.edge}", "picture")
+            size = np.array([0.5, 0.7, 0.03]) if rng.random() < 0.5 else np.array([0.7, 0.5, 0.03])
+            for share in (0.5, 0.3, 0.7):
+                thing = _hung(setting, wall, share * wall.length, "picture", size, EYE - size[1] / 2,
+                              int(rng.integers(1 << 30)), "")  # fmt: skip
+                if thing and not any(t.kind == "picture" and np.linalg.norm(t.position - thing.position) < 1.2
+                                     for t in setting.placed):  # fmt: skip
+                    setting.placed.append(thing)
+                    break
+
+
+def _group(setting: Setting, wall: Wall, along: float, host: Standing, rng: np.random.Generator) -> bool:
+    """Three equal pictures in a row, or three pairs, over a long piece; all of them or none."""
+    wide = float(host.size[0])
+    if wide < 1.3:
+        return False
+    free = setting.height - 0.25 - host.top - OVER
+    rows = 2 if free > 1.15 and wide > 1.7 and rng.random() < 0.5 else 1
+    w = float(np.clip((0.8 * wide - 0.16) / 3, 0.28, 0.5))
+    h = round(min(w * 1.3, (free - 0.08 * (rows - 1)) / rows), 2)
+    if h < 0.3:
+        return False
+    size, before = np.array([round(w, 2), h, 0.03]), len(setting.placed)
+    for row in range(rows):
+        for column in (-1, 0, 1):
+            least = max(host.top + OVER, 1.15) + row * (h + 0.08)
+            if rows == 2:
+                least = host.top + OVER + row * (h + 0.08)
+            spot = along + column * (float(size[0]) + 0.08)
+            one = hung_at(setting, wall, spot, "picture", size, least, int(rng.integers(12)), host.name)
+            if one is None:
+                del setting.placed[before:]
+                return False
+            setting.placed.append(one)
+    return True
+
+
+def _behind(host: Standing, walls: list[Wall]) -> tuple[Wall, float] | None:
+    """The wall at an object's back and where along it the object's middle is."""
+    front = np.array([np.sin(host.yaw), np.cos(host.yaw)])
+    back = host.position[[0, 2]] - front * host.size[2] / 2
+    for wall in walls:
+        along = float((back - wall.start) @ wall.along)
+        off = float((back - wall.start) @ wall.inside)
+        if front @ wall.inside > 0.97 and -0.1 < off < NEAR and 0 < along < wall.length:
+            return wall, along
+    return None
+
+
+def _over(host: Standing, setting: Setting, rng: np.random.Generator) -> list[tuple[str, np.ndarray]]:
+    """What would look good over an object, best first."""
+    wide = float(host.size[0])
+    out: list[tuple[str, np.ndarray]] = []
+    if "mirror" in host.row.invites:
+        out.append(("round_mirror" if rng.random() < 0.5 else "mirror", usual_size("round_mirror", rng)))
+        if out[0][0] == "mirror":
+            out = [("mirror", usual_size("mirror", rng))]
+    share = rng.uniform(0.5, 0.62)
+    w = float(np.clip(wide * share, 0.35, 1.3))
+    ratio = rng.uniform(0.6, 0.72) if w > 0.55 else rng.uniform(1.25, 1.4)
+    for scale in (1.0, 0.8, 0.6):
+        size = np.round([w * scale, w * ratio * scale, 0.03], 2)
+        if size[0] >= 0.28:
+            out.append(("picture", size))
+    return out
+
+
+def _hung(
+    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, least: float, variant: int, on: str
+) -> Thing | None:
+    """A thing on a wall whose middle is at eye height or whose lower side is at `least`; None where it does not fit."""
+    low = max(least, EYE - size[1] / 2) if not on else max(least, 1.15)
+    low = min(low, setting.height - 0.2 - size[1])
+    if low < least - 0.1 or low < 0.4:
+        return None
+    return hung_at(setting, wall, along, kind, size, low, variant, on)
+
+
+def hung_at(
+    setting: Setting, wall: Wall, along: float, kind: str, size: np.ndarray, low: float, variant: int, on: str
+) -> Thing | None:
+    """A thing whose lower side is at `low`; None where an opening, furniture or something else is in its way."""
+    if along - size[0] / 2 < 0.12 or along + size[0] / 2 > wall.length - 0.12:
+        return None
+    for opening in (o for o in setting.openings if o.edge == wall.edge):
+        beside = SIDE if opening.kind == "window" else 0.15
+        if meets(opening, along, size[0] / 2 + beside, low, low + size[1]):
+            return None
+    thing = Thing(kind, size, wall.at(along, size[2] / 2 + 0.002, low), wall.yaw, on, variant)
+    before = Thing(kind, size + np.array([0.1, 0.06, 0.3]), wall.at(along, 0.18, low - 0.03), wall.yaw, on)
+    return thing if setting.clear(before, margin=0.0, floor=False, host=on) else None
+
+
+def meets(opening: Opening, along: float, half: float, low: float, high: float) -> bool:
+    """Whether an opening lies within `half` metres of a place along its wall, between two heights."""
+    beside = opening.end < along - half or opening.offset > along + half
+    return not beside and opening.sill - 0.1 < high and opening.sill + opening.height + 0.2 > low
+
+
+def _companion(setting: Setting, wall: Wall, along: float, first: Thing, host: Standing) -> None:
+    """A second picture of the same size beside one that leaves room over a long piece, in full rooms."""
+    wide = float(host.size[0])
+    if not setting.full or first.kind != "picture" or wide < 1.8 or first.size[0] > 0.55 * wide:
+        return
+    for side in (1, -1):
+        size = np.round([first.size[0] * 0.5, first.size[1] * 0.75, 0.03], 2)
+        spot = along + side * (first.size[0] / 2 + size[0] / 2 + 0.1)
+        thing = _hung(setting, wall, spot, "picture", size, float(first.position[1]), first.variant + side, host.name)
+        if thing:
+            setting.put_first([thing], margin=0.02, floor=False, host=host.name)

@@ -1,0 +1,1 @@
+"""A room's folder on disk: manifest, journal, history, ownership, lock."""

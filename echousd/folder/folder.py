@@ -1,0 +1,247 @@
+"""A room's folder on disk: files appear together or not at all, and what is not ours stays untouched (no pxr here).
+
+Everything new is first written to `.echousd/` inside the folder. A journal beside it, itself renamed into place, then
+says which files move where; from then on the run can be finished by whoever comes next, before nothing was changed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from echomodel.files import flush
+from echousd.folder.journal import (
+    DONE,
+    Journal,
+    Move,
+    Removal,
+    digest,
+    digest_of,
+    read_journal,
+    write_journal,
+)
+from echousd.folder.lock import LOCK, locked, run_of
+from echousd.folder.manifest import find_manifest
+from echousd.folder.within import inside
+from echousd.naming import free_name
+from echousd.pending import JOURNAL, STAGING, half_written
+from echousd.stage.files import check_path
+
+
+def claim(folder: Path, *, force: bool, root: str = "") -> dict[str, Any]:
+    """Make sure that `folder` is ours to write into, finish or discard an interrupted run, and return the old manifest.
+
+    Where several rooms lie in the folder, it is that of the room called `root` if there is one.
+
+    Raises ValueError for a file in the way, or a folder that holds other things than a room of ours.
+    """
+    check_path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: is a file, the output must be a folder")
+    if not folder.exists():
+        return {}
+    recover(folder)
+    manifest = find_manifest(folder, root)
+    if manifest is not None:
+        return manifest
+    others = sorted(entry.name for entry in folder.iterdir() if entry.name not in (STAGING, LOCK))
+    if others and not force:
+        shown = ", ".join(others[:3]) + (" ..." if len(others) > 3 else "")
+        raise ValueError(f"{folder}: holds {shown} and no room of EchoUSD; choose another folder or use --force")
+    return {}
+
+
+def check_writable(folder: Path) -> None:
+    """Raises ValueError where nothing can be written into `folder`, or where it cannot be created."""
+    check_path(folder)
+    nearest = folder
+    while not nearest.exists():
+        nearest = nearest.parent
+    if not nearest.is_dir():
+        raise ValueError(f"{folder}: {nearest} is a file, not a folder")
+    if not os.access(nearest, os.W_OK | os.X_OK):
+        raise ValueError(f"{folder}: {nearest} is not writable (permission denied)")
+
+
+def write_together(
+    folder: Path, files: Mapping[str, bytes], *, last: Iterable[str], remove: Iterable[str]
+) -> list[str]:
+    """Write all files of a room as one step and return the paths that changed.
+
+    Files whose bytes are already there are not touched.
+
+    Arguments:
+        folder: created if need be.
+        files: relative path (forward slashes) -> content, in the order in which they are moved into place.
+        last: those of them that are moved after all others, in this order.
+        remove: relative paths that no longer belong to the room, deleted at the very end; where nothing changes, they
+            are left.
+
+    Raises:
+        ValueError: something cannot be written, would be outside of the folder, or another process is writing there;
+            then nothing was changed.
+    """
+    with held(folder):
+        changed = _stage(folder, files, list(last), list(remove))
+        if changed:
+            finish(folder)
+    return changed
+
+
+def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: list[str]) -> list[str]:
+    """Write what differs and the journal into the staging folder, and return the paths that will change."""
+    staging = folder / STAGING
+    order = [path for path in files if path not in last] + [path for path in last if path in files]
+    for path in (*order, *remove):
+        if inside(folder, path, "a file of the room").is_dir():
+            raise ValueError(f"{folder / path}: is a folder, where a file of the room belongs; nothing was changed")
+        blocking = [place for place in (folder / path).parents if place != folder and place.is_file()]
+        if blocking and path in files:
+            raise ValueError(f"{blocking[0]}: is a file, where a folder of the room belongs; nothing was changed")
+    try:
+        _discard(staging)
+        staging.mkdir()
+        changed = [path for path in order if not _holds(folder / path, files[path])]
+        for number, path in enumerate(changed):
+            (staging / str(number)).write_bytes(files[path])
+        move = [
+            Move(staged=str(number), to=path, digest=digest(files[path]), over=digest_of(folder / path))
+            for number, path in enumerate(changed)
+        ]
+        gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
+        if changed:
+            write_journal(staging, Journal(run=run_of(folder), move=move, remove=gone))
+        else:
+            _discard(staging)
+    except OSError as error:
+        shutil.rmtree(staging, ignore_errors=True)
+        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
+    return changed
+
+
+@contextmanager
+def held(folder: Path, *, wait: bool = False, run: str = "") -> Iterator[str]:
+    """Have the folder for this process alone, and an interrupted run finished first.
+
+    Arguments:
+        wait: for another process that writes the folder, instead of raising.
+        run: what this one does: a word and what tells it from others. Until the end of the outermost block the folder
+            says so, for whoever begins the same once more after this process died.
+
+    Yields the `run` that was finished, "" for none and in a block inside another. Raises ValueError as `recover` does.
+    """
+    with locked(folder, wait=wait, run=run) as outermost:
+        yield recover(folder) if outermost else ""
+        if outermost and not half_written(folder):
+            _discard(folder / STAGING)
+
+
+def recover(folder: Path) -> str:
+    """Finish an interrupted run that had written its journal, warn, and return its name; discard one that had not.
+
+    Raises ValueError where that is impossible, where another process is writing, and for a journal that names anything
+    outside of the folder.
+    """
+    staging = folder / STAGING
+    if not staging.is_symlink() and not staging.is_dir():
+        return ""
+    with locked(folder) as outermost:
+        pending = half_written(folder)
+        run = finish(folder)
+        if pending and run is not None:
+            what = (run or "run").partition(" ")[0]
+            warnings.warn(f"{folder}: the {what} that was interrupted is finished now", stacklevel=3)
+        if outermost and not half_written(folder):
+            _discard(staging)
+    return run or ""
+
+
+def finish(folder: Path) -> str | None:
+    """Do what the journal of a run says, and return the run's name; None where there is nothing to finish."""
+    staging = folder / STAGING
+    try:
+        journal = read_journal(folder)
+        if journal is not None and _whole(folder, journal):
+            _finish(folder, journal)
+            (staging / JOURNAL).replace(staging / DONE)
+        else:
+            journal = None if journal else read_journal(folder, DONE)
+        if journal is None or not journal.run:
+            _discard(staging)
+        return journal.run if journal else None
+    except OSError as error:
+        raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); run again to finish") from None
+
+
+def backup_name(folder: Path, path: str) -> str:
+    """`layers/layout.edited.usda` for `layers/layout.usda`, or the first free one of `.edited_2`, `.edited_3` ..."""
+    place = Path(path)
+
+    def name(word: str) -> str:
+        return place.with_name(f"{place.stem}.{word}{place.suffix}").as_posix()
+
+    return name(free_name("edited", lambda word: os.path.lexists(folder / name(word))))
+
+
+def tell_kept(folder: Path, path: str, kept: str) -> None:
+    """Warn that a file that is not ours, or was edited, is now called `kept`."""
+    warnings.warn(f"{folder / path}: not as echousd wrote it; kept as {kept}", stacklevel=3)
+
+
+def _whole(folder: Path, journal: Journal) -> bool:
+    """Whether all that is still staged is what the journal says."""
+    for entry in journal.move:
+        staged = folder / STAGING / entry.staged
+        if staged.exists() and digest_of(staged) != entry.digest:
+            warnings.warn(f"{staged}: damaged; the interrupted run is given up, generate the room again", stacklevel=3)
+            return False
+    return True
+
+
+def _finish(folder: Path, journal: Journal) -> None:
+    touched = {folder}
+    for entry in journal.move:
+        staged, place = folder / STAGING / entry.staged, folder / entry.to
+        if not staged.exists():  # an earlier run has moved it
+            continue
+        place.parent.mkdir(parents=True, exist_ok=True)
+        touched |= {place.parent, place.parent.parent}
+        if digest_of(place) not in ("", entry.over, entry.digest):  # somebody's, since the run was interrupted
+            kept = backup_name(folder, entry.to)
+            place.replace(folder / kept)
+            tell_kept(folder, entry.to, kept)
+        staged.replace(place)
+    for removal in journal.remove:
+        place = folder / removal.path
+        if digest_of(place) == removal.digest:
+            place.unlink(missing_ok=True)
+        _remove_empty(place.parent, folder)
+    for place in touched:
+        if place.is_dir():
+            flush(place)
+
+
+def _discard(staging: Path) -> None:
+    if staging.is_symlink():
+        raise ValueError(f"{staging}: is a link, where runs keep their own files; remove it")
+    if staging.exists():
+        (staging / JOURNAL).unlink(missing_ok=True)  # before what it names
+        shutil.rmtree(staging)
+
+
+def _remove_empty(folder: Path, top: Path) -> None:
+    while folder != top and folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()
+        folder = folder.parent
+
+
+def _holds(path: Path, content: bytes) -> bool:
+    try:
+        return path.stat().st_size == len(content) and path.read_bytes() == content
+    except OSError:
+        return False

@@ -1,0 +1,86 @@
+"""Which rooms a path means: a file, the folder of a room, a folder of such folders, or a pattern."""
+
+from __future__ import annotations
+
+import glob
+from pathlib import Path
+
+from echousd.folder.manifest import find_manifest
+from echousd.graph.files import STAGE_FORMS
+from echousd.pending import half_written
+
+
+def rooms_at(place: Path) -> list[Path]:
+    """The root layers of the rooms at a path, sorted; raises ValueError for a folder or pattern without any."""
+    if place.is_dir():
+        found = _rooms_below(place)
+        if not found:
+            raise ValueError(f"{place}: no room in this folder")
+        return found
+    if not place.exists() and glob.has_magic(str(place)):
+        matches = [Path(path) for path in sorted(glob.glob(str(place), recursive=True))]  # noqa: PTH207
+        found = _rooms_of(matches)
+        if not found:
+            raise ValueError(f"{place}: matches {'no room' if matches else 'nothing'}")
+        return found
+    return [place]
+
+
+def room_at(place: Path) -> Path:
+    """The one root layer at a path: a file itself, of a folder its room; raises ValueError where several are."""
+    if not place.is_dir():
+        return place
+    found = _room_in(place)
+    if found is not None:
+        return found
+    rooms = rooms_at(place)
+    if len(rooms) > 1:
+        named = [path.relative_to(place) for path in (*sorted(place.glob("*.usda")), *rooms)]  # a house, then its rooms
+        shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
+        raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
+    return rooms[0]
+
+
+def layer_over(place: Path) -> Path:
+    """Somebody's layer over a room: a file itself, of a room's folder the one layer there that names its root.
+
+    Raises ValueError for a folder without one or with several.
+    """
+    if not place.is_dir():
+        return place
+    from pxr import Sdf
+
+    root = room_at(place)
+    layers = sorted(path for path in root.parent.glob("*.usd*") if path.suffix in STAGE_FORMS and path != root)
+    opened = {path: Sdf.Layer.FindOrOpen(str(path)) for path in layers}
+    over = [
+        path
+        for path, layer in opened.items()
+        if layer and any((path.parent / below).resolve() == root.resolve() for below in layer.subLayerPaths)
+    ]
+    if len(over) != 1:
+        found = ", ".join(path.name for path in over) or "none"
+        raise ValueError(f"{place}: layers over {root.name} in this folder: {found}; name the one that changes it")
+    return over[0]
+
+
+def _rooms_below(place: Path) -> list[Path]:
+    rooms = [_room_in(folder) for folder in (place, *sorted(path for path in place.rglob("*") if path.is_dir()))]
+    return [room for room in rooms if room is not None]
+
+
+def _rooms_of(matches: list[Path]) -> list[Path]:
+    """What a pattern found: rooms of folders, and stages that are no layers or assets of these."""
+    rooms = [room for path in matches if path.is_dir() for room in _rooms_below(path)]
+    stages = [path for path in matches if path.suffix in STAGE_FORMS and path.is_file()]
+    folders = {room.parent for room in rooms}
+    rooms += [path for path in stages if folders.isdisjoint(path.parents)]
+    return sorted(dict.fromkeys(rooms))
+
+
+def _room_in(folder: Path) -> Path | None:
+    manifest = find_manifest(folder)
+    if manifest is None and half_written(folder):  # the first room there: whoever opens it is told
+        return folder / f"{folder.name}.usda"
+    root = None if manifest is None else folder / f"{manifest['name']}.usda"
+    return root if root is not None and root.is_file() else None

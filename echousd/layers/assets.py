@@ -1,0 +1,214 @@
+"""One piece of furniture as a USD asset: a light component layer with a payload, and the heavy geometry behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
+
+from echousd.layers.materials import write_looks, write_palettes
+from echousd.layers.physics import write_asset_physics
+from echousd.shapes.finishes.harmonies import HARMONIES
+from echousd.shapes.geometry import Geometry
+from echousd.shapes.joints import write_joints
+from echousd.shapes.looks import look, palette_for
+from echousd.shapes.surface import Surface, surface
+from echousd.stage.files import new_stage
+from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, class_path, coarse_name, payload_name, piece_path
+from echousd.stage.taxonomy import ade20k
+
+LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
+
+
+def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.Layer:
+    """A copy of a stage's layer, finished where no stage looks on: that would try to load what is not on disk yet."""
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.TransferContent(stage.GetRootLayer())
+    with Sdf.ChangeBlock():
+        finish(layer)
+    return layer
+
+
+def as_class(stage: Usd.Stage, name: str) -> None:
+    """Have what a stage says of an asset's class be a class, and define what is below: no overs of nothing."""
+    layer, top = stage.GetRootLayer(), Sdf.Path(class_path(name))
+    paths: list[Sdf.Path] = []
+    layer.Traverse(top, paths.append)
+    with Sdf.ChangeBlock():
+        for path in paths:
+            if path.IsPrimPath():
+                layer.GetPrimAtPath(path).specifier = Sdf.SpecifierDef  # a class below would not be seen
+        for path in (top.GetParentPath(), top):
+            layer.GetPrimAtPath(path).specifier = Sdf.SpecifierClass
+
+
+def write_mesh(stage: Usd.Stage, path: str, form: Surface) -> UsdGeom.Mesh:
+    """Author a UsdGeomMesh with indexed normals and `st`, and a GeomSubset per material group if there are several."""
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    # Blender merges an Xform with an only child that has no transform of its own, and the Xform's name is lost.
+    # In floats: three.js fails on whole numbers in doubles of a usdc.
+    mesh.AddTranslateOp(UsdGeom.XformOp.PrecisionFloat).Set(Gf.Vec3f(0.0))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(form.points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(form.faces), 3, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(form.faces.ravel()))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(form.extent))
+    primvars = UsdGeom.PrimvarsAPI(mesh)
+    normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
+    normals.Set(Vt.Vec3fArray.FromNumpy(form.normals))
+    normals.SetIndices(Vt.IntArray.FromNumpy(form.normal_index))
+    st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+    st.Set(Vt.Vec2fArray.FromNumpy(form.st))
+    st.SetIndices(Vt.IntArray.FromNumpy(form.st_index))
+    if len(form.groups) > 1:
+        for name, faces in form.groups.items():
+            subset = UsdGeom.Subset.Define(stage, f"{path}/{name}")
+            subset.CreateElementTypeAttr(UsdGeom.Tokens.face)
+            subset.CreateFamilyNameAttr("materialBind")
+            subset.CreateIndicesAttr(Vt.IntArray.FromNumpy(faces))
+        UsdGeom.Subset.SetFamilyType(mesh, "materialBind", UsdGeom.Tokens.partition)
+    return mesh
+
+
+def geometry_layer(
+    name: str, forms: Mapping[str, Surface], geometry: Geometry, data: Mapping[str, Any], style: str = ""
+) -> Sdf.Layer:
+    """`<name>_geo`: a mesh for every part and, as guides, the colliders; their looks; what the furniture was made from.
+
+    Arguments:
+        name: of the asset.
+        forms: path of a part below the root -> its surface.
+        geometry: whose parts these are, and whose colliders are written.
+        data: customLayerData.
+        style: chooses the looks, which a room's materials layer overrides.
+    """
+    stage = new_stage(name, ".usdc", data)
+    root = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
+    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
+    if geometry.description:
+        root.CreateAttribute(DESCRIPTION, Sdf.ValueTypeNames.FloatArray).Set(Vt.FloatArray(geometry.description))
+    for body in sorted({part.body for part in geometry.parts if part.body}):
+        UsdGeom.Xform.Define(stage, piece_path(f"/{name}", name, body))
+    for path, form in forms.items():
+        write_mesh(stage, f"/{name}{path}", form)
+    for collider in () if geometry.theirs_collides else geometry.colliders:
+        every = np.arange(len(collider.mesh.faces))
+        form = surface(collider.mesh, {"collider": every})
+        guide = write_mesh(stage, piece_path(f"/{name}", name, collider.name, collider.body), form)
+        guide.CreatePurposeAttr(UsdGeom.Tokens.guide)
+    _write_looks(stage, name, style, {part: tuple(form.groups) for part, form in forms.items()})
+    return stage.GetRootLayer()
+
+
+def _write_looks(stage: Usd.Stage, name: str, style: str, slots: Mapping[str, Sequence[str]]) -> None:
+    """The looks of an asset that stands for itself, in plain colours, and its variant set `palette`."""
+    bindings = slot_paths(f"/{name}", slots)
+    if not bindings:
+        return
+    used, chosen, scope = sorted(set(bindings.values())), palette_for(style), f"/{name}/{MTL}"
+    plain = {harmony: {slot: replace(look(harmony, slot), pattern="") for slot in used} for harmony in HARMONIES}
+    write_looks(stage, plain[chosen], bindings, scope, tinted=True)
+    write_palettes(stage, chosen, plain, f"/{name}", scope)
+
+
+def coarse_layer(name: str, forms: Mapping[str, Surface], data: Mapping[str, Any]) -> Sdf.Layer:
+    """`<name>_low`: the meshes once more with few faces; arguments as for `geometry_layer`."""
+    stage = new_stage(name, ".usdc", data)
+    UsdGeom.Xform.Define(stage, f"/{name}")
+    UsdGeom.Scope.Define(stage, f"/{name}/{GEO}")
+    for path, form in forms.items():
+        write_mesh(stage, f"/{name}{path}", form)
+    return stage.GetRootLayer()
+
+
+def component_layer(
+    name: str,
+    category: str,
+    extent: np.ndarray,
+    geometry: Geometry,
+    data: Mapping[str, Any],
+) -> Sdf.Layer:
+    """`<name>.usda`: kind, class, labels, extentsHint, physics, variants and the payload `./<name>_geo.usdc`.
+
+    Arguments:
+        name, category: words. extent: (2, 3) float, metres.
+        geometry: whose joints, colliders and mass are told.
+        data: customLayerData.
+    """
+    stage = new_stage(name, ".usda", data)
+    prim = UsdGeom.Xform.Define(stage, f"/{name}").GetPrim()
+    model = Usd.ModelAPI(prim)
+    model.SetKind(Kind.Tokens.component)
+    model.SetAssetName(name)
+    model.SetAssetIdentifier(Sdf.AssetPath(f"./{name}.usda"))
+    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([Gf.Vec3f(*map(float, extent[0])), Gf.Vec3f(*map(float, extent[1]))])
+    prim.SetDocumentation(f"{category}: origin at the centre of the bottom face, +Y up, +Z is the front; metres")
+    if geometry.joints:
+        write_joints(stage, name, geometry)
+    if geometry.original is None:
+        _write_levels(stage, name, geometry)
+    for taxonomy, word in (("category", category), ("ade20k", ade20k(category))):
+        UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+    write_asset_physics(stage, name, category, geometry, most_used(geometry))
+    return without_stage(stage, lambda layer: _add_arcs(layer, name, geometry))
+
+
+def _write_levels(stage: Usd.Stage, name: str, geometry: Geometry) -> None:
+    """The variant set `LOD`: all faces, few faces where there are such meshes, or the colliders in place of them."""
+    variants = stage.GetPrimAtPath(f"/{name}").GetVariantSets().AddVariantSet(LOD)
+    for level in (HIGH, LOW, PROXY) if geometry.coarse else (HIGH, PROXY):
+        variants.AddVariant(level)
+    variants.SetVariantSelection(PROXY)
+    with variants.GetVariantEditContext():
+        for part in geometry.parts:
+            mesh = stage.OverridePrim(piece_path(f"/{name}", name, part.name, part.body))
+            UsdGeom.Imageable(mesh).CreateVisibilityAttr(UsdGeom.Tokens.invisible)
+        for collider in geometry.colliders:
+            guide = stage.OverridePrim(piece_path(f"/{name}", name, collider.name, collider.body))
+            UsdGeom.Imageable(guide).CreatePurposeAttr(UsdGeom.Tokens.default_)
+            UsdShade.MaterialBindingAPI.Apply(guide)
+            guide.CreateRelationship("material:binding", False).SetTargets(
+                [Sdf.Path(f"/{name}/{MTL}/{most_used(geometry)[0]}")]
+            )
+    variants.SetVariantSelection(HIGH)
+
+
+def most_used(geometry: Geometry) -> list[str]:
+    """Material slots of all parts, the one with most surface first."""
+    area: dict[str, float] = {}
+    for part in geometry.parts:
+        for slot, faces in part.slots.items():
+            area[slot] = area.get(slot, 0.0) + float(part.mesh.area_faces[faces].sum())
+    return sorted(area, key=lambda slot: (-area[slot], slot))
+
+
+def slot_paths(root: str, slots: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Prim path -> material slot: the part's mesh where it has one slot, a subset of it for each of several.
+
+    Arguments:
+        root: path of the asset's root prim, or of an object that references it.
+        slots: path of a part below that -> its material slots.
+    """
+    out: dict[str, str] = {}
+    for part, names in slots.items():
+        mesh = f"{root}{part}"
+        out |= {f"{mesh}/{slot}" if len(names) > 1 else mesh: slot for slot in names}
+    return out
+
+
+def _add_arcs(layer: Sdf.Layer, name: str, geometry: Geometry) -> None:
+    """The payloads, and a class whose opinions, in whatever stage, reach all users of the asset."""
+    classes = Sdf.PrimSpec(layer, CLASSES, Sdf.SpecifierClass)
+    Sdf.PrimSpec(classes, name, Sdf.SpecifierClass)
+    layer.GetPrimAtPath(f"/{name}").inheritPathList.prependedItems.append(Sdf.Path(class_path(name)))
+    if geometry.theirs_collides:
+        return
+    if geometry.coarse:
+        # a payload inside a variant is stronger than the one beside it, so that its meshes win
+        variant = layer.GetPrimAtPath(f"/{name}").variantSets[LOD].variants[LOW].primSpec
+        variant.payloadList.prependedItems.append(Sdf.Payload(f"./{coarse_name(name)}", Sdf.Path(f"/{name}")))
+    payload = Sdf.Payload(f"./{payload_name(name)}", Sdf.Path(f"/{name}"))
+    layer.GetPrimAtPath(f"/{name}").payloadList.prependedItems.append(payload)

@@ -1,0 +1,85 @@
+"""Cameras that belong to a room: a view from above and one from a corner."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom
+
+from echomodel.openings import inward_normal, segment
+from echomodel.vocabulary import vocabulary
+from echousd.draw.sight import Furniture
+from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view
+from echousd.layers.volume import Volume
+from echousd.room import RoomData
+
+FAR = 10.0  # widths of the room that the camera above is away: heights hardly show
+TENTHS = 0.01  # what a millimetre is in USD's lens unit, tenths of a scene unit, here of a metre
+MAIN = ("bed", "sofa", "board", "screen")  # roles: what a picture of a room is about, the first that is there
+
+
+def main_piece(categories: Sequence[str], furniture: Furniture) -> int | None:
+    """Row of the largest bed, else sofa, table or screen; None where there is none of these."""
+    roles = [vocabulary().category(word).role for word in categories]
+    found = [i for role in MAIN for i in sorted(
+        (i for i, own in enumerate(roles) if own == role), key=lambda i: -furniture.size[i].prod()
+    )]  # fmt: skip
+    return found[0] if found else None
+
+
+def opening_boxes(room: RoomData) -> Furniture:
+    """Doors, windows and passages as boxes of 2 cm at the inner side of their walls."""
+    corners, rows = room.graph.room.corners, []
+    for opening in room.graph.room.openings if corners is not None else ():
+        x, z = segment(corners, opening).mean(0)
+        yaw = np.arctan2(*inward_normal(corners, opening.edge))
+        rows.append((opening.width, opening.height, 0.02, x, opening.sill, z, yaw))
+    table = np.array(rows, float).reshape(-1, 7)
+    return Furniture(table[:, :3], table[:, 3:6], table[:, 6])
+
+
+def write_cameras(
+    stage: Usd.Stage,
+    volume: Volume,
+    points: np.ndarray,
+    furniture: Furniture,
+    walled: np.ndarray | None = None,
+    hung: Furniture | None = None,
+    openings: Furniture | None = None,
+    main: int | None = None,
+) -> None:
+    """Author `/Room/Cameras/top` (from afar, -Z up in the picture) and `/Room/Cameras/perspective`.
+
+    Arguments:
+        stage: receives the cameras.
+        volume: of the room. points, furniture: see `perspective_view`.
+        walled: corners of the floor of a room with walls; its perspective camera stands inside.
+        hung: what hangs or stands at the walls and must not fill that camera's picture. openings: doors and windows.
+        main: row of the furniture that this camera has whole in its picture.
+    """
+    UsdGeom.Scope.Define(stage, "/Room/Cameras")
+    top = UsdGeom.Camera.Define(stage, "/Room/Cameras/top")
+    # from afar rather than orthographic, whose width Blender takes for ten times what it is
+    width = float((volume.upper - volume.lower)[[0, 2]].max()) * MARGIN
+    height = float(volume.upper[1]) + FAR * width
+    top.CreateFocalLengthAttr(FAR * APERTURE * TENTHS)
+    for aperture in (top.CreateHorizontalApertureAttr(), top.CreateVerticalApertureAttr()):
+        aperture.Set(APERTURE * TENTHS)
+    top.CreateFocusDistanceAttr(height)
+    top.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height, float(volume.centre[2])))
+    top.AddRotateXOp().Set(-90.0)
+    top.CreateClippingRangeAttr(Gf.Vec2f(0.5 * FAR * width, height + 1.0))
+    camera = UsdGeom.Camera.Define(stage, "/Room/Cameras/perspective")
+    if walled is not None:
+        matrix, lens = inside_view(walled, furniture, float(volume.upper[1]), hung, openings, main)
+    else:
+        matrix, lens = perspective_view(points, furniture), FOCAL_LENGTH
+    camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
+    camera.CreateFocalLengthAttr(lens * TENTHS)
+    camera.CreateHorizontalApertureAttr(APERTURE * TENTHS)
+    camera.CreateVerticalApertureAttr(APERTURE * TENTHS)
+    distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
+    sharp = volume.centre if main is None else furniture.corners[main].mean(0)
+    camera.CreateFocusDistanceAttr(float(np.linalg.norm(matrix[:3, 3] - sharp)))
+    camera.CreateClippingRangeAttr(Gf.Vec2f(0.05, 4 * distance + 10.0))

@@ -1,0 +1,365 @@
+"""All files of a layered room as bytes, without touching the disk: the same room gives the same bytes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
+
+import echousd
+from echomodel.dressing import KINDS
+from echousd.draw.sight import Furniture
+from echousd.draw.thumbnails import thumbnails
+from echousd.dressing import Dressing, dress
+from echousd.folder.stored import Shelf
+from echousd.layers import (
+    assets,
+    attribution,
+    cameras,
+    component,
+    coverings,
+    lights,
+    materials,
+    materialx,
+    physics,
+    structure,
+)
+from echousd.layers.dressing import dressing_layer
+from echousd.layers.placing import place_layouts
+from echousd.layers.volume import room_points, room_volume
+from echousd.naming import free_name
+from echousd.room import RoomData
+from echousd.shapes import joints, looks
+from echousd.shapes.geometry import LICENCE, Geometry
+from echousd.shapes.styles import ROOM_STYLE
+from echousd.shapes.surface import surface
+from echousd.stage import graph_layer as write_graph_layer
+from echousd.stage.encoding import relation_name
+from echousd.stage.files import layer_bytes, new_stage
+from echousd.stage.paths import (
+    OBJECTS,
+    SHELL,
+    class_path,
+    coarse_file,
+    component_file,
+    layer_file,
+    payload_file,
+    piece_path,
+)
+from echousd.stage.taxonomy import ade20k, word_of
+from echousd.stage.turning import turn_up
+
+LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
+
+
+@dataclass(frozen=True)
+class Asset:
+    """One piece of furniture, ready to be written: path of a part below its root -> material slots, and the files."""
+
+    name: str
+    slots: Mapping[str, Sequence[str]]
+    files: Mapping[str, bytes]
+
+
+def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None = None) -> dict[str, bytes]:
+    """Relative path -> content of everything that a room consists of, except the preview and the manifest.
+
+    Arguments:
+        shelf: takes assets and images, which are not among the files then.
+        folder: where the room will lie, which paths of models outside of it are relative to; None = the present one.
+    """
+    files: dict[str, bytes] = {}
+    made: dict[str, Asset] = {}
+    for name, user in room.asset_users.items():
+        made[name] = _asset(room, name, user, shelf, (folder or Path.cwd()) / "assets" / name)
+        files.update(made[name].files)
+    files |= attribution.files(room)
+    dressing = dress(room)
+    small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
+    for asset in small.values():
+        files.update(asset.files)
+    if room.options.thumbnails:
+        files |= thumbnails(files, [*made, *small])
+    built = structure.shell_prims(room, dressing.bare)
+    harmony = room.options.palette or looks.palette_of_room(room.provenance.seed)
+    slots = _slots(small)
+    table, bindings = room_looks(room, made, built, slots, harmony)
+    files |= materials.texture_files(table, harmony)
+    files |= lights.image_files(room)
+    layers = {
+        "geometry": geometry_layer(room),
+        "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell")),
+        "graph": graph_layer(room),
+        "layout": layout_layer(room),
+        "physics": physics_layer(room, built),
+        "materials": materials_layer(room, made, built, small, bindings, harmony),
+    }
+    if room.options.dress != "none":
+        looks_of = {slot: f"{ROOM_STYLE}_{slot}" for slot in slots}
+        parts = {name: asset.slots for name, asset in small.items()}
+        layers["dressing"] = dressing_layer(
+            dressing, parts, looks_of, layer_data(room, f"{room.name}_dressing"), instances=room.options.instances,
+            taken=[relation_name(*relation.triple) for relation in room.graph.relations],
+        )  # fmt: skip
+    if shelf is not None:
+        shelf.put(files)
+        files = {path: content for path, content in files.items() if not shelf.holds(path)}
+    for name, layer in layers.items():
+        if shelf is not None:
+            shelf.redirect(layer)
+        path = layer_file(name, crate=room.options.crate)
+        files[path] = _bytes(room, layer, path)
+    root = root_layer(room, dressing.hung)
+    if shelf is not None:
+        shelf.redirect(root, above=".")
+    files[f"{room.name}.usda"] = _bytes(room, root, ".usda")
+    return files
+
+
+def layer_data(room: RoomData, name: str) -> dict[str, Any]:
+    """The customLayerData of a layer: who made it, from what, and under which licence."""
+    return {
+        "asset_name": name,
+        "generator": f"echousd {echousd.__version__}",
+        "seed": room.provenance.seed,
+        "model": room.provenance.model,
+        "asset_license": LICENCE,
+    }
+
+
+def simready_data(room: RoomData) -> dict[str, Any]:
+    """What SimReady's profiles ask of a root layer besides; the date is the earliest there is, as in our archives."""
+    told = {"asset_type": "Scene", "source_file": room.provenance.source or "none", "usd_date_generated": "1980-01-01"}
+    return {**told, "SimReady_Metadata": dict(told)}
+
+
+def geometry_layer(room: RoomData) -> Sdf.Layer:
+    """`layers/geometry.usda`: every object references its asset."""
+    stage = _room_stage(room, "geometry")
+    root = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
+    for path in (OBJECTS, SHELL):
+        Usd.ModelAPI(UsdGeom.Xform.Define(stage, path)).SetKind(Kind.Tokens.group)
+    for node in room.graph.nodes:
+        prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
+        _label(prim, "ade20k", ade20k(word_of(node)))
+        if node.name in instanced(room):
+            prim.SetInstanceable(True)
+    return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
+
+
+def instanced(room: RoomData) -> frozenset[str]:
+    """Names of the objects that are instances: those of ours whose asset has another user, where that is asked for."""
+    users = Counter(room.assets.values())
+    shared = {name for name, asset in room.assets.items() if users[asset] > 1 and room.geometry[name].original is None}
+    return frozenset(shared if room.options.instances else ())
+
+
+def graph_layer(room: RoomData) -> Sdf.Layer:
+    """`layers/graph.usda`: nodes, labels and relations, as asked for."""
+    layer = write_graph_layer(room.graph)
+    layer.customLayerData = {**layer.customLayerData, **layer_data(room, f"{room.name}_graph")}
+    return layer
+
+
+def layout_layer(room: RoomData) -> Sdf.Layer:
+    """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
+    stage = _room_stage(room, "layout")
+    UsdGeom.SetStageUpAxis(stage, room.options.up_axis)  # its places are so already
+    stage.OverridePrim("/Room")
+    place_layouts(stage, room)
+    return stage.GetRootLayer()
+
+
+def physics_layer(room: RoomData, built: Sequence[structure.ShellPrim]) -> Sdf.Layer:
+    """`layers/physics.usda`: the scene, the shell, its doors' hinges; the furniture's physics is in its assets."""
+    stage = _room_stage(room, "physics")
+    stage.OverridePrim("/Room")
+    forms = {True: "convexHull", False: "none"}  # what may turn, what stands as it is
+    solid = {mesh.path: forms[part.joint is not None] for part in built for mesh in part.meshes if mesh.solid}
+    physics.write_physics(stage, solid)
+    for part in built:
+        if part.joint and part.mass:
+            joints.write_hinge(stage, part.path, part.joint, part.mass)
+    return stage.GetRootLayer()
+
+
+def room_looks(
+    room: RoomData,
+    made: Mapping[str, Asset],
+    built: Sequence[structure.ShellPrim],
+    small: Collection[str],
+    harmony: str,
+) -> tuple[dict[str, looks.Look], dict[str, str]]:
+    """Material name -> look in a harmony, and prim path -> material name; the dressing binds its own.
+
+    Arguments:
+        made: the furniture. built: the shell. small: material slots of the dressing. harmony: of the whole room.
+    """
+    table: dict[str, looks.Look] = {}
+    bindings: dict[str, str] = {}
+    voices, slugs, alike = {ROOM_STYLE: 0}, _slugs(room), instanced(room)
+    for node in room.graph.nodes:
+        asset, style = room.assets[node.name], room.styles[node.name]
+        slug = slugs[style]
+        voice = voices.setdefault(style, len(voices))
+        above = class_path(asset) if node.name in alike else f"{OBJECTS}/{node.name}"
+        for path, slot in assets.slot_paths(above, made[asset].slots).items():
+            name = f"{slug}_{slot}"
+            table[name] = looks.look(harmony, slot, voice)
+            bindings[path] = name
+    table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
+    table |= {slot: looks.look(harmony, slot) for slot in ("wall", "wallpaper")} | structure.LOOKS
+    table["floor"] = looks.look(harmony, coverings.floor_slot(room))
+    paper = {"wall": "wallpaper"} if (papered := coverings.papered_wall(room)) else {}
+    for part in built:
+        own = paper if part.path == f"{SHELL}/{papered}" else {}
+        bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
+    used = {*bindings.values(), *(f"{ROOM_STYLE}_{slot}" for slot in small)}
+    return {name: look for name, look in table.items() if name in used}, bindings
+
+
+def materials_layer(
+    room: RoomData,
+    made: Mapping[str, Asset],
+    built: Sequence[structure.ShellPrim],
+    small: Mapping[str, Asset],
+    bindings: Mapping[str, str],
+    harmony: str,
+) -> Sdf.Layer:
+    """`layers/materials.usda`: materials, bindings, and the variant set `palette`; arguments as for `room_looks`."""
+    stage = _room_stage(room, "materials")
+    stage.OverridePrim("/Room")
+    slots = _slots(small)
+    tables = {name: room_looks(room, made, built, slots, name)[0] for name in looks.PALETTES}
+    materials.write_looks(stage, tables[harmony], bindings, also=tables[harmony], harmony=harmony, tinted=True)
+    for asset in sorted({room.assets[name] for name in instanced(room)}):
+        assets.as_class(stage, asset)
+    materials.write_palettes(stage, harmony, tables)
+    if room.options.materialx:
+        materialx.write_networks(stage, harmony, tables)
+    return stage.GetRootLayer()
+
+
+def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
+    """The root layer: metadata, sublayers, lights and cameras; `hung`: what stands in a camera's way at walls."""
+    stage = _room_stage(room, "")
+    layer = stage.GetRootLayer()
+    layer.customLayerData = {**layer.customLayerData, **simready_data(room)}
+    layer.documentation = (
+        "A room made by EchoUSD. Put your own opinions into a stronger layer; layers/ is rewritten. "
+        "Readers that compose no sublayers (three.js, tinyusdz) need `echousd export` of it."
+    )
+    prim = UsdGeom.Xform.Define(stage, "/Room").GetPrim()
+    Usd.ModelAPI(prim).SetKind(Kind.Tokens.assembly)
+    Usd.ModelAPI(prim).SetAssetName(room.name)
+    seen = room_volume(room)
+    low, high = (Gf.Vec3f(*map(float, corner)) for corner in (seen.lower, seen.upper))
+    UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
+    furniture = Furniture(*(np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw)))
+    lights.write_lights(stage, room, seen)
+    walled = room.floor if room.options.walls else None
+    main = cameras.main_piece([node.category for node in room.graph.nodes], furniture)
+    cameras.write_cameras(stage, seen, room_points(room), furniture, walled, hung, cameras.opening_boxes(room), main)
+    names = [name for name in LAYERS if name != "dressing" or room.options.dress != "none"]
+    paths = [f"./{layer_file(name, crate=room.options.crate)}" for name in names]
+    return assets.without_stage(stage, lambda layer: setattr(layer, "subLayerPaths", paths))
+
+
+def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
+    for name, asset in references.items():
+        prim = layer.GetPrimAtPath(f"{OBJECTS}/{name}")
+        prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
+
+
+def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:
+    geometry = room.geometry[user]
+    if geometry.original is not None:
+        if shelf is not None:  # a model lies once in the store, however many rooms place it in whatever size
+            kept = shelf.kept_apart(name, geometry.original.files, geometry.original.main)
+            original = replace(geometry.original, layer=kept, files={}) if kept else geometry.original
+            geometry, folder = replace(geometry, original=original), shelf.place
+        assert geometry.original is not None
+        if name in room.carried:
+            return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
+        data = _asset_data(room, name, geometry)
+        word, axis = word_of(room.graph.node(user)), room.options.up_axis
+        return Asset(name, {}, component.files(name, word, geometry, data, folder, axis))
+    if name in room.carried:
+        carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
+        return Asset(name, carried, room.carried[name])
+    return _written(room, name, word_of(room.graph.node(user)), room.styles[user], geometry)
+
+
+def _small_asset(room: RoomData, name: str, dressing: Dressing) -> Asset:
+    return _written(room, name, KINDS[dressing.kinds[name]].name, ROOM_STYLE, dressing.geometry[name])
+
+
+def _written(room: RoomData, name: str, category: str, style: str, geometry: Geometry) -> Asset:
+    forms = {
+        piece_path("", name, part.name, part.body): surface(
+            part.mesh, part.slots, atlas=room.options.atlas, crease=part.crease
+        )
+        for part in geometry.parts
+    }
+    slots = {part: tuple(form.groups) for part, form in forms.items()}
+    extents = np.stack([form.extent for form in forms.values()])
+    extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
+    data = _asset_data(room, name, geometry)
+    payload = assets.geometry_layer(name, forms, geometry, data, style)
+    layer = assets.component_layer(name, category, extent, geometry, data)
+    coarse = {
+        piece_path("", name, part.name, part.body): surface(part.mesh, part.slots, crease=part.crease)
+        for part in geometry.coarse
+    }
+    low = {coarse_file(name): _bytes(room, assets.coarse_layer(name, coarse, data), ".usdc")} if coarse else {}
+    files = {
+        **low,
+        payload_file(name): _bytes(room, payload, ".usdc"),
+        component_file(name): _bytes(room, layer, ".usda"),
+    }
+    return Asset(name, slots, files)
+
+
+def _bytes(room: RoomData, layer: Sdf.Layer, path: str) -> bytes:
+    """A layer of the room as it lies on disk, with the room's up axis; `path` ends as its file does."""
+    return layer_bytes(turn_up(layer) if room.options.up_axis == "Z" else layer, path[-5:])
+
+
+def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]:
+    """The customLayerData of an asset's layers."""
+    data = {key: value for key, value in layer_data(room, name).items() if key not in ("seed", "model")}
+    data["asset_license"] = geometry.origin.licence
+    if geometry.origin.credit:
+        data["asset_credit"] = geometry.origin.credit
+    return data
+
+
+def _slugs(room: RoomData) -> dict[str, str]:
+    """Style -> the first word of its materials' names; styles that differ in what no name may hold stay apart."""
+    out: dict[str, str] = {}
+    for style in (room.styles[node.name] for node in room.graph.nodes):
+        if style not in out:
+            word = "".join(c if Sdf.Path.IsValidIdentifier(f"a{c}") else "_" for c in style)
+            word = word if word[:1].isalpha() else f"style_{word}"
+            out[style] = free_name(word, {ROOM_STYLE, *out.values()} - {style})
+    return out
+
+
+def _slots(made: Mapping[str, Asset]) -> list[str]:
+    """Material slots of assets, each once, in an order that no hash seed changes."""
+    return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
+
+
+def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:
+    UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+
+
+def _room_stage(room: RoomData, layer: str) -> Usd.Stage:
+    name = f"{room.name}_{layer}" if layer else room.name
+    return new_stage("Room", ".usda", layer_data(room, name))

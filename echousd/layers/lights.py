@@ -1,0 +1,168 @@
+"""Lights of a room: a sky, a soft panel below the ceiling, the sun through a window, and every lamp of the graph.
+
+The variant set `light` of `/Room` dims them for `day`, `evening` and `night`; intensities stand in its variants alone,
+as a light's own opinion would be stronger than theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import shapely
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+
+from echomodel.boxes import Boxes
+from echomodel.openings import inward_normal, segment
+from echomodel.vocabulary import vocabulary
+from echousd.draw.views import view_matrix
+from echousd.layers.volume import Volume
+from echousd.room import RoomData
+from echousd.shapes.finishes import baking
+
+LIGHTS = "/Room/Lights"
+NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
+LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # of a lamp, by what it rests on
+# Of sky and panel: without walls, with walls, which throw back what they get, and below a ceiling, where the sky is
+# seen through the windows alone.
+SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
+SKY = "textures/sky.jpg"
+BULB = 0.04  # metres, radius
+# Kelvin. White is 6504 to a renderer, which adapts to nothing as eyes do: lamps of 2,900 K would turn a room orange.
+DAYLIGHT, BULBS = 6500.0, 4700.0
+# Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
+# walls without a ceiling, which have the sky already, so much would leave them blank.
+SUN, OVERHEAD = 1.4, 0.55
+ELEVATION, ASIDE = np.radians(38.0), 0.35  # of the sun over the horizon, and how far it comes from the side
+# What is left of sky, sun and lamps.
+TIMES: Mapping[str, tuple[float, float, float]] = {
+    "day": (1.0, 1.0, 0.15),
+    "evening": (0.16, 0.0, 1.0),
+    "night": (0.02, 0.0, 1.0),
+}
+# Lumens on a square metre of floor: what people have on at a time (the panel gives what the lamps do not, at least
+# `FILL`), and from where on a camera would expose less.
+LIT, FILL, BRIGHT = {"evening": 85.0, "night": 75.0}, 20.0, 160.0
+Intensities = dict[Sdf.Path, tuple[int, float]]  # light -> its column of `TIMES`, intensity at full
+
+
+def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
+    """Author `/Room/Lights` and the variant set `light`, with `day` chosen.
+
+    Radiances are for a camera whose imaging ratio is 1 (UsdGeomCamera's default): a white surface under sky and panel
+    comes to about 1, so nothing is blown out. Lamps are in the same scale, `NITS` to 1, from their lumens.
+
+    Arguments:
+        stage: receives the lights.
+        room: whose lamps and windows these are.
+        volume: of the room, metres.
+    """
+    UsdGeom.Scope.Define(stage, LIGHTS)
+    sky = UsdLux.DomeLight.Define(stage, f"{LIGHTS}/sky")
+    sky.CreateColorAttr(Gf.Vec3f(1.0, 0.97, 0.93) if room.options.walls else Gf.Vec3f(0.95, 0.98, 1.0))
+    if room.options.walls:  # who looks out of a window or over a wall sees something
+        sky.CreateTextureFileAttr(Sdf.AssetPath(f"./{SKY}"))
+        sky.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
+    kind = "open" if not room.options.walls else "ceiling" if room.options.ceiling else "walls"
+    above, share = SHARES[kind]
+    panel, flux = _panel(stage, volume, room.height)
+    full: Intensities = {sky.GetPath(): (0, 0.5 * above)}
+    if room.options.walls:
+        full |= _sun(stage, room)
+    lamps = _lamps(stage, room)
+    full |= lamps
+    area = shapely.Polygon(room.floor).area
+    lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / area
+    times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
+    for name, shares in TIMES.items():
+        times.AddVariant(name)
+        times.SetVariantSelection(name)
+        exposed, radiance = 1.0, share * min(20.0, 1.6 * room.height**2 * np.pi * NITS / flux)
+        if name in LIT:
+            exposed = min(1.0, BRIGHT / max(lumens, 1.0))
+            radiance = max(LIT[name] - lumens, FILL) * area / flux
+        with times.GetVariantEditContext():
+            UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
+            for path, (column, intensity) in full.items():
+                light = UsdLux.LightAPI(stage.OverridePrim(path))
+                light.CreateIntensityAttr(round(intensity * shares[column] * exposed, 4))
+    times.SetVariantSelection("day")
+
+
+def image_files(room: RoomData) -> dict[str, bytes]:
+    """Path in the room's folder -> image that its lights name."""
+    return {SKY: baking.sky_image()} if room.options.walls else {}
+
+
+def _panel(stage: Usd.Stage, volume: Volume, height: float) -> tuple[Sdf.Path, float]:
+    """A panel below the ceiling, and its lumens at radiance 1; of radiance L and area A it lights the floor with about
+    L A / h²."""
+    panel = UsdLux.RectLight.Define(stage, f"{LIGHTS}/ceiling")
+    side = 0.3 * (volume.upper - volume.lower)[[0, 2]]
+    width, depth = (max(float(s), 0.5) for s in side)
+    panel.CreateWidthAttr(width)
+    panel.CreateHeightAttr(depth)
+    panel.CreateEnableColorTemperatureAttr(True)
+    panel.CreateColorTemperatureAttr(DAYLIGHT)
+    panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
+    panel.AddRotateXOp().Set(-90.0)
+    return panel.GetPath(), np.pi * NITS * width * depth
+
+
+def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
+    """The sun through the widest window, from a little aside."""
+    corners = room.graph.room.corners
+    windows = [opening for opening in room.graph.room.openings if opening.kind == "window"]
+    if corners is None or not windows:
+        return {}
+    window = max(windows, key=lambda opening: opening.width * opening.height)
+    near, far = segment(corners, window)
+    level = inward_normal(corners, window.edge) + ASIDE * (far - near) / window.width
+    level = level / np.linalg.norm(level) * np.cos(ELEVATION)
+    way = np.array([level[0], -np.sin(ELEVATION), level[1]])
+    sun = UsdLux.DistantLight.Define(stage, f"{LIGHTS}/sun")
+    sun.CreateAngleAttr(0.53)
+    sun.CreateNormalizeAttr(True)  # intensity is irradiance, whatever the disc's size
+    sun.CreateEnableColorTemperatureAttr(True)
+    sun.CreateColorTemperatureAttr(DAYLIGHT - 700)
+    matrix = view_matrix(-way, np.zeros(3))
+    matrix[:3, 3] = 0.0
+    sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
+    return {sun.GetPath(): (1, SUN if room.options.ceiling else OVERHEAD)}
+
+
+def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
+    """A bulb for every lamp: below what hangs, over the shade of what stands; in every layout where its lamp is."""
+    full: Intensities = {}
+    for node in room.graph.nodes:
+        row = vocabulary().category(node.category)
+        if row.role != "light":
+            continue
+        bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
+        bulb.CreateRadiusAttr(BULB)
+        bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
+        bulb.CreateEnableColorTemperatureAttr(True)
+        bulb.CreateColorTemperatureAttr(BULBS)
+        bulb.AddTranslateOp()
+        full[bulb.GetPath()] = (2, LUMENS[row.support] / (np.pi * NITS))
+    if len(room.layouts) < 2:
+        _hang_bulbs(stage, room, room.boxes)
+        return full
+    layouts = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
+    for number, boxes in enumerate(room.layouts):
+        layouts.AddVariant(f"layout_{number}")
+        layouts.SetVariantSelection(f"layout_{number}")
+        with layouts.GetVariantEditContext():
+            _hang_bulbs(stage, room, boxes)
+    layouts.ClearVariantSelection()  # the layer of the layout says which one is seen
+    return full
+
+
+def _hang_bulbs(stage: Usd.Stage, room: RoomData, boxes: Boxes) -> None:
+    for number, node in enumerate(room.graph.nodes):
+        row = vocabulary().category(node.category)
+        if row.role == "light":
+            x, y, z = (float(v) for v in boxes.position[number])
+            height = y - 0.06 if row.support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
+            over = stage.OverridePrim(f"{LIGHTS}/lamp_{node.name}")
+            over.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(x, height, z))

@@ -1,0 +1,132 @@
+"""The shell of a room as prims: which parts it has, their surfaces, and how they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
+
+from echomodel.furniture.solids import Joint
+from echousd.layers import assets
+from echousd.room import RoomData
+from echousd.shapes.finishes.harmonies import linear
+from echousd.shapes.geometry import Mass
+from echousd.shapes.looks import Look
+from echousd.shapes.shell import floor_mesh
+from echousd.shapes.surface import Surface, surface
+from echousd.shapes.walls import Piece, ShellPart, ceiling, walls
+from echousd.stage.files import new_stage
+from echousd.stage.paths import SHELL, piece_name
+from echousd.stage.taxonomy import ade20k
+
+LEAF = 320.0  # kg/m³ of a door's leaf
+LOOKS = {
+    "ceiling": Look(linear("f6f4f0"), 0.95),
+    "trim": Look(linear("f7f5f1"), 0.4),
+    "leaf": Look(linear("efebe3"), 0.4),
+    "rail": Look(linear("8e9194"), 0.35, metallic=0.85),
+    "glass": Look(linear("d6e6ee"), 0.05, opacity=0.06),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ShellMesh:
+    """One mesh of the shell, ready to be written: prim path, material, surface, whether things bump into it."""
+
+    path: str
+    look: str
+    form: Surface
+    solid: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ShellPrim:
+    """A part of the shell with its meshes; a door or a window stands below its wall, a leaf below its door.
+
+    What has a joint has its origin at the joint's anchor; `mass` of it is that of its body.
+    """
+
+    path: str
+    label: str
+    kind: str
+    meshes: tuple[ShellMesh, ...]
+    extent: np.ndarray
+    joint: Joint | None = None
+    mass: Mass | None = None
+
+    @property
+    def at(self) -> np.ndarray:
+        """(3,) float, its origin in the frame of the part above, metres."""
+        return np.array(self.joint.anchor) if self.joint else np.zeros(3)
+
+
+def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[ShellPrim]:
+    """All parts of a room's shell, walls before what is in them; `bare`: windows that need no curtain rail."""
+    corners = room.graph.room.corners
+    plan = room.floor if corners is None else corners
+    slab = Piece(piece_name("Floor", "mesh"), "floor", floor_mesh(room.floor))
+    parts = [ShellPart("Floor", "floor", (slab,))]
+    if room.options.walls:
+        parts += walls(plan, room.height, room.graph.room.openings, bare)
+    if room.options.ceiling:
+        parts.append(ceiling(plan, room.height))
+    return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]
+
+
+def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any]) -> Sdf.Layer:
+    """`layers/shell.usdc`: floor, walls and what is in them, as meshes; `data`: customLayerData."""
+    stage = new_stage("Room", ".usdc", data)
+    for path in ("/Room", SHELL):
+        UsdGeom.Xform.Define(stage, path)
+    write_shell(stage, built)
+    return stage.GetRootLayer()
+
+
+def write_shell(stage: Usd.Stage, prims: Sequence[ShellPrim]) -> None:
+    """Author the parts with kind, labels and extents, and their meshes."""
+    for part in prims:
+        xform = UsdGeom.Xform.Define(stage, part.path)
+        prim = xform.GetPrim()
+        if part.joint:  # a pivot to turn
+            xform.AddTranslateOp().Set(Gf.Vec3d(*part.joint.anchor))
+            xform.AddRotateYOp().Set(0.0)
+        Usd.ModelAPI(prim).SetKind(part.kind)
+        low, high = (Gf.Vec3f(*map(float, corner)) for corner in part.extent)
+        UsdGeom.ModelAPI.Apply(prim).SetExtentsHint([low, high])
+        for taxonomy, word in (("category", part.label), ("ade20k", ade20k(part.label))) if part.label else ():
+            UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
+        for mesh in part.meshes:
+            assets.write_mesh(stage, mesh.path, mesh.form)
+
+
+def _prims(part: ShellPart, above: str, kind: str) -> Iterator[ShellPrim]:
+    path = f"{above}/{part.name}"
+    at = np.array(part.joint.anchor) if part.joint else np.zeros(3)
+    meshes = tuple(_mesh(piece, path, at) for piece in part.pieces)
+    inner = [list(_prims(each, path, Kind.Tokens.subcomponent)) for each in part.inner]
+    extents = np.stack([mesh.form.extent for mesh in meshes] + [prims[0].extent + prims[0].at for prims in inner])
+    extent = np.stack([extents[:, 0].min(0), extents[:, 1].max(0)])
+    mass = _mass([piece for piece in part.pieces if piece.solid], at) if part.joint else None
+    yield ShellPrim(path, part.label, kind, meshes, extent, part.joint, mass)
+    for prims in inner:
+        yield from prims
+
+
+def _mesh(piece: Piece, above: str, at: np.ndarray) -> ShellMesh:
+    mesh = piece.mesh
+    if at.any():
+        mesh = mesh.copy()
+        mesh.apply_translation(-at)
+    form = surface(mesh, {piece.look: np.arange(len(mesh.faces))})
+    return ShellMesh(f"{above}/{piece.name}", piece.look, form, piece.solid)
+
+
+def _mass(pieces: Sequence[Piece], at: np.ndarray) -> Mass:
+    """Of a leaf, as light as a hollow door."""
+    hull = trimesh.Trimesh(np.concatenate([piece.mesh.vertices for piece in pieces])).convex_hull
+    moments, axes = np.linalg.eigh(LEAF * np.asarray(hull.moment_inertia))
+    return Mass(round(LEAF * float(hull.volume), 2), hull.center_mass - at, moments, axes)

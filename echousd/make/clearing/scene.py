@@ -1,0 +1,205 @@
+"""A furnished room as solids that slide in plan: what overlaps, where each may go, and what goes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+import trimesh
+from shapely.affinity import translate
+from shapely.geometry.base import BaseGeometry
+
+from echomodel.boxes import Boxes
+from echomodel.objective.support import carriers
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+from echousd.repair.repair import DEFAULT_HEIGHT
+from echousd.shapes.geometry import Geometry
+from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
+from echousd.shapes.surface import connected_pieces
+from echousd.shapes.walls import ShellPart
+from echousd.shapes.walls import walls as walls_of
+
+REACH = 0.5  # metres that a piece is moved at most in all
+EDGE = 0.002  # metres beyond the floor, or beyond what it stands on, that a piece may be
+ASIDE = 2.0  # a seat moves back from its table more easily than aside
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that can be in the way; numbers from n on are parts of the shell, which stays.
+
+    Arguments:
+        solids: corners of the convex pieces of every thing in the room, metres.
+        fixed: (n,) bool, what must not move. carrier: (n,) int, as `Problem.carrier`.
+        heading: (n,) float, yaw in radians. seat: (n,) bool. bulk: (n,) float, square root of the footprint, metres.
+        outline: n polygons, footprints. floor: the floor, a little wider.
+        level: n polygons, where the top of each is: a desk with a shelf behind has it there alone.
+        bounds: (s, 2, 3) float, boxes of everything.
+        known: pair -> forbidden moves of its first against its second from where both stood at first.
+    """
+
+    solids: Sequence[Solids]
+    fixed: np.ndarray
+    carrier: np.ndarray
+    heading: np.ndarray
+    seat: np.ndarray
+    bulk: np.ndarray
+    outline: Sequence[shapely.Polygon]
+    level: Sequence[BaseGeometry]
+    floor: shapely.Polygon
+    bounds: np.ndarray
+    known: dict[tuple[int, int], BaseGeometry] = field(default_factory=dict)
+
+    def forbidden(self, pair: tuple[int, int]) -> BaseGeometry:
+        """Moves of the first against the second at which they overlap; empty for a thing and what it stands on."""
+        i, k = pair
+        if i > k:
+            turned: BaseGeometry = shapely.transform(self.forbidden((k, i)), np.negative)
+            return turned
+        if pair not in self.known:
+            stands = k < len(self.carrier) and (self.carrier[i] == k or self.carrier[k] == i)
+            found = shapely.Polygon() if stands else forbidden_moves(self.solids[i], self.solids[k], 2 * REACH)
+            self.known[pair] = found
+        return self.known[pair]
+
+    def near(self, one: int, moves: np.ndarray, reach: float) -> list[int]:
+        """What has a box (in plan and height) within a distance in plan of one thing's."""
+        away = np.zeros((len(self.solids), 3))
+        away[: len(moves), [0, 2]] = moves
+        margin = np.array([reach, 0.0, reach])
+        low, high = self.bounds[:, 0] + away - margin, self.bounds[:, 1] + away + margin
+        meet = ((self.bounds[one, 0] + away[one] < high) & (self.bounds[one, 1] + away[one] > low)).all(1)
+        return [int(k) for k in np.flatnonzero(meet) if k != one]
+
+    def overlaps(self, moves: np.ndarray, deep: float) -> list[tuple[tuple[int, int], float]]:
+        """Pairs that reach deeper than `deep` metres into one another after moves (n, 2), deepest first."""
+        found = []
+        for i in range(len(moves)):
+            for k in self.near(i, moves, 0.0):
+                way = moves[i] - moves[k] if k < len(moves) else moves[i]
+                if k > i and (far := depth(self.forbidden((i, k)), way)) > deep:
+                    found.append(((i, k), far))
+        return sorted(found, key=lambda hit: -hit[1])
+
+    def carried(self, mover: int) -> list[int]:
+        """A thing and all that stands on it, and on that."""
+        out = [mover]
+        for one in out:
+            out += [int(i) for i in np.flatnonzero(self.carrier == one) if i not in out and not self.fixed[i]]
+        return out
+
+    def space(self, group: Sequence[int], moves: np.ndarray, gap: float) -> BaseGeometry:
+        """Further moves (x, z) of a group at which it is clear of everything by `gap` metres and stays on the floor."""
+        space: BaseGeometry = shapely.Point(-moves[group[0]]).buffer(REACH)
+        taken = []
+        for one in group:
+            for other in self.near(one, moves, 2 * REACH):
+                if other not in group:
+                    way = moves[one] - moves[other] if other < len(moves) else moves[one]
+                    taken.append(translate(self.forbidden((one, other)), *-way))
+            for corner in self._corners(one, moves):
+                below = self.floor if one != group[0] or self.carrier[one] < 0 else self._top(one, moves)
+                if below.covers(shapely.Point(corner)):
+                    space = space.intersection(translate(below, *-corner))
+        return space.difference(shapely.union_all(taken).buffer(gap, quad_segs=2))
+
+    def price(self, mover: int, way: np.ndarray) -> float:
+        """What a move costs: its length, more for what is large, and for a seat that does not go back."""
+        back = -np.array([np.sin(self.heading[mover]), np.cos(self.heading[mover])])
+        far = float(np.linalg.norm(way))
+        aside = self.seat[mover] and way @ back < 0.9 * far
+        return far * float(self.bulk[mover]) * (ASIDE if aside else 1.0)
+
+    def _corners(self, one: int, moves: np.ndarray) -> np.ndarray:
+        return np.asarray(shapely.get_coordinates(self.outline[one])[:4] + moves[one])
+
+    def _top(self, one: int, moves: np.ndarray) -> BaseGeometry:
+        carrier = int(self.carrier[one])
+        return translate(self.outline[carrier], *moves[carrier]).buffer(EDGE, join_style="mitre")
+
+    def hangs_over(self, one: int, moves: np.ndarray) -> bool:
+        """Whether the middle of a thing is above no level part of what it should stand on."""
+        carrier = int(self.carrier[one])
+        if carrier < 0 or self.fixed[one]:
+            return False
+        level = translate(self.level[carrier], *moves[carrier])
+        return not level.is_empty and not level.buffer(EDGE).contains(shapely.Point(self._corners(one, moves).mean(0)))
+
+    def onto(self, group: Sequence[int], moves: np.ndarray, gap: float) -> BaseGeometry:
+        """Further moves of a group at which its first thing stands on its carrier's level top, whole if possible."""
+        one = group[0]
+        level = translate(self.level[int(self.carrier[one])], *moves[int(self.carrier[one])]).buffer(EDGE)
+        corners, space = self._corners(one, moves), self.space(group, moves, gap)
+        for points in (corners, corners.mean(0, keepdims=True)):
+            found = space
+            for corner in points:
+                found = found.intersection(translate(level, *-corner))
+            if not found.is_empty:
+                break
+        return found
+
+
+def scene_of(
+    graph: SceneGraph, boxes: Boxes, geometry: Mapping[str, Geometry], floor: np.ndarray, *, walls: bool
+) -> Scene:
+    """The scene of a layout; arguments as `cleared`."""
+    nodes, words = graph.nodes, vocabulary()
+    size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
+    kinds = [words.category(node.category) for node in nodes]
+    index = {node.name: number for number, node in enumerate(nodes)}
+    triplets = np.array(
+        [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations], int
+    ).reshape(-1, 3)
+    solids = [
+        [_placed(collider.mesh.vertices, position[i], yaw[i]) for collider in geometry[node.name].colliders]
+        for i, node in enumerate(nodes)
+    ]
+    plan = floor if graph.room.corners is None else graph.room.corners
+    height = graph.room.height or DEFAULT_HEIGHT
+    shell = list(shell_solids(walls_of(plan, height, graph.room.openings))) if walls else []
+    everything = [*solids, *shell]
+    return Scene(
+        everything,
+        np.array([node.locked or node.position is not None for node in nodes]),
+        carriers(kinds, size, position, yaw, triplets),
+        yaw,
+        np.array([kind.role == "seat" for kind in kinds]),
+        np.sqrt(size[:, 0] * size[:, 2]),
+        [shapely.Polygon(corner) for corner in footprints(size, position, yaw)],
+        [_level(pieces) for pieces in solids],
+        shapely.Polygon(floor).buffer(EDGE, join_style="mitre"),
+        np.array([(np.concatenate(pieces).min(0), np.concatenate(pieces).max(0)) for pieces in everything]),
+    )
+
+
+def shell_solids(parts: Sequence[ShellPart]) -> Iterator[Solids]:
+    """Convex pieces of what stands before the walls: sills, casings, leaves; the walls are the floor's edge."""
+    for part in parts:
+        for filled in part.inner:
+            for piece in filled.pieces:
+                if piece.solid:
+                    yield _boards(piece.mesh)
+
+
+def _level(solids: Solids) -> BaseGeometry:
+    """What lies at the height of a thing's top, in plan."""
+    top = max(float(solid[:, 1].max()) for solid in solids)
+    near = [solid[solid[:, 1] > top - FLUSH][:, [0, 2]] for solid in solids]
+    return shapely.union_all([shapely.convex_hull(shapely.multipoints(points)) for points in near if len(points) > 2])
+
+
+def _boards(mesh: trimesh.Trimesh) -> Solids:
+    """Points of the connected pieces of a mesh."""
+    faces, points = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    board = connected_pieces(faces, len(points))
+    return [points[np.unique(faces[board == number])] for number in range(int(board.max()) + 1)]
+
+
+def _placed(points: np.ndarray, position: np.ndarray, yaw: float) -> np.ndarray:
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
+    return np.asarray(points, float) @ turn.T + position

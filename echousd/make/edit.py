@@ -1,0 +1,269 @@
+"""Change the graph of a finished room and make anew only what the change touches."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.loading import load_model
+from echomodel.progress import StageListener
+from echomodel.vocabulary import vocabulary
+from echousd.assets.record import Vector
+from echousd.graph import Node, SceneGraph
+from echousd.graph.floors import with_plan_of
+from echousd.make.clearing import cleared_layouts
+from echousd.make.finished import Room
+from echousd.make.layouts import Draws, best_boxes, check_objects, most_drafts, room_floor, with_sizes
+from echousd.make.reading import SavedRoom, read_room
+from echousd.make.verdicts import layout_outcome, warn_of_faults
+from echousd.naming import free_name
+from echousd.options import OF_NEW, Look, RoomOptions, takes_options
+from echousd.progress import StageTimer
+from echousd.reproducible import one_thread
+from echousd.room import Provenance
+from echousd.shapes.looks import palette_of_room
+from echousd.shapes.merging import merged
+from echousd.shapes.sources import default_source
+from echousd.shapes.sources.mixing import check_sources, mixed_shapes
+from echousd.shapes.sources.retrieval import (
+    Retrieved,
+    anchored,
+    check_files,
+    given_pieces,
+    retrieved,
+    source_of,
+    with_given_sizes,
+)
+from echousd.shapes.sources.source import ShapeRequest
+from echousd.shapes.styles import asset_names, style_groups
+from echousd.tensors import graph_batch
+
+if TYPE_CHECKING:
+    from echomodel.protocols import GraphEdit, RoomModel
+
+
+@takes_options(OF_NEW)
+def edit(
+    root: str | Path,
+    graph: SceneGraph,
+    *,
+    model: RoomModel | str | Path | None = None,
+    outside: Sequence[str | Path] = (),
+    progress: StageListener | None = None,
+    **given: Any,
+) -> Room:
+    """A room whose graph was changed; objects that the change does not touch keep box, mesh and files.
+
+    New objects and objects of another category get boxes and shapes, subjects of new relations (and what stands on
+    them) get new places.
+
+    Arguments:
+        root: root layer of a room that `generate` made.
+        graph: what its graph (`read_room(root).graph`) shall become; a floor or openings that it leaves open stay
+            those of the room.
+        model, outside, progress: as for `generate`.
+        given: options of what is new (`RoomOptions`); `shapes` and `faces` are those of the room where none are given.
+
+    Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
+    `model` is None. Warns where the weights are not those that made the room, and of
+    faults as `generate` does.
+    """
+    if wrong := sorted(given.keys() - set(OF_NEW)):
+        raise ValueError(f"{wrong[0]} is no option of an edit, allowed: {', '.join(OF_NEW)}")
+    given = {name: value for name, value in given.items() if value is not None}
+    RoomOptions(**given)  # what is not allowed is told before the room is read
+    timer = StageTimer(progress)
+    with timer.stage("read"):
+        saved = read_room(root)
+    manifest = saved.manifest
+    look = {name: manifest[name] for name in Look.model_fields}
+    asked = RoomOptions(**{**look, **given})
+    wishes, shapes, model = asked.wishes(outside), asked.shapes, asked.weights if model is None else model
+    check_objects(graph, str(root))
+    beside = Path(root).parent
+    graph = with_plan_of(anchored(graph, beside), saved.graph)
+    fresh, moving = touched(anchored(saved.graph, beside), graph)
+    check_files(graph, beside, wishes, str(root), fresh)
+    styles = style_groups(graph)
+    model_used: RoomModel | None = None
+    change: GraphEdit | None = None
+    pins: list[SceneGraph] = []
+    notes: tuple[str, ...] = ()
+    own = Retrieved()
+    if fresh or moving:
+        with timer.stage("load"), one_thread():
+            model_used = load_model(model, device=asked.device)
+            _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
+        if fresh:
+            made_of = saved.manifest["shapes"]
+            again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and wishes.library is not None)
+            shapes = shapes or (made_of if again else default_source(model_used))
+            check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
+            own = given_pieces(graph, shapes, wishes, fresh)
+        change = graph_edit(saved.graph, graph)
+
+    def laid_out(sizes: Mapping[str, Vector]) -> list[Boxes]:
+        nonlocal notes
+        layouts: list[Boxes] = []
+        pins.clear()
+        for number, before in enumerate(saved.layouts):
+            pinned = with_given_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
+            if layouts:  # one furniture in all layouts
+                pinned = with_sizes(pinned, layouts[0])
+            pins.append(pinned)
+            if model_used is None:
+                layouts.append(_boxes_of(pinned))
+                continue
+            found, told = best_boxes(
+                model_used, pinned, styles, Draws(asked.seed, number, asked.steps, change), repair=asked.repair,
+                drafts=asked.drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
+            )  # fmt: skip
+            layouts.append(found)
+            notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
+        return layouts
+
+    layouts, models = laid_out(own.sizes), own
+    if fresh and shapes is not None:
+        palette = asked.palette or palette_of_room(manifest["seed"])
+        models = retrieved(graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=fresh, palette=palette)
+        layouts = laid_out(models.sizes) if models.sizes != own.sizes else layouts
+        notes = (*models.notes, *notes)
+    geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
+    names = {name: saved.assets[name] for name in geometry}
+    if fresh and shapes is not None:
+        wanted = tuple(name for name in graph.names if name in fresh)
+        request = ShapeRequest(
+            graph, layouts[0], styles, asked.seed, model_used, asked.steps, asked.faces, wanted, dict(geometry), change,
+            timer, models,
+        )  # fmt: skip
+        made = mixed_shapes(request, shapes)
+        shaped = {name: made.geometry[owner] for name, owner in made.owners.items()}
+        geometry |= merged(shaped, asked.merge, asked.faces)
+        names |= asset_names(made.owners, {node.name: node.category for node in graph.nodes})
+    names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
+    geometry = {name: geometry[name] for name in graph.names}
+    floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
+    if asked.repair:
+        with timer.stage("repair"), one_thread():
+            layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
+    room = Room(
+        name=manifest["name"],
+        graph=graph,
+        boxes=layouts[0],
+        geometry=geometry,
+        assets=names,
+        floor=floor,
+        layouts=tuple(layouts),
+        outcomes=outcomes,
+        notes=notes,
+        provenance=_provenance(manifest, model_used),
+        options=asked.replaced(seed=manifest["seed"]),
+        timings=timer.seconds,
+        edited=Path(root),
+        carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
+    )
+    warn_of_faults(room)
+    return room
+
+
+def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
+    """Names of objects that need a box and a shape, and of objects that only need another place."""
+    diff = before.diff(after)
+    fresh = {node.name for node in diff.added}
+    fresh |= {new.name for old, new in diff.changed if _made_of(old) != _made_of(new)}
+    moving = {relation.subject for relation in diff.related}
+    moving |= {new.name for old, new in diff.changed if _placed_at(old) != _placed_at(new)}
+    on = [(r.subject, r.object) for r in after.relations if vocabulary().predicate(r.predicate).follows]
+    for _ in on:  # what stands on something goes with it, and what stands on that
+        moving |= {subject for subject, carrier in on if carrier in moving | fresh}
+    return fresh, {name for name in moving - fresh if not after.node(name).locked}
+
+
+def _placed_at(node: Node) -> tuple[object, ...]:
+    return node.position, node.yaw, node.place, node.between
+
+
+def _made_of(node: Node) -> tuple[object, ...]:
+    return node.category, node.size, node.source, node.asset
+
+
+def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:
+    """The change as the model takes it: what was related among the objects that stay, and which are new.
+
+    An object of another category counts as new.
+    """
+    from echomodel.protocols import GraphEdit
+
+    old = {node.name: node.category for node in before.nodes}
+    added = torch.tensor([old.get(node.name) != node.category for node in after.nodes], dtype=torch.bool)
+    stay = {node.name for node, new in zip(after.nodes, added.tolist(), strict=True) if not new}
+    relations = tuple(r for r in before.relations if r.subject in stay and r.object in stay)
+    return GraphEdit(graph_batch(after.replaced(relations=relations)).triplets, added)
+
+
+def _pinned(
+    graph: SceneGraph, old: SceneGraph, boxes: Boxes, fresh: Iterable[str], moving: Iterable[str]
+) -> SceneGraph:
+    """The graph with the boxes of everything that stays written into its nodes."""
+    row = {name: i for i, name in enumerate(old.names)}
+    nodes = []
+    for node in graph.nodes:
+        if node.name not in fresh:
+            size, position, yaw = (v[row[node.name]].tolist() for v in _arrays(boxes))
+            fields: dict[str, Any] = {"size": node.size or tuple(size)}
+            if node.name not in moving:
+                fields |= {"position": node.position or tuple(position), "yaw": yaw if node.yaw is None else node.yaw}
+            node = node.replaced(**fields)
+        nodes.append(node)
+    return graph.replaced(nodes=tuple(nodes))
+
+
+def _arrays(boxes: Boxes) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    return boxes.size, boxes.position, boxes.yaw
+
+
+def _boxes_of(graph: SceneGraph) -> Boxes:
+    return Boxes(
+        torch.tensor([node.size for node in graph.nodes]),
+        torch.tensor([node.position for node in graph.nodes]),
+        torch.tensor([node.yaw for node in graph.nodes]),
+    )
+
+
+def _own_names(assets: Mapping[str, str], fresh: set[str], saved: SavedRoom) -> dict[str, str]:
+    """A new asset whose name an asset that stays has already gets another name."""
+    kept = {asset for name, asset in assets.items() if name not in fresh}
+    renamed: dict[str, str] = {}
+    for name in sorted(fresh):
+        asset = assets[name]
+        if asset in kept and asset not in renamed:
+            renamed[asset] = free_name(asset, kept | set(assets.values()) | set(renamed.values()))
+    return {name: renamed.get(asset, asset) if name in fresh else asset for name, asset in assets.items()}
+
+
+def _compare(manifest: Mapping[str, Any], echo: RoomModel, *, given: bool, root: Path) -> None:
+    """Refuse the weights that ship where the room needs others; warn where the room was made with other weights."""
+    preset, made_with = manifest["preset"], manifest["model"]
+    if not given and preset != echo.preset:
+        raise ValueError(
+            f"{root}: made with weights of the preset {preset!r} (hash {made_with or 'unknown'}), which do not ship; "
+            "name their file (--weights FILE)"
+        )
+    if made_with and echo.hash and made_with != echo.hash:
+        warnings.warn(
+            f"{root}: made with weights {made_with}, edited with weights {echo.hash}; "
+            "what the edit does not touch stays as it is",
+            stacklevel=3,
+        )
+
+
+def _provenance(manifest: Mapping[str, Any], echo: RoomModel | None) -> Provenance:
+    preset, model = manifest["preset"], manifest["model"]
+    if echo is not None:
+        preset, model = echo.preset, echo.hash or model
+    return Provenance(manifest["seed"], preset, model, manifest["shapes"], manifest["source"])

@@ -1,0 +1,92 @@
+"""A finished room: its data, and how it is saved and shown."""
+
+from __future__ import annotations
+
+import base64
+import io
+import tempfile
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from echousd.room import RoomData
+
+if TYPE_CHECKING:
+    from pxr import Usd
+
+
+class Room(RoomData):
+    """A room that can be saved, opened as a stage and looked at; its data are those of `RoomData`."""
+
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        force: bool = False,
+        preview: bool | None = None,
+        wait: bool = False,
+        store: str | Path | None = None,
+    ) -> Path:
+        """Write the layered room and return the path of its root layer.
+
+        Arguments:
+            folder: created if need be, its name names the room; a room of ours in it is regenerated under the name
+                that it has. Files that somebody else wrote or edited stay, if need be under another name that a warning
+                tells.
+            force: also write into a folder that holds other things than a room of ours.
+            preview: draw `<name>.png` (needs the extra `render`; left out without it); None = as its options say.
+            wait: for another process that writes this folder, instead of raising.
+            store: folder where many rooms keep their assets and images once (`echousd.store`), made if need be; None =
+                that of the room which is there, "" = none: the room travels alone.
+
+        Raises:
+            ValueError: the folder is not ours, is being written by another process, cannot be written, or the disk is
+                full; nothing is half-written.
+        """
+        from echousd.make.save import save_room
+
+        return save_room(self, Path(folder), force=force, preview=preview, wait=wait, store=store)
+
+    @property
+    def stage(self) -> Usd.Stage:
+        """The room as a composed stage (written to a temporary folder that lives as long as the room)."""
+        if not hasattr(self, "_stage"):
+            from pxr import Usd
+
+            folder = tempfile.TemporaryDirectory(prefix="echousd-")
+            root = self.save(Path(folder.name) / self.name, preview=False)
+            object.__setattr__(self, "_stage", Usd.Stage.Open(str(root)))
+            weakref.finalize(self, folder.cleanup)
+        return self._stage  # type: ignore[attr-defined]
+
+    def image(self, *, size: int = 512, view: str = "perspective") -> Any:
+        """A picture of the room (PIL image); needs the extra `render`."""
+        from echousd.draw.rendering import render_stage
+
+        return render_stage(self.stage, view=view, size=size)
+
+    def _repr_png_(self) -> bytes | None:
+        try:
+            picture = self.image(size=360)
+        except ValueError:  # without embreex a notebook shows the table alone
+            return None
+        out = io.BytesIO()
+        picture.save(out, "PNG")
+        return out.getvalue()
+
+    def _repr_html_(self) -> str:
+        kept = sum(v.state == "kept" for v in self.verdicts)
+        measured = sum(v.state != "unmeasured" for v in self.verdicts)
+        size = [" × ".join(f"{v:.2f}" for v in row) for row in self.boxes.size.tolist()]
+        position = [", ".join(f"{v:.2f}" for v in row) for row in self.boxes.position.tolist()]
+        cells = [(n.name, n.category, s, p) for n, s, p in zip(self.graph.nodes, size, position, strict=True)]
+        rows = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in cells)
+        head = "".join(f"<th>{title}</th>" for title in ("object", "category", "size (m)", "position (m)"))
+        count = f"{len(self.names)} objects, {kept} of {measured} measured relations kept"
+        png = self._repr_png_()
+        picture = f'<img width="360" src="data:image/png;base64,{base64.b64encode(png).decode()}">' if png else ""
+        return f"<div><b>{self.name}</b>: {count}<br>{picture}<table><tr>{head}</tr>{rows}</table></div>"
+
+    def __repr__(self) -> str:
+        count = f"{len(self.names)} objects, {len(self.verdicts)} relations"
+        return f"Room({self.name!r}, {count}, seed {self.provenance.seed})"

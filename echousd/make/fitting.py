@@ -1,0 +1,61 @@
+"""What cannot fit is left out where that is asked for (`--fit drop`), and said; nothing is ever stacked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from echomodel.boxes import Boxes
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+from echousd.graph.consistency import GraphError
+from echousd.graph.floors import check_space
+from echousd.make.verdicts import colliding
+
+LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
+Layout = tuple[Boxes, tuple[str, ...]]
+
+
+def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph without what the stated floor cannot hold by its area, and a sentence for each piece.
+
+    Raises `GraphError` where nothing that may be left out is left.
+    """
+    said: list[str] = []
+    while True:
+        try:
+            check_space(graph)
+            return graph, tuple(said)
+        except GraphError:
+            out = _dispensable(graph, graph.names)
+            if out is None:
+                raise
+            graph = graph.remove_node(out)
+            said.append(f"left out: {out}, the floor is too small for all that was asked for")
+
+
+def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
+    """The graph and its layout without the pieces that collide in the best one, and a sentence for each of them.
+
+    Arguments:
+        arranged: makes the best layout of a graph.
+    """
+    said: list[str] = []
+    while True:
+        layout = arranged(graph)
+        hits = colliding(graph, layout[0])
+        out = _dispensable(graph, [name for hit in hits[:1] for name in (hit.first, hit.second)])
+        if out is None:
+            return graph, layout, tuple(said)
+        other = hits[0].second if out == hits[0].first else hits[0].first
+        graph = graph.remove_node(out)
+        said.append(f"left out: {out}, no place for it but {hits[0].depth:.2f} m deep in {other}")
+
+
+def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str | None:
+    """Of some objects the one that a room misses least; None where there is none but what is locked or placed."""
+    free = [node for node in graph.nodes if node.name in names and not node.locked and node.position is None]
+    if not free or len(graph.nodes) < 2:
+        return None
+    order = {node.name: number for number, node in enumerate(graph.nodes)}
+    rank = {node.name: LEAST_FIRST.index(vocabulary().category(node.category).role) for node in free}
+    return min(free, key=lambda node: (rank[node.name], -order[node.name])).name

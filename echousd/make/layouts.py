@@ -1,0 +1,328 @@
+"""Boxes for a graph: sampled by the layout branch, equal within sets of furniture, repaired; and the floor below."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.graph import GraphBatch
+from echomodel.openings import free_area
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import vocabulary
+from echousd.graph import SceneGraph
+from echousd.graph.floors import with_placed_openings
+from echousd.make.verdicts import layout_outcome
+from echousd.progress import StageTimer
+from echousd.reproducible import one_thread, rounded_boxes
+from echousd.shapes.shell import floor_polygon
+from echousd.shapes.styles import equal_sizes, unequal_pairs
+from echousd.tensors import floor_centre, graph_batch, seeded
+
+if TYPE_CHECKING:
+    from echomodel.protocols import GraphEdit, RoomModel
+
+DRAFTS = 8  # of which the best is kept
+ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
+CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
+MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
+TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
+OF_OPENINGS = ("door_free", "window_free")  # living rules
+DRAWN_LATER = 1_000_000  # added to the number of a layout, so that its further drafts are no other layout's
+
+
+def check_objects(graph: SceneGraph, file: str = "") -> None:
+    """Raises ValueError for more objects than a room may hold."""
+    if len(graph.nodes) > MAX_OBJECTS:
+        raise ValueError(f"{file or 'the graph'}: {len(graph.nodes)} objects, allowed in one room: {MAX_OBJECTS}")
+
+
+def usual_drafts(objects: int) -> int:
+    """Layouts that are drawn where nobody says how many: fewer for very many objects, which take long enough."""
+    return max(1, min(DRAFTS, CROWD // max(objects, 1)))
+
+
+@dataclass(frozen=True, eq=False)
+class BestDraft:
+    """The best of some drafts after repair.
+
+    Arguments:
+        of: JSON of the graph that they are of. boxes, conflicts: as `finished_boxes` gives them.
+        wishes: what is left to be wished for, the worse first.
+    """
+
+    of: str
+    boxes: Boxes
+    conflicts: tuple[str, ...]
+    wishes: tuple[float, ...]
+
+
+class DraftsWanted(Exception):  # no error: the caller draws them and asks again
+    """What was drawn leaves something to be wished for, and further ones are drawn elsewhere; `best` of them."""
+
+    def __init__(self, best: BestDraft) -> None:
+        super().__init__()
+        self.best = best
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Drafts of the first layout that were sampled already (`echousd.make.packed`).
+
+    Arguments:
+        rounds: the first draft alone, then those of the following rounds (`draft_rounds`) that were wanted.
+        elsewhere: raise `DraftsWanted` in place of drawing further ones.
+        best: of all rounds but the last, where those were valued; None = they are valued again.
+    """
+
+    rounds: tuple[tuple[Boxes, ...], ...]
+    elsewhere: bool = False
+    best: BestDraft | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Which drafts are drawn, and how.
+
+    Arguments:
+        seed, number: of the draws; equal ones, and equal counts, give equal drafts.
+        steps: of the sampler, None = the model's own. change: what was edited in the graph, None = nothing.
+    """
+
+    seed: int
+    number: int = 0
+    steps: int | None = None
+    change: GraphEdit | None = None
+
+
+def sample_boxes(
+    model: RoomModel, graph: SceneGraph, draws: Draws, *, count: int = 1, timer: StageTimer
+) -> list[Boxes]:
+    """So many drafts at once from the layout branch, in the room's frame; what the graph fixes comes back."""
+    centre, nodes = floor_centre(graph), graph.nodes
+    batch = GraphBatch.pack([graph_batch(graph)] * count)
+    given = torch.tensor([None not in (n.size, n.position, n.yaw) for n in nodes])
+    known = Boxes(
+        torch.tensor([n.size or (1.0, 1.0, 1.0) for n in nodes], dtype=torch.float32),
+        torch.tensor([n.position or (0.0, 0.0, 0.0) for n in nodes], dtype=torch.float32) - centre,
+        torch.tensor([n.yaw or 0.0 for n in nodes], dtype=torch.float32),
+    )
+    extra: dict[str, Any] = {}
+    if bool(given.any()):
+        extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
+    if draws.steps is not None:
+        extra["steps"] = draws.steps
+    if draws.change is not None:
+        extra["edit"] = repeated(draws.change, len(nodes), count)
+    generator = seeded(draws.seed, "layout", draws.number)
+    with timer.stage("layout") as tell, one_thread():
+        found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu")
+    mounted = torch.tensor([vocabulary().category(node.category).mounted for node in nodes]).repeat(count)
+    found.position[mounted > 0, 1] = mounted[mounted > 0]
+    return [
+        rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
+        for rows in torch.arange(count * len(nodes)).chunk(count)
+    ]
+
+
+def best_boxes(
+    model: RoomModel,
+    graph: SceneGraph,
+    styles: Mapping[str, str],
+    draws: Draws,
+    *,
+    drafts: int = 1,
+    repair: bool = True,
+    sized: Boxes | None = None,
+    drawn: Drawn | None = None,
+    proposed: bool = False,
+    timer: StageTimer,
+) -> tuple[Boxes, tuple[str, ...]]:
+    """The best of several drafts after repair: kept relations first, then collisions, then the living rules.
+
+    Further drafts are drawn, a few at once, only where those before leave something to be wished for.
+
+    Arguments:
+        draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
+        drawn: drafts that were sampled already.
+        proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
+        others: as `sample_boxes` and `finished_boxes`.
+    """
+    best: tuple[Boxes, tuple[str, ...]] | None = None
+    worth: tuple[float, ...] = ()
+    of, valued = graph.to_json() if drawn is not None else "", 0
+    if drawn is not None and drawn.best is not None and drawn.best.of == of:
+        best, worth = (drawn.best.boxes, drawn.best.conflicts), drawn.best.wishes
+        valued = len(drawn.rounds) - 1
+    for at, (start, count) in enumerate(draft_rounds(drafts)):
+        if at < valued:
+            continue
+        if best is not None and not any(worth):
+            break
+        given = drawn.rounds[at] if drawn is not None and at < len(drawn.rounds) else ()
+        if not given and best is not None and drawn is not None and drawn.elsewhere:
+            raise DraftsWanted(BestDraft(of, *best, worth))
+        for draft in given or sample_boxes(
+            model, graph, replace(draws, number=draws.number + start), count=count, timer=timer
+        ):
+            if sized is not None:
+                draft = Boxes(sized.size, draft.position, draft.yaw)
+            found = finished_boxes(graph, draft, styles, repair, timer)
+            if drafts == 1 or not repair:
+                return found
+            with timer.stage("repair"), one_thread():
+                wrong = _wishes(graph, found, proposed)
+            if best is None or wrong < worth:
+                best, worth = found, wrong
+            if not any(worth):
+                break
+    assert best is not None
+    return best
+
+
+def repeated(change: GraphEdit, nodes: int, count: int) -> GraphEdit:
+    """The edit of one graph of `nodes` objects for `count` copies of it behind one another."""
+    from echomodel.protocols import GraphEdit
+
+    shift = torch.arange(count)[:, None, None] * torch.tensor([nodes, 0, nodes])
+    return GraphEdit((change.before[None] + shift).reshape(-1, 3), change.added.repeat(count))
+
+
+def most_drafts(model: RoomModel, objects: int) -> int:
+    """How many drafts a model draws at most where nobody says it: the published ones take a thousand steps for one."""
+    return usual_drafts(objects) if model.preset == "compact" else 1
+
+
+def draft_rounds(drafts: int) -> list[tuple[int, int]]:
+    """What is added to the number of the draws, and how many are drawn at once, until all drafts are drawn."""
+    out, left = [(0, 1)], drafts - 1
+    for count in (*ROUNDS, drafts):
+        if left > 0:
+            out.append((len(out) * DRAWN_LATER, min(count, left)))
+            left -= count
+    return out
+
+
+def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], proposed: bool) -> tuple[float, ...]:
+    """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults.
+
+    Arguments:
+        proposed: faults of openings come last, as these may still be moved.
+    """
+    from echousd.repair.living import living_faults
+
+    boxes, conflicts = found
+    late = [proposed and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
+    return len(layout_outcome(graph, boxes).faults), len(conflicts), len(late) - sum(late), sum(late)
+
+
+def finished_boxes(
+    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], repair: bool, timer: StageTimer
+) -> tuple[Boxes, tuple[str, ...]]:
+    """Sampled boxes after equal sizes within style groups and, if wanted, repair; and demands in conflict."""
+    boxes = _alike(graph, boxes, styles)
+    if not repair:
+        return rounded_boxes(graph, boxes), ()
+    from echousd.repair import RepairConfig, RepairResult
+    from echousd.repair import repair as repaired
+    from echousd.repair.living import living_faults
+
+    judged: dict[int, tuple[int, ...]] = {}
+
+    def wrong(one: RepairResult) -> tuple[int, ...]:
+        if id(one) not in judged:
+            judged[id(one)] = len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
+        return judged[id(one)]
+
+    graph = _with_homeless_unlocked(graph)
+    with timer.stage("repair"), one_thread():
+        found = repaired(graph, boxes)
+        same = _alike(graph, found.boxes, styles)
+        if not torch.equal(same.size, found.boxes.size):
+            # chairs of one set that had to shrink: all of them, if it fits; else at other places
+            fixed = with_sizes(graph, same)
+            second = repaired(fixed, same, config=RepairConfig(arrange=False))
+            if wrong(second) > wrong(found):
+                third = repaired(fixed, same)  # both are held, as they are known by their ids
+                second = min(second, third, key=wrong)
+            if wrong(second)[:2] <= wrong(found)[:2]:
+                found = second
+    return rounded_boxes(graph, found.boxes), found.conflicts
+
+
+def _with_homeless_unlocked(graph: SceneGraph) -> SceneGraph:
+    """The graph in which what is locked without having a place may be placed."""
+    if not any(node.locked and node.position is None for node in graph.nodes):
+        return graph
+    return graph.replaced(nodes=tuple(n.replaced(locked=n.locked and n.position is not None) for n in graph.nodes))
+
+
+def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -> SceneGraph:
+    """The graph with openings that nobody stated moved to where nothing stands, if furniture is in their way.
+
+    A screen is in the way of a window, too: who watches it would look into the light.
+    """
+    from echousd.repair.living import living_faults
+
+    def faults(graph: SceneGraph) -> int:
+        return sum(len(living_faults(graph, boxes)) + backlit(graph, boxes) for boxes in layouts)
+
+    size, position, yaw = plan_boxes(layouts)
+    size[np.tile(screens(graph), len(layouts)), 1] += TALL
+    bare = graph.replaced(room=graph.room.replaced(openings=()))
+    before = faults(graph)
+    if graph.room.openings and (not before or before <= faults(bare)):
+        return graph
+    moved = with_placed_openings(bare, (size, position, yaw), seed)
+    return moved if not graph.room.openings or faults(moved) < before else graph
+
+
+def screens(graph: SceneGraph) -> np.ndarray:
+    """(n,) bool, televisions and what they stand on."""
+    kinds = [vocabulary().category(node.category) for node in graph.nodes]
+    return np.array([kind.role == "screen" or kind.stands == "opposite" for kind in kinds], bool)
+
+
+def backlit(graph: SceneGraph, boxes: Boxes) -> int:
+    """How many windows have a screen before them."""
+    import shapely
+
+    corners, here = graph.room.corners, screens(graph)
+    if corners is None or not here.any():
+        return 0
+    plan = footprints(*(np.asarray(v, float)[here] for v in (boxes.size, boxes.position, boxes.yaw)))
+    there = shapely.union_all(shapely.polygons(plan))
+    windows = [opening for opening in graph.room.openings if opening.kind == "window"]
+    return sum(shapely.Polygon(free_area(corners, one)).intersection(there).area > GLARE for one in windows)
+
+
+def with_sizes(graph: SceneGraph, boxes: Boxes) -> SceneGraph:
+    """The graph with the sizes of the boxes written into its nodes."""
+    sizes = [tuple(row) for row in boxes.size.tolist()]
+    return graph.replaced(nodes=tuple(n.replaced(size=s) for n, s in zip(graph.nodes, sizes, strict=True)))
+
+
+def room_floor(graph: SceneGraph, layouts: Sequence[Boxes]) -> np.ndarray:
+    """(k, 2) float: corners of the floor, from the graph or around the furniture of all layouts."""
+    plan = [footprints(*(np.asarray(v, float) for v in (b.size, b.position, b.yaw))).reshape(-1, 2) for b in layouts]
+    return floor_polygon(graph.room.floor_polygon, graph.room.size, np.concatenate(plan))
+
+
+def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Size and position (n, 3), metres, and yaw (n,), radians, of the boxes of all layouts behind one another."""
+    size, position, yaw = (
+        np.concatenate([np.asarray(getattr(boxes, name), float) for boxes in layouts])
+        for name in ("size", "position", "yaw")
+    )
+    return size, position, yaw
+
+
+def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
+    names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
+    free = np.array([node.size is None and not node.locked for node in graph.nodes])
+    size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
+    return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)

@@ -1,0 +1,58 @@
+"""Locked objects stay: what a graph does not say of their boxes comes from its stage or from the last generation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from echousd.graph import SceneGraph
+
+STAGES = (".usd", ".usda", ".usdc", ".usdz")
+
+
+def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph with size, position and yaw of locked objects that lack one, and a sentence for each without a place.
+
+    Arguments:
+        files: stages or folders of rooms in which the objects may stand, the first that holds one counts.
+
+    Raises ValueError for a stage that cannot be read.
+    """
+    wanted = {node.name for node in graph.nodes if node.locked and None in (node.size, node.position, node.yaw)}
+    for file in files:
+        stage = None if file is None else _stage_of(file)
+        if wanted and stage is not None:
+            graph, found = _filled(graph, stage, wanted)
+            wanted -= found
+    lost = sorted(name for name in wanted if graph.node(name).position is None)
+    return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
+
+
+def _stage_of(file: Path) -> Path | None:
+    """The stage at a path: the file itself, or the root layer of a room's folder."""
+    if file.is_dir():
+        from echousd.folder.manifest import find_manifest
+
+        manifest = find_manifest(file, file.resolve().name)
+        file = file / f"{manifest['name']}.usda" if manifest else file
+    return file if file.is_file() and file.suffix in STAGES else None
+
+
+def _filled(graph: SceneGraph, file: Path, wanted: set[str]) -> tuple[SceneGraph, set[str]]:
+    from echousd.stage.contents import read_contents
+    from echousd.stage.files import opened
+    from echousd.stage.read import find_rooms
+
+    stage = opened(file)
+    things = {thing.node.name: thing for room in find_rooms(stage) for thing in read_contents(room).objects}
+    found = wanted & things.keys()
+    nodes = []
+    for node in graph.nodes:
+        if node.name in found:
+            thing = things[node.name]
+            node = node.replaced(
+                size=node.size or tuple(thing.size.round(4).tolist()),
+                position=node.position or tuple(thing.position.round(4).tolist()),
+                yaw=round(float(thing.yaw), 5) if node.yaw is None else node.yaw,
+            )
+        nodes.append(node)
+    return graph.replaced(nodes=tuple(nodes)), found

@@ -1,0 +1,189 @@
+"""From a graph to a room: sample boxes, repair them, get shapes from a source, decide what shares an asset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from echomodel.boxes import Boxes
+from echomodel.loading import load_model
+from echomodel.progress import StageListener
+from echomodel.roomboxes import footprints
+from echousd.graph import SceneGraph
+from echousd.graph.consistency import faults_of
+from echousd.graph.doors import check_doors
+from echousd.graph.floors import check_space, with_plan, with_wider_floor, without_openings
+from echousd.make.clearing import cleared_layouts
+from echousd.make.finished import Room
+from echousd.make.fitting import fitted, with_space
+from echousd.make.layouts import (
+    Drawn,
+    Draws,
+    best_boxes,
+    check_objects,
+    most_drafts,
+    plan_boxes,
+    room_floor,
+    with_free_openings,
+    with_sizes,
+)
+from echousd.make.locking import with_locked_places
+from echousd.make.owned import with_own_boxes, with_own_pieces
+from echousd.make.verdicts import layout_outcome, warn_of_faults
+from echousd.options import RoomOptions, takes_options
+from echousd.progress import StageTimer
+from echousd.repair.living import unusual_sizes
+from echousd.reproducible import one_thread
+from echousd.room import Provenance
+from echousd.shapes.merging import merged
+from echousd.shapes.sources import default_source
+from echousd.shapes.sources.guided import shape_nearness
+from echousd.shapes.sources.mixing import check_sources, mixed_shapes, sources_of
+from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
+from echousd.shapes.sources.source import ShapeRequest
+from echousd.shapes.styles import asset_names, style_groups
+from echousd.tensors import graph_batch
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
+    from echomodel.protocols import RoomModel
+
+
+@takes_options()
+def generate(
+    graph: SceneGraph | str | Path,
+    *,
+    room: str | None = None,
+    options: RoomOptions | None = None,
+    model: RoomModel | str | Path | None = None,
+    earlier: Path | None = None,
+    outside: Sequence[str | Path] = (),
+    boxes: Boxes | None = None,
+    meshes: Mapping[str, str | Path] | None = None,
+    progress: StageListener | None = None,
+    drawn: Drawn | None = None,
+    **given: Any,
+) -> Room:
+    """Make a room from a scene graph.
+
+    A floor that nobody stated is proposed before the layout is drawn, and doors and windows that nobody stated are
+    placed where no furniture stands; both are in the room's graph and stay when it is generated again.
+
+    Arguments:
+        graph: the graph, or a file that holds one (stage, YAML, JSON).
+        room: prim path of one room where the file holds several.
+        options: how the room is made and written; `given`, the same by name, comes first. Equal options give equal
+            rooms.
+        model: a loaded model, a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`), or a
+            weights file; None = that of the option `weights`.
+        earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
+        outside: folders besides those of the graph's file and of the library's index in which models may lie.
+        boxes: layout of your own, n boxes in the order of the graph's nodes, metres and radians in the room's frame;
+            every object stands where its box is.
+        meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
+            working folder.
+        progress: called with (stage, done, total).
+        drawn: drafts of the first layout that were sampled already (`echousd.make.packed`).
+
+    Raises:
+        ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
+            missing, damaged or have no shape branch.
+
+    Warns (`RoomWarning`) of relations that are broken and of furniture that collides; `Room.faults` lists them.
+    """
+    asked = (options or RoomOptions()).replaced(**given)
+    timer = StageTimer(progress)
+    file, beside = "", Path.cwd()
+    wishes, seed, drafts = asked.wishes(outside), asked.seed, asked.drafts
+    if not isinstance(graph, SceneGraph):
+        from echousd.graph import load_graph
+
+        file, beside = Path(graph).name, Path(graph).parent
+        with timer.stage("read"):
+            read = Path(graph)
+            graph, homeless = with_locked_places(load_graph(read, room), None if room else read, earlier)
+    else:
+        graph, homeless = with_locked_places(graph, earlier)
+    graph = anchored(without_openings(graph) if asked.openings == "drawn" else graph, beside)
+    if file:  # a graph that was read may come from anybody; one in memory is the caller's own
+        check_files(graph, beside, wishes, file)
+    graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
+    check_objects(graph, file)
+    with timer.stage("load"), one_thread():
+        echo = load_model(asked.weights if model is None else model, device=asked.device)
+        shapes = asked.shapes or default_source(echo)
+        check_sources([shapes, *sources_of(graph, shapes).values()], echo)
+    pieces = given_pieces(graph, shapes, wishes, timer=timer)
+    sizes = dict(pieces.sizes)
+    with faults_of(file):
+        check_doors(graph)
+        graph, left_out = with_space(graph) if asked.fit == "drop" else (graph, ())
+        crowded = check_space(graph)
+    stated, graph = graph, with_plan(graph, seed)
+    drafts = drafts or most_drafts(echo, len(graph.nodes))
+
+    def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
+        styles = style_groups(graph)
+        whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
+        return best_boxes(
+            echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=asked.steps), drafts=drafts,
+            repair=asked.repair,
+            drawn=drawn if whole else None, proposed=not stated.room.openings, timer=timer,
+        )  # fmt: skip
+
+    def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
+        if asked.fit == "drop":
+            graph, (boxes, notes), more = fitted(graph, arranged)
+            return graph, boxes, notes, more
+        return graph, *arranged(graph), ()
+
+    graph, boxes, notes, more = laid_out(graph)
+    left_out = (*left_out, *more)
+    near = shape_nearness(graph, boxes, shapes, wishes, seed, echo, asked.steps, timer)
+    models = retrieved(
+        graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
+    )
+    if models.sizes != sizes:  # real sizes shape the layout
+        sizes |= models.sizes
+        graph, boxes, notes, more = laid_out(graph)
+        left_out = (*left_out, *more)
+    styles = style_groups(graph)
+    notes = (*left_out, *models.notes, *echo.unlearned(graph_batch(graph)), *notes)
+    layouts, sized = [boxes], with_sizes(graph, boxes)
+    for number in range(1, asked.layouts):
+        found, _ = best_boxes(
+            echo, sized, styles, Draws(seed, number, asked.steps), drafts=drafts, repair=asked.repair,
+            sized=boxes, proposed=not stated.room.openings, timer=timer,
+        )  # fmt: skip
+        layouts.append(found)
+    plan = plan_boxes(layouts)
+    if stated.room.extents is None:  # without repair, or with weights that know of no floor, furniture may stand beyond
+        graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
+    if not stated.room.openings:
+        graph = with_free_openings(graph, layouts, seed)
+    request = ShapeRequest(graph, boxes, styles, seed, echo, asked.steps, asked.faces, timer=timer, retrieved=models)
+    made = mixed_shapes(request, shapes)
+    floor = room_floor(graph, layouts)
+    own = {name: made.geometry[owner] for name, owner in made.owners.items()}
+    geometry = merged(own, asked.merge, asked.faces)
+    outcomes = tuple(layout_outcome(graph, found) for found in layouts)
+    if asked.repair:
+        with timer.stage("repair"), one_thread():
+            layouts, outcomes = cleared_layouts([graph] * asked.layouts, layouts, geometry, floor, walls=asked.walls)
+    made_room = Room(
+        name=graph.room.type,
+        graph=graph,
+        boxes=layouts[0],
+        geometry=geometry,
+        assets=asset_names(made.owners, {node.name: node.category for node in graph.nodes}),
+        floor=floor,
+        layouts=tuple(layouts),
+        outcomes=outcomes,
+        notes=(*crowded, *homeless, *notes, *unusual_sizes(stated)),
+        provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
+        options=asked,
+        timings=timer.seconds,
+    )
+    warn_of_faults(made_room)
+    return made_room

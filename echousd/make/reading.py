@@ -1,0 +1,192 @@
+"""Read a room of ours back from its folder: graph, boxes, meshes, and the assets' files as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import trimesh
+from pxr import Tf, Usd, UsdGeom
+
+from echomodel.boxes import Boxes
+from echousd.folder.folder import recover
+from echousd.folder.manifest import find_manifest
+from echousd.folder.stored import asset_from, shelf_of
+from echousd.folder.within import inside
+from echousd.graph import SceneGraph
+from echousd.make.reading_models import read_original
+from echousd.shapes.colliders import approximation
+from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Part
+from echousd.shapes.joints import read_joints
+from echousd.shapes.masses import read_mass
+from echousd.shapes.upright import as_y_up, stands_z_up
+from echousd.stage import open_stage, read_graph
+from echousd.stage.contents import Z_TO_Y
+from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_of
+from echousd.stage.values import matrix, reading
+
+
+@dataclass(frozen=True, eq=False)
+class SavedRoom:
+    """What a room's folder holds.
+
+    Arguments:
+        graph: the composed stage's graph, an artist's changes included.
+        boxes: N boxes in the order of the graph's nodes, as composed.
+        layouts: all arrangements of the variant set `layout`, in its order, or `boxes` alone.
+        geometry: object name -> geometry; objects of one asset have one.
+        assets: object name -> asset name.
+        carried: asset name -> its files as they are, path -> bytes.
+        manifest: as `save` wrote it.
+    """
+
+    graph: SceneGraph
+    boxes: Boxes
+    layouts: tuple[Boxes, ...]
+    geometry: Mapping[str, Geometry]
+    assets: Mapping[str, str]
+    carried: Mapping[str, Mapping[str, bytes]]
+    manifest: Mapping[str, Any]
+
+
+def read_room(root: str | Path) -> SavedRoom:
+    """Read the room whose root layer is `root` (a stronger layer over a room will do, too).
+
+    Raises ValueError where there is no such stage, no room of ours, or an object without geometry.
+    """
+    root = Path(root)
+    recover(root.parent)
+    stage = open_stage(root)
+    manifest = find_manifest(root.parent, root.stem)
+    if manifest is None:
+        raise ValueError(f"{root}: not a room made by `echousd generate` (no manifest beside it)")
+    shelf = shelf_of(manifest, root.parent)
+    graph = read_graph(stage)
+    geometry: dict[str, Geometry] = {}
+    carried: dict[str, Mapping[str, bytes]] = {}
+    assets: dict[str, str] = {}
+    made: dict[str, Geometry] = {}
+    z_up = stands_z_up(stage.GetPrimAtPath("/Room"))
+    for node in graph.nodes:
+        asset = manifest["assets"].get(node.name)
+        read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
+        where = f"{OBJECTS}/{node.name}"
+        try:
+            found = made.get(asset) or read(stage.GetPrimAtPath(where), asset, node.category, manifest)
+        except (TypeError, ValueError, IndexError, AttributeError, ArithmeticError, Tf.ErrorException) as error:
+            if read is read_original and isinstance(error, ValueError):
+                raise
+            reason = " ".join(str(error).split())
+            raise ValueError(
+                f"{root}: <{where}> holds what echousd did not write there ({reason}); generate the room again"
+            ) from None
+        if asset is None or found is None:
+            raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
+        if asset not in made:
+            found = made[asset] = as_y_up(found) if z_up else found
+            if shelf is not None and f"assets/{asset}" in shelf.keys:
+                carried[asset] = asset_from(shelf, asset)
+            else:
+                recorded = (path for path in manifest["files"] if path.startswith(f"assets/{asset}/"))
+                paths = dict.fromkeys((*asset_files(asset), *recorded))
+                files = {path: inside(root.parent, path, f"asset {asset!r}") for path in paths}
+                must = component_file(asset)
+                carried[asset] = {path: f.read_bytes() for path, f in files.items() if path == must or f.exists()}
+        assets[node.name], geometry[node.name] = asset, found
+    bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
+    sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)
+    boxes = _boxes(stage, graph, sizes)
+    return SavedRoom(graph, boxes, _layouts(stage, graph, sizes) or (boxes,), geometry, assets, carried, manifest)
+
+
+def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
+    """Boxes of the objects as the stage places them now."""
+    position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath("/Room")
+    turn, ahead = (Z_TO_Y, (0, -1, 0)) if stands_z_up(room) else (np.eye(3), (0, 0, 1))
+    for name in graph.names:
+        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
+        with reading(stage):
+            pose, _ = cache.ComputeRelativeTransform(prim, room)
+        matrix(pose, prim)
+        front, place = (np.array(v) @ turn.T for v in (pose.TransformDir(ahead), pose.ExtractTranslation()))
+        position.append(place)
+        yaw.append(np.arctan2(front[0], front[2]))
+    return Boxes(size, *(torch.tensor(np.array(v), dtype=torch.float32) for v in (position, yaw)))
+
+
+def _layouts(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> tuple[Boxes, ...]:
+    """Boxes under every variant of `layout`; the stage is left as it was."""
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    names = [name for name in variants.GetVariantNames() if name.startswith("layout_")]
+    found = []
+    for name in sorted(names, key=lambda name: (len(name), name)):
+        with Usd.EditContext(stage, stage.GetSessionLayer()):
+            variants.SetVariantSelection(name)
+            found.append(_boxes(stage, graph, size))
+            variants.ClearVariantSelection()
+    return tuple(found)
+
+
+def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mapping[str, Any]) -> Geometry | None:
+    """Parts and colliders below an object's root; None where there is no mesh of ours."""
+    parts, colliders = [], []
+    for prim, name, body in _pieces(root, asset) if root and asset else ():
+        form, mesh = _mesh(UsdGeom.Mesh(prim)), UsdGeom.Mesh(prim)
+        if mesh.GetPurposeAttr().Get() == UsdGeom.Tokens.guide:
+            kind = prim.GetAttribute("physics:approximation").Get() or approximation(category)
+            colliders.append(Collider(name, form, kind, body))
+        else:
+            parts.append(Part(name, form, _slots(mesh, len(form.faces)), body=body))
+    if not parts or not colliders:
+        return None
+    told = manifest.get("meshes", {}).get(asset, {})
+    origin = Origin(told.get("source", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
+    return Geometry(
+        tuple(parts),
+        tuple(colliders),
+        origin,
+        read_mass(root),
+        read_joints(root, asset or ""),
+        description=_description(root),
+    )
+
+
+def _description(root: Usd.Prim) -> tuple[float, ...]:
+    """What the furniture branch said of a piece, empty where it was not asked."""
+    return tuple(root.GetAttribute(DESCRIPTION).Get() or ())
+
+
+def _pieces(root: Usd.Prim, asset: str) -> Iterator[tuple[Usd.Prim, str, str]]:
+    """Meshes of ours below an object's root, their names, and the body that they stand below, empty = the root."""
+    geo = root.GetChild(GEO)
+    for prim in geo.GetChildren() if geo else ():
+        name = piece_of(asset, prim.GetName())
+        if name is None:
+            continue
+        if prim.IsA(UsdGeom.Mesh):
+            yield prim, name, ""
+        elif prim.IsA(UsdGeom.Xform):
+            for child in prim.GetChildren():
+                own = piece_of(asset, child.GetName())
+                if own is not None and child.IsA(UsdGeom.Mesh):
+                    yield child, own, name
+
+
+def _mesh(mesh: UsdGeom.Mesh) -> trimesh.Trimesh:
+    points = np.asarray(mesh.GetPointsAttr().Get(), float)
+    return trimesh.Trimesh(points, np.asarray(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3), process=False)
+
+
+def _slots(mesh: UsdGeom.Mesh, faces: int) -> dict[str, np.ndarray]:
+    """Material slot -> faces of a mesh that we wrote."""
+    subsets = [UsdGeom.Subset(child) for child in mesh.GetPrim().GetChildren() if child.IsA(UsdGeom.Subset)]
+    if subsets:
+        return {subset.GetPrim().GetName(): np.asarray(subset.GetIndicesAttr().Get()) for subset in subsets}
+    # one slot is bound on the mesh itself: the asset, the weakest that speaks of it, calls its look by the slot
+    told = mesh.GetPrim().GetRelationship("material:binding").GetPropertyStack()
+    bound = told[-1].targetPathList.GetAddedOrExplicitItems() if told else ()
+    return {bound[0].name if bound else "wood": np.arange(faces)}

@@ -1,0 +1,217 @@
+"""Save a room: the layered folder with its manifest and preview."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pxr import Sdf
+
+import echousd
+from echousd.draw.pictures import is_ours, png
+from echousd.folder import folder as folders
+from echousd.folder import ownership
+from echousd.folder.history import remembered, undone
+from echousd.folder.manifest import MANIFEST_KEY
+from echousd.folder.stored import Shelf, shelf_of
+from echousd.graph import SceneGraph
+from echousd.layers import paintings
+from echousd.layers.compose import LAYERS, room_files
+from echousd.naming import as_identifier
+from echousd.options import Look
+from echousd.repair.living import living_faults
+from echousd.room import LayoutOutcome, RoomData
+from echousd.shapes.geometry import Geometry
+from echousd.shapes.sources.retrieval import beside
+from echousd.stage import open_stage
+from echousd.stage.files import write_whole
+from echousd.stage.layouts import layout_names
+from echousd.stage.paths import layer_file
+from echousd.store import Store
+
+
+def save_room(
+    room: RoomData,
+    folder: Path,
+    *,
+    force: bool = False,
+    preview: bool | None = None,
+    wait: bool = False,
+    store: str | Path | None = None,
+) -> Path:
+    """Write the layered room and its preview; see `Room.save`."""
+    with folders.held(folder, wait=wait):
+        root = save_layers(room, folder, force=force, store=store)
+        if room.options.preview if preview is None else preview:
+            write_preview(root)
+            write_sheet(root)
+        return root
+
+
+def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str | Path | None = None) -> Path:
+    """Write the layers, assets and the manifest of a room; see `Room.save`.
+
+    Warns of every file that is kept because somebody else wrote or edited it, and names it.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: is a file, the output must be a folder")
+    with folders.held(folder):
+        old = folders.claim(folder, force=force, root=room.name)
+        shelf = shelf_of(old, folder) if store is None else Shelf(Store.create(store), folder) if store else None
+        return _save_layers(room, folder, old, replace(shelf, keys={}) if shelf else None)
+
+
+def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Shelf | None) -> Path:
+    recorded: dict[str, str] = dict(old.get("files", {}))
+    # A folder that was renamed or copied keeps its root's name: other layers refer to it.
+    room = replace(room, name=old.get("name") or as_identifier(folder.resolve().name))
+    room = replace(room, assets=ownership.free_assets(folder, room, recorded))
+    room = replace(room, graph=beside(room.graph, folder))
+    files = room_files(room, shelf, folder)
+    root, manifest = f"{room.name}.usda", f"{room.name}.json"
+    current = ownership.read(folder, root)
+    painted, unfit = paintings.refitted(folder, root, files, current, room.edited)
+    owned = {path: folders.digest(content) for path, content in files.items()}
+    remarks = []
+    if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
+        files[root] = ownership.merged_root(folder / root, current, files[root])  # not ours alone: `owned` says so
+        remarks = [root] if ownership.loses_text(current) else []
+    for path in (path for files_of in room.carried.values() for path in files_of):
+        if path in files and path in recorded and path in owned and ownership.read(folder, path) == files[path]:
+            owned[path] = recorded[path]  # if it was edited, it is taken along as it is and still not ours
+    replaced = [path for path in files if path != root or root not in recorded] + ([] if old else [manifest])
+    kept = ownership.backups(folder, [*replaced, *remarks], recorded, files)
+    files |= painted  # the user's own: not among what the manifest knows as ours
+    files |= {name: ownership.read(folder, path) or b"" for path, name in kept.items() if name}
+    gone = [path for path in recorded if path not in owned]
+    needed = ownership.referenced(folder, recorded, gone, replaced)
+    owned |= {path: recorded[path] for path in needed}
+    history: list[dict[str, Any]] = []
+    if room.edited and old:
+        steps = SceneGraph.from_json(json.dumps(old["graph"])).diff(room.graph).lines() if "graph" in old else []
+        history, archive = remembered(folder, old, files, owned, list(kept.values()), steps)
+        files |= archive
+        kept_steps = {entry["restores"] for entry in history}
+        owned |= {path: recorded[path] for path in kept_steps & recorded.keys()}
+        owned |= {path: folders.digest(content) for path, content in archive.items()}
+    gone = [path for path in gone if path not in owned or path in needed]
+    told = (
+        manifest_of(room, owned)
+        | {"history": history}
+        | ({"store": shelf.at, "stored": dict(sorted(shelf.keys.items()))} if shelf else {})
+    )
+    files[manifest] = (json.dumps(told, indent=1) + "\n").encode()
+    stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
+    # What is referenced comes before what refers to it, so that a room opens between any two renames.
+    layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
+    last = [*layers, paintings.UNFIT, root, manifest]
+    drawn = ownership.pictures(folder, room.name)
+    changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder), *drawn])
+    for path, name in kept.items():
+        if name:
+            folders.tell_kept(folder, path, name)
+    for fault in unfit:
+        warnings.warn(fault, stacklevel=3)
+    for path in gone:
+        if path not in stale and (folder / path).is_file():
+            why = f"{needed[path]} refers to it" if path in needed else "it was edited"
+            warnings.warn(f"{folder / path}: no longer part of the room; kept, as {why}", stacklevel=3)
+    for layer in filter(None, (Sdf.Layer.Find(str(folder / path)) for path in changed)):
+        layer.Reload()  # this process holds it open, as it was before
+    return folder / root
+
+
+PREVIEW = 400  # pixels
+
+
+def write_preview(root: Path) -> Path | None:
+    """Draw `<name>.png` beside the root layer; None where the extra `render` is not installed."""
+    from echousd.draw.rendering import render
+    from echousd.draw.tracing import QUICK, RenderUnavailable
+
+    out = root.with_suffix(".png")
+    try:
+        picture = render(root, view="perspective", size=PREVIEW, rays=QUICK)
+    except RenderUnavailable:
+        return None
+    if out.is_file() and not is_ours(out):
+        kept = folders.backup_name(out.parent, out.name)
+        out.replace(out.with_name(kept))
+        folders.tell_kept(out.parent, out.name, kept)
+    write_whole(out, png(picture), left="the room itself is complete")
+    return out
+
+
+SHEET = 280  # pixels of one layout
+
+
+def write_sheet(root: Path) -> Path | None:
+    """Draw `<name>_layouts.png`, all layouts side by side, beside the root layer; None where there is only one.
+
+    The sheet of a room that has only one layout any more is taken away.
+    """
+    from PIL import Image, ImageDraw
+
+    from echousd.draw.rendering import render
+    from echousd.draw.tracing import QUICK, RenderUnavailable
+
+    out = root.with_name(f"{root.stem}_layouts.png")
+    names = layout_names(open_stage(root))
+    if out.is_file() and not is_ours(out):
+        return None
+    if not names:
+        out.unlink(missing_ok=True)
+        return None
+    wide = min(len(names), 4)
+    sheet = Image.new("RGB", (wide * SHEET, -(-len(names) // wide) * SHEET), "white")
+    for number, name in enumerate(names):
+        try:
+            picture = render(root, size=SHEET, rays=QUICK, layout=name)
+        except RenderUnavailable:
+            return None
+        ImageDraw.Draw(picture).text((8, 6), name, fill="black")
+        sheet.paste(picture, (number % wide * SHEET, number // wide * SHEET))
+    write_whole(out, png(sheet), left="the room itself is complete")
+    return out
+
+
+def manifest_of(room: RoomData, files: dict[str, str]) -> dict[str, Any]:
+    """What was asked for, what made the room, what became of every relation, and which files are ours."""
+    first = room.outcomes[0] if room.outcomes else LayoutOutcome()
+    return {
+        MANIFEST_KEY: 1,
+        "name": room.name,
+        "generator": f"echousd {echousd.__version__}",
+        "seed": room.provenance.seed,
+        "preset": room.provenance.preset,
+        "model": room.provenance.model,
+        "shapes": room.provenance.shapes,
+        "source": room.provenance.source,
+        **room.options.model_dump(include=set(Look.model_fields)),
+        "layouts": [{"name": f"layout_{i}", **found.to_json()} for i, found in enumerate(room.outcomes)],
+        "relations": first.counts(),
+        "notes": list(room.notes),
+        "verdicts": [verdict.to_json() for verdict in room.verdicts],
+        "living": [fault.to_json() for fault in living_faults(room.graph, room.boxes, room.floor)],
+        "graph": json.loads(room.graph.to_json()),
+        "assets": dict(room.assets),
+        "meshes": {asset: _mesh_facts(room.geometry[user]) for asset, user in sorted(room.asset_users.items())},
+        "files": dict(sorted(files.items())),
+    }
+
+
+def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
+    origin = geometry.origin
+    credit = {"credit": origin.credit} if origin.credit else {}
+    facts = {"faces": geometry.faces, "watertight": geometry.watertight}
+    asset = {"asset": origin.asset, "sha256": origin.sha256} if origin.asset else {}
+    return {**facts, "source": origin.source, "licence": origin.licence, **credit, **asset}
+
+
+def _digest(folder: Path, path: str) -> str:
+    content = ownership.read(folder, path)
+    return "" if content is None else folders.digest(content)

@@ -1,0 +1,77 @@
+"""What became of every relation that a graph states, and which boxes collide."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from echomodel.boxes import Boxes
+from echomodel.objective.support import allowed_overlap
+from echomodel.rules import fronts, margins, verdicts
+from echomodel.rules.placements import placement_margins
+from echousd.graph import SceneGraph
+from echousd.repair.geometry import pair_indices, separation
+from echousd.repair.placements import stated_placements
+from echousd.repair.report import TOUCH, Collision
+from echousd.room import LayoutOutcome, RoomData, Verdict
+from echousd.tensors import floor_centre, graph_batch
+
+ROUNDING = 1e-4  # metres: boxes are written to a tenth of a millimetre
+STATES = {1: "kept", 0: "broken", -1: "unmeasured"}
+
+
+class RoomWarning(UserWarning):
+    """A room is finished but does not keep its graph, or its furniture collides."""
+
+
+def layout_outcome(graph: SceneGraph, boxes: Boxes) -> LayoutOutcome:
+    """What became of one layout, whether it was repaired or not."""
+    return LayoutOutcome(relation_verdicts(graph, boxes), colliding(graph, boxes))
+
+
+def colliding(graph: SceneGraph, boxes: Boxes) -> tuple[Collision, ...]:
+    """Pairs of boxes that run into each other deeper than they may, deepest first."""
+    pairs = pair_indices(len(graph.nodes))
+    if not len(pairs):
+        return ()
+    size, position, yaw = (np.asarray(v, float) for v in (boxes.size, boxes.position, boxes.yaw))
+    allowed = allowed_overlap([node.category for node in graph.nodes], size, pairs)
+    depth = -(separation(size, position, yaw, pairs) + allowed)
+    names = graph.names
+    return tuple(
+        Collision(names[pairs[row, 0]], names[pairs[row, 1]], float(depth[row]))
+        for row in np.argsort(-depth, kind="stable")
+        if depth[row] > TOUCH
+    )
+
+
+def warn_of_faults(room: RoomData) -> None:
+    """A `RoomWarning` with what is wrong with a finished room, if anything is."""
+    faults = room.faults
+    if faults:
+        more = f" and {len(faults) - 3} more" if len(faults) > 3 else ""
+        warnings.warn(f"the room has faults: {'; '.join(faults[:3])}{more}", RoomWarning, stacklevel=3)
+
+
+def relation_verdicts(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict") -> tuple[Verdict, ...]:
+    """One verdict per relation of the graph, in its order, then one per placement."""
+    if not graph.relations:
+        return _placement_verdicts(graph, boxes)
+    triplets, centre = graph_batch(graph).triplets, floor_centre(graph)[[0, 2]]
+    headed = fronts(node.category for node in graph.nodes)
+    state = verdicts(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
+    margin = margins(boxes, triplets, rules=rules, center=centre, fronts=headed).tolist()
+    return tuple(
+        Verdict(r.subject, r.predicate, r.object, STATES[s], None if s < 0 else m)
+        for r, s, m in zip(graph.relations, state, margin, strict=True)
+    ) + _placement_verdicts(graph, boxes)
+
+
+def _placement_verdicts(graph: SceneGraph, boxes: Boxes) -> tuple[Verdict, ...]:
+    categories = [node.category for node in graph.nodes]
+    margin = placement_margins(boxes, stated_placements(graph), graph.room.corners, categories).tolist()
+    return tuple(
+        Verdict(*placed.triple, STATES[-1 if m != m else int(m >= -ROUNDING)], None if m != m else m)
+        for placed, m in zip(graph.placements, margin, strict=True)
+    )

@@ -1,0 +1,217 @@
+"""The options of a room, one row each: name, default, what is allowed, help.
+
+Flags of commands, `batch.toml`, `--set`, the manifest and the signatures of Python are made of this table.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Sequence
+from functools import lru_cache
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from echousd.assets.record import STRETCH
+from echousd.graph.nodes import PlainModel
+
+if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
+    from echousd.assets.choose import AssetWishes
+
+FACES = 5000  # budget of each mesh
+MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
+# options of an edit: how what is new is made; all others stay those of the room
+OF_NEW = (
+    "seed", "shapes", "weights", "device", "drafts", "steps", "repair", "faces",
+    "assets", "stretch", "licenses", "text", "collect",
+)  # fmt: skip
+ROOM, MODELS, LOOK, FILES = GROUPS = "Room", "Models of a library", "Look", "Files"
+
+
+def row(default: Any, group: str, help: str, *, everyday: bool = False, words: str = "", **limits: Any) -> Any:
+    """A row of the table.
+
+    Arguments:
+        help: a sentence part, without the default. everyday: on the first page of a command's help.
+        words: what stands for the value there; limits: of numbers, as pydantic calls them.
+    """
+    return Field(default, description=help, json_schema_extra={"group": group, "everyday": everyday, "words": words},
+                 **limits)  # fmt: skip
+
+
+def _source(name: str) -> str:
+    from echousd.shapes.sources import shape_source
+
+    shape_source(name)
+    return name
+
+
+def _palette(name: str) -> str:
+    from echousd.shapes.finishes.harmonies import HARMONIES
+
+    if name and name not in HARMONIES:
+        raise ValueError(f"palette is {name!r}, allowed: {', '.join(HARMONIES)}")
+    return name
+
+
+def _licences(text: str) -> str:
+    if not any(word.strip() for word in text.split(",")):
+        raise ValueError(f"licenses is {text!r}, allowed: licences with commas between, such as CC0,CC-BY")
+    return text
+
+
+def _upper(word: Any) -> Any:
+    return word.upper() if isinstance(word, str) else word
+
+
+File = Annotated[str, BeforeValidator(lambda value: str(value) if isinstance(value, Path) else value)]
+
+
+class Look(BaseModel):
+    """How a room looks and is written: what its manifest keeps, so that an edit goes on with it."""
+
+    model_config = ConfigDict(frozen=True, strict=True, allow_inf_nan=False)
+
+    walls: bool = row(True, LOOK, "walls, with doors and windows", everyday=True)
+    ceiling: bool = row(False, LOOK, "add a ceiling", everyday=True)
+    dress: Literal["none", "some", "full"] = row("some", LOOK, "small things, rugs, curtains", everyday=True)
+    dress_graph: bool = row(False, LOOK, "small things are nodes of the graph, too, in their own layer")
+    palette: Annotated[str, AfterValidator(_palette)] = row(
+        "", LOOK, "colours, as oak; else by the seed", everyday=True, words="name"
+    )
+    up_axis: Annotated[Literal["Y", "Z"], BeforeValidator(_upper)] = row(
+        "Y", FILES, "axis up, in assets too", everyday=True
+    )
+    faces: int = row(FACES, FILES, "face budget of each mesh", ge=100)
+    merge: Literal["parts", "bodies", "closed"] = row(
+        "parts",
+        FILES,
+        "a mesh for each part (legs, top ...), for all that moves together, or that as one closed surface",
+    )
+    atlas: bool = row(False, FILES, "unwrap without overlaps, not along the axes (extra: texture)")
+    materialx: bool = row(False, FILES, "materials have a MaterialX network beside UsdPreviewSurface")
+    instances: bool = row(False, FILES, "pieces that share an asset are instances of it: less memory, no overrides")
+    thumbnails: bool = row(False, FILES, "a picture of every asset in its folder (extra: render)")
+    crate: bool = row(False, FILES, "layers as usdc, which open faster, not as text")
+
+    @model_validator(mode="after")
+    def _agree(self) -> Look:
+        if self.dress_graph and self.dress == "none":
+            raise ValueError("dress_graph writes small things into the graph, but dress is 'none', allowed: some, full")
+        return self
+
+
+class RoomOptions(PlainModel, Look):
+    """What is asked of a room beside its graph; frozen, raises ValueError in one line for what is not allowed."""
+
+    seed: int = row(0, ROOM, "seed of all randomness", everyday=True, ge=0, le=MAX_SEED)
+    shapes: Annotated[str, AfterValidator(_source)] | None = row(
+        None, ROOM, "parts, sdf, library, guided or boxes", everyday=True, words="source"
+    )  # fmt: skip
+    layouts: int = row(1, ROOM, "arrangements, as variants", everyday=True, ge=1, le=1000)
+    weights: File | None = row(None, ROOM, "weights file or folder, from convert or train; else those that ship")
+    device: Literal["cpu", "cuda", "mps"] = row("cpu", ROOM, "what the network runs on")
+    drafts: int | None = row(None, ROOM, "layouts to choose the best from; else 8, fewer in large rooms", ge=1, le=64)
+    steps: int | None = row(None, ROOM, "sampling steps; else the model's", ge=1)
+    fit: Literal["keep", "drop"] = row("keep", ROOM, "keep all that is asked for, or leave out what has no place")
+    repair: bool = row(True, ROOM, "move and size boxes as little as possible until the graph is kept")
+    openings: Literal["kept", "drawn"] = row("kept", ROOM, "doors and windows of the graph, or new ones by the seed")
+    settle: bool = row(False, ROOM, "simulate the room, put everything where it rests (extra: sim)")
+    assets: File | None = row(None, MODELS, "index of a library of models", everyday=True)
+    stretch: float = row(STRETCH, MODELS, "how much models may be stretched", ge=1, le=4)
+    licenses: Annotated[str, AfterValidator(_licences)] | None = row(
+        None, MODELS, "licences that are allowed, such as CC0,CC-BY; else all"
+    )
+    text: str = row("", MODELS, 'what models shall be like, such as "mid-century oak" (extra: text)', words="words")
+    collect: bool = row(False, MODELS, "take models along with their files instead of referring to them")
+    preview: bool = row(True, FILES, "draw a picture of the room (extra: render)")
+
+    @model_validator(mode="after")
+    def _models(self) -> RoomOptions:
+        if self.text and self.assets is None:
+            raise ValueError(f"text {self.text!r} needs models to choose from; name a library's index (assets)")
+        return self
+
+    def wishes(self, outside: Sequence[str | Path] = ()) -> AssetWishes:
+        """What is asked of a library; raises ValueError for what is not there.
+
+        Arguments:
+            outside: folders besides that of the index in which its models may lie.
+        """
+        index = Path(self.assets or "")
+        changed = index.stat().st_mtime_ns if self.assets and index.is_file() else 0
+        beyond = tuple(map(str, outside))
+        return _wishes(self.assets, changed, self.stretch, self.licenses or "", self.text, self.collect, beyond)
+
+    @classmethod
+    def _explained(cls, fields: dict[str, Any], error: ValidationError) -> ValueError:
+        return ValueError(told(error, cls))
+
+
+@lru_cache(maxsize=4)  # words are compared with those of all models once in a process
+def _wishes(
+    assets: str | None, changed: int, stretch: float, licenses: str, text: str, collect: bool, outside: tuple[str, ...]
+) -> AssetWishes:
+    from echousd.assets.choose import AssetWishes
+    from echousd.assets.table import read_library
+
+    words = tuple(word.strip() for word in licenses.split(",") if word.strip())
+    library = None if assets is None else read_library(assets)
+    wishes = AssetWishes(library, stretch, words, text, collect, outside=tuple(map(Path, outside)))
+    _ = wishes.unlikeness  # what is absent is told before any long work
+    return wishes
+
+
+def told(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault in one line: the field, what was found and what is allowed."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "value_error":
+        return str(first["ctx"]["error"])
+    if first["type"] == "string_pattern_mismatch":
+        what = "a name of letters, digits and _" if "A-Z" in first["ctx"]["pattern"] else "a hexadecimal digest"
+        return f"{where} is {first['input']!r:.100}, allowed: {what}"
+    if first["type"] == "extra_forbidden":
+        return f"{where} is no option, allowed: {', '.join(sorted(model.model_fields))}"
+    field = model.model_fields.get(str(first["loc"][0])) if first["loc"] else None
+    limits = (
+        limits_of(field) if field is not None and first["type"] in ("greater_than_equal", "less_than_equal") else ""
+    )
+    words = re.sub("^Input should be ", "", first["msg"]).replace("'", "")
+    return f"{where} is {first['input']!r:.100}, allowed: {limits or words}"
+
+
+def limits_of(field: FieldInfo) -> str:
+    """The numbers that a field may hold, `1 to 64` or `1 or more`; "" where all are allowed."""
+    low = next((one.ge for one in field.metadata if hasattr(one, "ge")), None)
+    high = next((one.le for one in field.metadata if hasattr(one, "le")), None)
+    return "" if low is None else f"{low} or more" if high is None else f"{low} to {high}"
+
+
+def words_of(field: FieldInfo) -> str:
+    """What stands for a field's value in help: its words, or the kind of value."""
+    extra: Any = field.json_schema_extra
+    literal = [str(word) for word in get_args(field.annotation) if isinstance(word, str)]
+    return extra["words"] or "|".join(literal)
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def takes_options(
+    names: Collection[str] = tuple(RoomOptions.model_fields), model: type[RoomOptions] = RoomOptions
+) -> Callable[[Function], Function]:
+    """Show rows of the table in place of a function's `**given` in its signature."""
+
+    def shown(function: Function) -> Function:
+        own = [one for one in signature(function).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
+        rows = [Parameter(name, Parameter.KEYWORD_ONLY, default=model.model_fields[name].default) for name in names]
+
+        function.__signature__ = signature(function).replace(parameters=[*own, *rows])  # type: ignore[attr-defined]
+        return function
+
+    return shown

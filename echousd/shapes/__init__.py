@@ -1,0 +1,1 @@
+"""What stands in a room: where its geometry comes from, and what it is made of."""

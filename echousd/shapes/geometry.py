@@ -1,0 +1,150 @@
+"""The geometry of one piece of furniture: parts with material slots, colliders, and where it all comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import trimesh
+
+from echomodel.furniture.solids import Joint
+from echousd.shapes.originals.original import Original
+from echousd.shapes.surface import CREASE
+
+FRAME = "frame"  # the body that holds the joints
+LICENCE = "Apache-2.0"  # of everything that EchoUSD itself makes
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a piece of furniture comes from.
+
+    Arguments:
+        source: name of the shape source, see `echousd.shapes.sources`.
+        licence: SPDX identifier of its licence.
+        credit: who must be named, empty where nobody must.
+        asset: file or id of the model that it is, empty for what EchoUSD made. sha256: of the model's file.
+    """
+
+    source: str
+    licence: str = LICENCE
+    credit: str = ""
+    asset: str = ""
+    sha256: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a piece of furniture.
+
+    Arguments:
+        name: unique in its geometry; the prim is called `<asset>_<name>`.
+        mesh: in the object's frame, metres.
+        slots: material slot (a group of `echousd.shapes.looks`) -> (m,) int face numbers; together every face once.
+        crease: neighbours that fold more sharply than this keep a hard edge, radians.
+        body: what it moves with, see `Geometry.joints`; empty where the whole piece is one body.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    slots: Mapping[str, np.ndarray]
+    crease: float = CREASE
+    body: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Mass:
+    """What a piece of furniture, or one body of it, weighs.
+
+    Arguments:
+        mass: kilograms. centre: (3,) float, metres, in the object's frame.
+        inertia: (3,) float, moments about the principal axes, kg m². axes: (3, 3) float rotation, its columns are them.
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+    axes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Collider:
+    """What a piece of furniture collides with.
+
+    Arguments:
+        name: unique in its geometry; the prim is called `<asset>_<name>`.
+        mesh: in the object's frame, metres.
+        approximation: UsdPhysics's word for how the mesh is meant, `convexHull` or `convexDecomposition`.
+        body: as for `Part`.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    approximation: str
+    body: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """The geometry of one piece of furniture; objects that share an asset share this object.
+
+    Arguments:
+        parts: at least one.
+        colliders: at least one; together they cover all parts.
+        origin: provenance and licence.
+        mass: what it weighs, None = nobody knows, it is estimated from the category and the box.
+        joints: of the bodies that move (drawers, doors); what is fixed then belongs to the body `FRAME`.
+        masses: body -> what it weighs, for every body of a piece with joints.
+        coarse: the parts once more with few faces, of the same names, bodies and slots; empty = there are none.
+        description: numbers from which a furniture program makes the piece again, empty = there are none.
+        original: somebody else's model that the piece is; its parts and colliders only tell what it looks like.
+    """
+
+    parts: tuple[Part, ...]
+    colliders: tuple[Collider, ...]
+    origin: Origin
+    mass: Mass | None = None
+    joints: tuple[Joint, ...] = ()
+    masses: Mapping[str, Mass] = field(default_factory=dict)
+    coarse: tuple[Part, ...] = ()
+    description: tuple[float, ...] = ()
+    original: Original | None = None
+
+    def __post_init__(self) -> None:
+        names = [part.name for part in self.parts] + [collider.name for collider in self.colliders]
+        if not self.parts or not self.colliders or len(set(names)) < len(names):
+            raise ValueError(f"geometry has the pieces {names}, need parts and colliders, each with a name of its own")
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """All parts as one mesh."""
+        if len(self.parts) == 1:
+            return self.parts[0].mesh
+        whole = trimesh.util.concatenate([part.mesh for part in self.parts])
+        assert isinstance(whole, trimesh.Trimesh)
+        return whole
+
+    @property
+    def theirs_collides(self) -> bool:
+        """Whether it is somebody else's model with colliders of its own."""
+        return self.original is not None and self.original.colliders
+
+    @property
+    def faces(self) -> int:
+        """Triangles of all parts."""
+        return sum(len(part.mesh.faces) for part in self.parts)
+
+    @property
+    def watertight(self) -> bool:
+        """Whether every part is closed as it is, or once vertices at one place are one, as trimesh says."""
+        return all(_closed(part.mesh) for part in self.parts)
+
+
+def _closed(mesh: trimesh.Trimesh) -> bool:
+    if mesh.is_watertight:
+        return True
+    merged = mesh.copy()
+    merged.merge_vertices(merge_tex=True, merge_norm=True)
+    return bool(merged.is_watertight)

@@ -1,0 +1,165 @@
+"""Geometry of furniture that is made of solids: exact meshes in a face budget, convex colliders, mass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, QhullError
+
+from echomodel.furniture.assembly import Piece, pieces_of
+from echomodel.furniture.solids import FINEST, Solid
+from echomodel.triangles import area_normals
+from echousd.shapes.ballast import ballasted
+from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.matter import weighed
+
+SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ
+# role of a solid -> name of the part that all of its kind are in, where they differ
+GROUPS = {
+    "leg": "legs", "rail": "rails", "arm": "arms", "side": "case", "bottom": "case", "shelf": "shelves",
+    "handle": "handles", "leaf": "leaves", "book": "books", "bottle": "bottles", "pillow": "pillows",
+    "cushion": "cushions", "caster": "casters", "seam": "seams", "cord": "cords", "shade": "shades", "bulb": "bulbs",
+}  # fmt: skip
+CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
+COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
+COLLIDERS = 24  # convex pieces of one body at most
+SMALL = 0.002  # share of its box below which a solid alone is no obstacle
+
+
+def assembled(
+    solids: Sequence[Solid],
+    size: np.ndarray,
+    *,
+    faces: int,
+    origin: Origin,
+    description: tuple[float, ...] = (),
+    round: bool = False,
+) -> Geometry:
+    """The geometry of one piece of furniture: a part for each role (legs, top, back), drawers and doors in bodies.
+
+    Arguments:
+        solids: of a furniture program.
+        size: (3,) float, metres; the geometry fills it, in width or in depth alone where it is `round`.
+        faces: most triangles of all parts together; the finest detail that stays below is taken.
+        origin: provenance. description: what the solids were made from.
+    """
+    pieces = within_budget(solids, size, faces, round=round)
+    used = [piece.solid for piece in pieces]
+    plain, low = pieces_of(used, size, 1, round=round), pieces_of(used, size, 0, round=round)
+    fixed = FRAME if any(piece.joint for piece in pieces) else ""
+    parts: list[Part] = []
+    colliders: list[Collider] = []
+    masses: dict[str, Mass] = {}
+    for body, members in _bodies(pieces, fixed).items():
+        prefix = f"{body}_" if body != fixed else ""
+        parts += _parts(prefix, members, body)
+        own = _bodies(plain, fixed)[body]
+        hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
+        words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
+        colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
+        masses[body] = weighed(own)
+    joints = {piece.joint.body: piece.joint for piece in pieces if piece.joint}
+    fewer = sum(len(piece.faces) for piece in low) < COARSE * sum(len(piece.faces) for piece in pieces)
+    coarse: list[Part] = []
+    for body, members in _bodies(low, fixed).items() if fewer else ():
+        coarse += _parts(f"{body}_" if body != fixed else "", members, body)
+    whole = ballasted(weighed(plain), [piece.vertices for piece in plain])
+    return Geometry(
+        tuple(parts), tuple(colliders), origin, mass=whole, joints=tuple(joints.values()),
+        masses=masses if fixed else {}, coarse=tuple(coarse), description=description,
+    )  # fmt: skip
+
+
+def _bodies(pieces: Sequence[Piece], fixed: str) -> dict[str, list[Piece]]:
+    """Body -> its solids, what is fixed first."""
+    out: dict[str, list[Piece]] = {fixed: []}
+    for piece in pieces:
+        out.setdefault(piece.joint.body if piece.joint else fixed, []).append(piece)
+    return {body: members for body, members in out.items() if members}
+
+
+def _parts(prefix: str, pieces: Sequence[Piece], body: str) -> list[Part]:
+    """A part for each role among the solids of a body; what is the body itself, a drawer or a door, is its `mesh`."""
+    kind = body.rsplit("_", 1)[0]
+    groups: dict[str, list[Piece]] = {}
+    for piece in pieces:
+        role = piece.solid.role
+        groups.setdefault("mesh" if role == kind else GROUPS.get(role, role), []).append(piece)
+    return [part_of(f"{prefix}{role}", members, body) for role, members in groups.items()]
+
+
+def within_budget(solids: Sequence[Solid], size: np.ndarray, faces: int, *, round: bool = False) -> list[Piece]:
+    """The solids meshed as finely as `faces` triangles allow; where boxes are too many, the smallest are left out."""
+    for detail in range(FINEST, -1, -1):
+        pieces = pieces_of(solids, size, detail, round=round)
+        if sum(len(piece.faces) for piece in pieces) <= faces:
+            return pieces
+    volume = [float(np.prod(np.ptp(piece.vertices, axis=0))) for piece in pieces]
+    kept, total = [], 0
+    for number in np.argsort(volume)[::-1].tolist():
+        if total + len(pieces[number].faces) <= faces:
+            kept.append(number)
+            total += len(pieces[number].faces)
+    return pieces_of([pieces[number].solid for number in sorted(kept)], size, 0, round=round)
+
+
+def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
+    """Some meshed solids as one part with a slot per material."""
+    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
+    faces = np.concatenate([piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)])
+    mesh = trimesh.Trimesh(np.concatenate([piece.vertices for piece in pieces]), faces, process=False)
+    words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
+    slot = np.repeat(words, [len(piece.faces) for piece in pieces])
+    return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
+
+
+def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
+    """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
+
+    Arguments:
+        points: vertices (n, 3) of each solid, metres.
+        box: volume of the whole piece's box, m³; what is far smaller is no obstacle of its own.
+        most: number of hulls.
+    """
+    groups: list[list[np.ndarray]] = [[p] for p in points]
+    low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
+    volume = _volume(low, high)
+    left = len(groups)
+    while left > 1:
+        small = int(np.argmin(volume))
+        if left <= most and volume[small] >= SMALL * box:
+            break
+        wasted = _volume(np.minimum(low, low[small]), np.maximum(high, high[small])) - volume
+        wasted[small] = np.inf
+        other = int(np.argmin(wasted))  # what is gone has an infinite volume and never wins
+        groups[other] += groups[small]
+        groups[small] = []
+        low[other], high[other] = np.minimum(low[other], low[small]), np.maximum(high[other], high[small])
+        volume[other] = _volume(low[other], high[other])
+        low[small], high[small], volume[small] = 1e9, 2e9, np.inf
+        left -= 1
+    return [_hull(np.concatenate(group)) for group in groups if group]
+
+
+def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Volumes of boxes, none thinner than a millimetre."""
+    return np.prod(np.maximum(high - low, 1e-3), axis=-1)
+
+
+def _hull(points: np.ndarray) -> trimesh.Trimesh:
+    """The convex hull with exact corners, facing outwards; of points in one plane their box, a tenth of a mm thick."""
+    try:
+        hull = ConvexHull(points, qhull_options="QbB Pp Qt")
+    except QhullError:
+        extent = np.maximum(np.ptp(points, axis=0), 1e-4)
+        flat = trimesh.creation.box(extent)
+        flat.apply_translation((points.max(0) + points.min(0)) / 2)
+        return flat
+    corner = points[hull.simplices]
+    normal = area_normals(corner)
+    inwards = (normal * hull.equations[:, :3]).sum(1) < 0
+    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    used, index = np.unique(faces, return_inverse=True)
+    return trimesh.Trimesh(points[used], index.reshape(-1, 3), process=False)

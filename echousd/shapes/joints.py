@@ -1,0 +1,101 @@
+"""Drawers and doors of an asset: bodies, joints with limits and masses, in a variant set that is `static` at first."""
+
+from __future__ import annotations
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
+
+<<<<<<< HEAD:echousd/shapes/joints.py
+from echomodel.furniture.solids import Joint
+from echousd.shapes.geometry import FRAME, Geometry, Mass
+from echousd.shapes.masses import write_mass
+from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
+from echousd.stage.layouts import ARTICULATED, ARTICULATION
+=======
+from echomodel.furniture.solids import Joint
+from echousd.shapes.geometry import FRAME, Geometry, Mass
+from echousd.shapes.masses import write_mass
+from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
+>>>>>>> 9e16427 (Four trades of a room are four packages: make, shapes, layers, folder; drawing has its own):echousd/shapes/joints.py
+
+STATIC = "static"
+Point = tuple[float, float, float]
+DAMPING = 2.0  # N s/m or N m s: a drawer that is let go stops
+
+
+def write_joints(stage: Usd.Stage, asset: str, geometry: Geometry) -> None:
+    """Author the variant set `articulation` on the root of an asset: nothing in `static`, bodies and joints else.
+
+    Arguments:
+        stage: receives the opinions; its root prim is `/<asset>`.
+        geometry: with joints.
+    """
+    root = stage.GetPrimAtPath(f"/{asset}")
+    variants = root.GetVariantSets().AddVariantSet(ARTICULATION)
+    for name in (STATIC, ARTICULATED):
+        variants.AddVariant(name)
+    variants.SetVariantSelection(ARTICULATED)
+    with variants.GetVariantEditContext():
+        for body, mass in geometry.masses.items():
+            prim = stage.OverridePrim(piece_path(f"/{asset}", asset, body))
+            UsdPhysics.RigidBodyAPI.Apply(prim)
+            write_mass(prim, mass)
+        # on the frame, not on the asset's root: importers take whatever bears it for a body
+        frame = stage.OverridePrim(piece_path(f"/{asset}", asset, FRAME))
+        UsdPhysics.ArticulationRootAPI.Apply(frame)
+        UsdGeom.Scope.Define(stage, f"/{asset}/{piece_name(asset, 'joints')}")
+        for joint in geometry.joints:
+            path = f"/{asset}/{piece_name(asset, 'joints')}/{piece_name(asset, joint.body)}_joint"
+            still, moving = (piece_path(f"/{asset}", asset, body) for body in (FRAME, joint.body))
+            _joint(stage, path, still, moving, joint, (joint.anchor, joint.anchor))
+    variants.SetVariantSelection(STATIC)
+
+
+def write_hinge(stage: Usd.Stage, leaf: str, joint: Joint, mass: Mass) -> None:
+    """Author the variant set `articulation` on a door of the shell: nothing in `static`, its leaf on a hinge else.
+
+    Arguments:
+        stage: receives the opinions. leaf: prim path of what turns, whose origin is on the axis, below the door's prim.
+        joint: its anchor in the door's frame. mass: of the leaf.
+    """
+    door = leaf.rpartition("/")[0]
+    variants = stage.OverridePrim(door).GetVariantSets().AddVariantSet(ARTICULATION)
+    for name in (STATIC, ARTICULATED):
+        variants.AddVariant(name)
+    variants.SetVariantSelection(ARTICULATED)
+    with variants.GetVariantEditContext():
+        body = stage.OverridePrim(leaf)
+        UsdPhysics.RigidBodyAPI.Apply(body)
+        write_mass(body, mass)
+        # against the door's prim, which is no body and stays where it is, wherever the room is put
+        _joint(stage, f"{leaf}_joint", door, leaf, joint, (joint.anchor, (0.0, 0.0, 0.0)))
+    variants.SetVariantSelection(STATIC)
+
+
+def _joint(stage: Usd.Stage, path: str, still: str, moving: str, joint: Joint, places: tuple[Point, Point]) -> None:
+    """A joint between two prims; `places`: its anchor in the frame of each."""
+    slides = joint.kind == "prismatic"
+    made = (UsdPhysics.PrismaticJoint if slides else UsdPhysics.RevoluteJoint).Define(stage, path)
+    made.CreateBody0Rel().SetTargets([Sdf.Path(still)])
+    made.CreateBody1Rel().SetTargets([Sdf.Path(moving)])
+    made.CreateAxisAttr(UsdPhysics.Tokens.x)
+    turn = Gf.Rotation(Gf.Vec3d(1, 0, 0), Gf.Vec3d(*joint.axis)).GetQuat()
+    turned = Gf.Quatf(turn.GetReal(), Gf.Vec3f(turn.GetImaginary()))
+    for create, place in zip((made.CreateLocalPos0Attr, made.CreateLocalPos1Attr), places, strict=True):
+        create(Gf.Vec3f(*place))
+    for create in (made.CreateLocalRot0Attr, made.CreateLocalRot1Attr):
+        create(turned)
+    made.CreateLowerLimitAttr(0.0)
+    made.CreateUpperLimitAttr(round(joint.reach if slides else float(np.degrees(joint.reach)), 5))
+    drive = UsdPhysics.DriveAPI.Apply(made.GetPrim(), "linear" if slides else "angular")
+    drive.CreateDampingAttr(DAMPING if slides else DAMPING / 60)  # angular drives count in degrees
+    drive.CreateStiffnessAttr(0.0)
+
+
+def read_joints(root: Usd.Prim, asset: str) -> tuple[Joint, ...]:
+    """Names of the bodies of an asset that move, as joints without places: its files are carried on as they are."""
+    geo = root.GetChild(GEO)
+    below = geo.GetChildren() if geo else ()
+    bodies = [piece_of(asset, prim.GetName()) for prim in below if prim.GetTypeName() == "Xform"]
+    moving = [body for body in bodies if body and body != FRAME]
+    return tuple(Joint(body, "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.0) for body in sorted(moving))

@@ -1,0 +1,231 @@
+"""Surfaces ready to be shown: triangles with creased normals, texture coordinates and material groups."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from echomodel.triangles import area_normals
+from echousd.shapes.finishes.slots import metres_of
+
+NUDGE = 4e-6  # metres between points of different boards at one place
+CREASE = np.radians(42.0)  # neighbours that fold more sharply than this keep a hard edge
+MANY_FACES = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles with indexed corner attributes, as UsdGeomMesh stores them.
+
+    Arguments:
+        points: (v, 3) float32, metres.
+        faces: (f, 3) int32, indices into points, counter-clockwise seen from outside.
+        normals, normal_index: (k, 3) float32 unit vectors and (3 f) int32, one index per face corner.
+        st, st_index: (t, 2) float32 and (3 f) int32.
+        groups: material group -> (m,) int32 face numbers; together they name every face exactly once.
+    """
+
+    points: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    normal_index: np.ndarray
+    st: np.ndarray
+    st_index: np.ndarray
+    groups: Mapping[str, np.ndarray]
+
+    @property
+    def extent(self) -> np.ndarray:
+        """(2, 3) float32: lower and upper corner."""
+        return np.stack([self.points.min(0), self.points.max(0)]).astype(np.float32)
+
+
+def surface(
+    mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray], *, atlas: bool = False, crease: float = CREASE
+) -> Surface:
+    """A mesh with normals and texture coordinates.
+
+    Arguments:
+        mesh: triangles in metres.
+        groups: material group -> face numbers.
+        atlas: unwrap without overlaps into the unit square (xatlas, extra `texture`) instead of projecting along the
+            axes, see `laid_out`.
+        crease: neighbours that fold more sharply than this keep a hard edge, radians.
+    """
+    normals, normal_index = creased_normals(mesh, crease)
+    st, st_index = atlas_unwrap(mesh) if atlas else laid_out(mesh, groups)
+    return Surface(
+        points=unshared(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces)),
+        faces=np.asarray(mesh.faces, np.int32),
+        normals=normals,
+        normal_index=normal_index,
+        st=st,
+        st_index=st_index,
+        groups={name: np.asarray(index, np.int32) for name, index in sorted(groups.items()) if len(index)},
+    )
+
+
+def creased_normals(mesh: trimesh.Trimesh, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
+    """Corner normals, smooth within `crease` radians: ((k, 3) float32 values, (3 f) int32 indices)."""
+    faces = np.asarray(mesh.faces)
+    triangles = np.asarray(mesh.vertices)[faces]
+    area_normal = area_normals(triangles)
+    unit = area_normal / np.maximum(np.linalg.norm(area_normal, axis=1, keepdims=True), 1e-20)
+    corner_vertex = faces.ravel()
+    corner_face = np.repeat(np.arange(len(faces)), 3)
+    order = np.argsort(corner_vertex, kind="stable")
+    count = np.bincount(corner_vertex, minlength=len(mesh.vertices))
+    first = np.concatenate([[0], np.cumsum(count)[:-1]])
+    # every corner meets every corner of the same vertex
+    fan = count[corner_vertex]
+    here = np.repeat(np.arange(len(corner_vertex)), fan)
+    step = np.arange(len(here)) - np.repeat(np.cumsum(fan) - fan, fan)
+    other = order[np.repeat(first[corner_vertex], fan) + step]
+    near = (unit[corner_face[here]] * unit[corner_face[other]]).sum(1) >= np.cos(crease)
+    total = np.zeros((len(corner_vertex), 3))
+    for axis in range(3):
+        weight = area_normal[corner_face[other[near]], axis]
+        total[:, axis] = np.bincount(here[near], weights=weight, minlength=len(corner_vertex))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    total = np.where(length > 1e-12, total / np.maximum(length, 1e-12), unit[corner_face])
+    flat = np.linalg.norm(total, axis=1) < 0.5  # corners of triangles without area
+    total[flat] = (0.0, 1.0, 0.0)
+    return _indexed(total, 4)
+
+
+def laid_out(mesh: trimesh.Trimesh, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates for the patterns of our material slots: ((t, 2) float32, (3 f) int32).
+
+    Along the axis that each face looks at most, divided by the metres that one picture of its slot covers; u runs along
+    the longer side of every board (fibres do), and boards begin at different places of the picture. Slots whose picture
+    is of the whole thing get all of it on the side that they show.
+    """
+    points, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    axis, way = facing_axis(points[faces])
+    st = _projected(points[faces], axis, way)
+    board = connected_pieces(faces, len(points))
+    low, high = (np.full((int(board.max(initial=0)) + 1, 3), sign * np.inf) for sign in (1, -1))
+    np.minimum.at(low, np.repeat(board, 3), points[faces].reshape(-1, 3))
+    np.maximum.at(high, np.repeat(board, 3), points[faces].reshape(-1, 3))
+    extent = (high - low)[board]
+    rows = np.arange(len(faces))
+    across, along = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
+    turned = extent[rows, along] > 1.05 * extent[rows, across]
+    st[turned] = np.stack([st[turned][..., 1], -st[turned][..., 0]], -1)
+    st += (np.stack([0.37 * board, 0.61 * board], 1) % 1.0)[:, None]
+    for slot, members in groups.items():
+        metres = metres_of(slot)
+        if metres:
+            st[members] /= metres
+        elif len(members):
+            shown = points[faces[members]]
+            first, last = shown.reshape(-1, 3).min(0), shown.reshape(-1, 3).max(0)
+            upward = int(np.argmin(last - first) == 1)  # what lies shows its upper side, what hangs its front
+            share = (shown - first) / np.maximum(last - first, 1e-9)
+            st[members] = np.stack([share[..., 0], 1 - share[..., 2] if upward else share[..., 1]], -1)
+    return _indexed(st.reshape(-1, 2), 5)
+
+
+def unshared(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """The points (v, 3) float32, where boards meet a few micrometres apart: validators take equal points for a fault.
+
+    What lies at one place and belongs to several connected pieces moves towards the middle of its own; what belongs to
+    one piece (both ends of a cord around a cushion) moves inwards, against its own faces.
+    """
+    _, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    place = place.reshape(-1)
+    shared = np.flatnonzero(count[place] > 1)
+    if not len(shared):
+        return points
+    board = np.full(len(points), -1)
+    board[faces] = connected_pieces(faces, len(points))[:, None]
+    low, high = (np.full((int(board.max()) + 1, 3), sign * np.inf) for sign in (1, -1))
+    used = board >= 0
+    np.minimum.at(low, board[used], points[used])
+    np.maximum.at(high, board[used], points[used])
+    out = points.astype(float)
+    seen: dict[int, list[int]] = {}
+    times: Counter[tuple[int, int]] = Counter()
+    for vertex in shared[used[shared]].tolist():
+        boards = seen.setdefault(int(place[vertex]), [])
+        if board[vertex] not in boards:
+            boards.append(board[vertex])
+        inwards = (low[board[vertex]] + high[board[vertex]]) / 2 - out[vertex]
+        out[vertex] += NUDGE * boards.index(board[vertex]) * np.sign(inwards)
+        again = (int(place[vertex]), int(board[vertex]))
+        if times[again]:
+            one, two, three = np.moveaxis(points[faces[(faces == vertex).any(1)]].astype(float), 1, 0)
+            outwards = np.cross(two - one, three - one).sum(0)
+            out[vertex] -= NUDGE * times[again] * outwards / max(float(np.linalg.norm(outwards)), 1e-20)
+        times[again] += 1
+    return out.astype(np.float32)
+
+
+def connected_pieces(faces: np.ndarray, points: int) -> np.ndarray:
+    """(f,) int, the connected piece that each face belongs to, in the order of their first points."""
+    if len(faces) > MANY_FACES:
+        pairs = np.concatenate([faces[:, :2], faces[:, 1:]])
+        links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(points, points))
+        least = connected_components(links, directed=False)[1]
+    else:  # boards: building the matrix would take ten times as long
+        least, before = np.arange(points), None
+        while before is None or not np.array_equal(least, before):
+            before, least = least, least.copy()  # the first point that each is known to be connected with
+            np.minimum.at(least, faces.ravel(), np.repeat(before[faces].min(1), 3))
+            least = least[least]
+    return np.unique(least[faces[:, 0]], return_inverse=True)[1]
+
+
+def facing_axis(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(f,) int, the axis that each triangle (f, 3, 3) looks at most, and (f,) float, 1 or -1: which way."""
+    normal = area_normals(triangles)
+    axis = np.abs(normal).argmax(1)
+    return axis, np.where(normal[np.arange(len(normal)), axis] < 0, -1.0, 1.0)
+
+
+def box_projection(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(f, 3, 2) float: texture coordinates in metres along the axis that each face looks at most."""
+    triangles = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    return _projected(triangles, *facing_axis(triangles))
+
+
+def _projected(triangles: np.ndarray, axis: np.ndarray, way: np.ndarray) -> np.ndarray:
+    facing = way[:, None]
+    x, y, z = triangles[..., 0], triangles[..., 1], triangles[..., 2]
+    u = np.choose(axis[:, None], [-z * facing, x, x * facing])
+    v = np.choose(axis[:, None], [y, -z * facing, y])
+    return np.stack([u, v], -1)
+
+
+def atlas_unwrap(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
+    """Texture coordinates without overlaps in the unit square (xatlas): ((t, 2) float32, (3 f) int32)."""
+    try:
+        import xatlas
+    except ImportError as error:
+        raise ValueError(f'texture atlas needs xatlas ({error}): pip install "echousd[texture]"') from None
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32))
+    pack = xatlas.PackOptions()
+    pack.resolution, pack.padding = 1024, 2
+    atlas.generate(pack_options=pack)
+    _, index, st = atlas[0]  # xatlas keeps the order of the faces
+    return np.asarray(st, np.float32), np.asarray(index, np.int32).ravel()
+
+
+def _indexed(values: np.ndarray, digits: int) -> tuple[np.ndarray, np.ndarray]:
+    """The different rows of `values`, rounded, in lexicographic order, and for every row the number of its value."""
+    whole = np.rint(values * 10.0**digits).astype(np.int64)
+    low = whole.min(0)
+    span = whole.max(0) - low + 1
+    if float(np.prod(span.astype(float))) > 2**62:  # rows as one number each sort ten times as fast
+        unique, index = np.unique(whole, axis=0, return_inverse=True)
+    else:
+        keys = np.ravel_multi_index(tuple((whole - low).T), tuple(span))
+        found, index = np.unique(keys, return_inverse=True)
+        unique = np.stack(np.unravel_index(found, tuple(span)), 1) + low
+    return (unique / 10.0**digits).astype(np.float32), index.reshape(-1).astype(np.int32)

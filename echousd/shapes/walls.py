@@ -1,0 +1,175 @@
+"""Walls with their openings: solid between mitred corners, doors and windows in them, as parts of the room's shell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import shapely
+import trimesh
+
+from echomodel.furniture.solids import Joint
+from echomodel.openings import Opening, direction, edge_lengths, inward_normal, signed_area
+from echousd.shapes import fittings
+from echousd.shapes.fittings import WALL
+from echousd.shapes.shell import THICKNESS
+from echousd.stage.paths import piece_name
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One mesh of the shell in the room's frame: its prim's name, its material, whether things bump into it."""
+
+    name: str
+    look: str
+    mesh: trimesh.Trimesh
+    solid: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class ShellPart:
+    """A floor, wall, ceiling, door or window, or what of one moves.
+
+    Arguments:
+        name: of its prim. label: what it is, "" for a part of what is labelled.
+        pieces: its meshes. inner: parts that belong to it.
+        joint: how it moves against the part that it belongs to, None = not at all.
+    """
+
+    name: str
+    label: str
+    pieces: tuple[Piece, ...]
+    inner: tuple[ShellPart, ...] = ()
+    joint: Joint | None = None
+
+
+def walls(
+    polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset()
+) -> list[ShellPart]:
+    """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
+
+    Arguments:
+        polygon: (k, 2) float, corners (x, z) of the floor, metres, in the turn that the openings count edges in.
+        height: of the room, metres.
+        openings: in these walls. bare: names of the windows that have no curtain rail.
+    """
+    corners = np.ascontiguousarray(polygon, float)
+    return list(_walls(corners.tobytes(), height, tuple(openings), bare))
+
+
+@lru_cache(maxsize=4)  # furniture is moved away from them before they are written
+def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str]) -> tuple[ShellPart, ...]:
+    polygon = np.frombuffer(corners).reshape(-1, 2)
+    lengths = edge_lengths(polygon)
+    parts = []
+    for edge, length in enumerate(lengths):
+        if length < 1e-3:
+            continue
+        name = f"Wall_{edge + 1}"
+        here = [opening for opening in openings if opening.edge == edge]
+        frame = wall_frame(polygon, edge)
+        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, height, here), frame))]
+        boards = fittings.skirting(here, float(length))
+        if boards is not None:
+            pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
+        left_first = signed_area(polygon) > 0
+        inner = [
+            _filled(name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first)
+            for opening in here
+        ]
+        parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
+    return tuple(parts)
+
+
+def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
+    """A slab over the room, from the ceiling upwards."""
+    flat = shapely.Polygon(np.stack([polygon[:, 0], -polygon[:, 1]], 1))
+    slab = trimesh.creation.extrude_polygon(flat, THICKNESS)
+    slab.vertices = np.stack([slab.vertices[:, 0], slab.vertices[:, 2] + height, -slab.vertices[:, 1]], 1)
+    return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", slab),))
+
+
+def outline(polygon: np.ndarray) -> np.ndarray:
+    """(k, 2) float, the outer corners of the walls: offsets of the edges by their thickness meet there."""
+    count = len(polygon)
+    normals = np.array([-inward_normal(polygon, edge) for edge in range(count)])
+    before = np.roll(normals, 1, axis=0)
+    bisector = normals + before
+    cosine = 1.0 + (normals * before).sum(1, keepdims=True)
+    mitre = bisector / np.maximum(cosine, 0.35)  # very sharp corners are cut off
+    return np.asarray(polygon + WALL * mitre, float)
+
+
+def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
+    """(4, 4) float: a wall's own frame (u along, v up, w outwards) to the room's."""
+    frame = np.eye(4)
+    along, outward = direction(polygon, edge), -inward_normal(polygon, edge)
+    frame[[0, 2], 0], frame[1, 1], frame[[0, 2], 2] = along, 1.0, outward
+    frame[1, 1], frame[1, 0], frame[1, 2] = 1.0, 0.0, 0.0
+    frame[[0, 2], 3] = polygon[edge]
+    return frame
+
+
+def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening]) -> trimesh.Trimesh:
+    """The wall with its holes, in its own frame."""
+    length = float(edge_lengths(polygon)[edge])
+    face = shapely.box(0.0, -THICKNESS, length, height)
+    for opening in openings:
+        low = opening.sill if opening.sill > 0 else 0.0
+        face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, height)))
+    pieces = [p for p in getattr(face, "geoms", [face]) if p.area > 1e-6]
+    mesh = fittings.joined([trimesh.creation.extrude_polygon(p, WALL) for p in pieces])
+    outer = outline(polygon)
+    along = direction(polygon, edge)
+    first = float((outer[edge] - polygon[edge]) @ along)
+    last = float((outer[(edge + 1) % len(polygon)] - polygon[edge]) @ along)
+    vertices = np.array(mesh.vertices)
+    far = vertices[:, 2] > WALL / 2
+    vertices[far & (vertices[:, 0] < 1e-6), 0] = first
+    vertices[far & (vertices[:, 0] > length - 1e-6), 0] = last
+    mesh.vertices = vertices
+    return mesh
+
+
+def _filled(
+    wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool
+) -> ShellPart:
+    """What stands in an opening; passages have a frame and nothing else. `height`: below which a rail must be."""
+    name = f"{wall}_{opening.name}"
+
+    def made(what: str, look: str, mesh: trimesh.Trimesh | None, solid: bool = True) -> tuple[Piece, ...]:
+        return () if mesh is None else (Piece(piece_name(name, what), look, _placed(mesh, frame), solid),)
+
+    if opening.kind == "window":
+        pieces = (
+            *made("frame", "trim", fittings.window_frame(opening)),
+            *made("glass", "glass", fittings.window_glass(opening)),
+            *made("sill", "trim", fittings.window_sill(opening)),
+            *made("rail", "rail", fittings.curtain_rail(opening, length, height), solid=False),
+        )
+        return ShellPart(name, "window", pieces)
+    if opening.kind != "door":
+        return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)))
+    leaf = made("leaf", "leaf", fittings.door_leaf(opening))
+    handle = made("handle", "rail", fittings.door_handle(opening, left_first), solid=False)
+    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first))
+    return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)), (hinge,))
+
+
+def _hinge(opening: Opening, frame: np.ndarray, left_first: bool) -> Joint:
+    """How a door's leaf turns about its edge, by a right angle to the side that it opens to."""
+    at, closed, opened = fittings.hinge_line(opening, left_first)
+    anchor = frame[:3, :3] @ at + frame[:3, 3]
+    up = np.cross(frame[:3, :3] @ closed, frame[:3, :3] @ opened)  # from closed to open it turns about this
+    return Joint("hinge", "revolute", (0.0, float(np.sign(up[1])), 0.0), tuple(anchor.round(6).tolist()), np.pi / 2)
+
+
+def _placed(mesh: trimesh.Trimesh, frame: np.ndarray) -> trimesh.Trimesh:
+    """The mesh in the room's frame; a frame of the other hand turns the faces back."""
+    out = mesh.copy()
+    out.vertices = mesh.vertices @ frame[:3, :3].T + frame[:3, 3]
+    if np.linalg.det(frame[:3, :3]) < 0:
+        out.faces = np.ascontiguousarray(out.faces[:, ::-1])
+    return out

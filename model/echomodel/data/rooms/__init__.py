@@ -1,6 +1,0 @@
-"""Rooms to learn from: floors, functional groups and lamps, drawn so that they look like real ones in numbers."""
-
-from echomodel.data.rooms.generator import generate_room, generate_rooms
-from echomodel.data.rooms.untidy import untidied
-
-__all__ = ["generate_room", "generate_rooms", "untidied"]

@@ -1,0 +1,117 @@
+"""Books: single ones, rows, stacks, magazines, a notebook."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.solids import Block, Solid, rotation
+
+COVERS = ("book_a", "book_b", "book_c", "book_d")
+COVER = 0.003  # metres
+
+
+def book_row(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """Books upright side by side with their spines to the front, the last one leaning where there is room."""
+    w, h, d = size
+    parts: list[Solid] = []
+    at = -w / 2
+    while True:
+        thick = float(rng.uniform(0.016, 0.042))
+        if at + thick > w / 2:
+            break
+        tall, deep = h * rng.uniform(0.78, 1.0), d * rng.uniform(0.8, 1.0)
+        parts += _upright(at, thick, tall, deep, d, str(rng.choice(COVERS)))
+        at += thick + 0.0008
+    if not parts:
+        parts += _upright(-w / 2, w, h, d, d, COVERS[0])
+    return parts
+
+
+BOUND = 12  # kinds of single books, so that a wall of them shares few assets
+THICK, TALL, DEEP = (0.018, 0.024, 0.03, 0.038), (0.19, 0.22, 0.25), (0.13, 0.145, 0.16)
+
+
+def bound(number: int) -> np.ndarray:
+    """(3,) float, metres: extents of single book `number`, 0 to `BOUND` - 1."""
+    return np.array([THICK[number % 4], TALL[number % 3], DEEP[(number // 4) % 3]])
+
+
+def book(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One book upright, its spine to the front."""
+    w, h, d = size
+    return _upright(-w / 2, w, h, d, d, str(rng.choice(COVERS)))
+
+
+def books_in(width: float) -> int:
+    """How many books about a row of this width holds."""
+    return max(1, int(width / 0.03))
+
+
+def _upright(at: float, thick: float, tall: float, deep: float, d: float, cover: str) -> list[Solid]:
+    front = d / 2
+    # the block of pages stands back from the covers; spine and covers are one board bent round it
+    pages = box((at + COVER, 0.003, front - deep + 0.003), (at + thick - COVER, tall - 0.004, front - COVER), "paper")
+    return [
+        box((at, 0, front - deep), (at + COVER, tall, front), cover),
+        box((at + thick - COVER, 0, front - deep), (at + thick, tall, front), cover),
+        box((at, 0, front - COVER), (at + thick, tall, front), cover, 0.0012),
+        pages,
+    ]
+
+
+def book_stack(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """Books that lie on one another, each a little turned."""
+    w, h, d = size
+    count = max(2, round(h / 0.03))
+    parts: list[Solid] = []
+    at = 0.0
+    for number in range(count):
+        thick = h / count
+        share = 1.0 - 0.1 * number - rng.uniform(0, 0.05)
+        turn = rotation(y=float(rng.uniform(-0.14, 0.14)))
+        parts += _flat(at, thick, w * share * 0.92, d * share * 0.92, turn, str(rng.choice(COVERS)))
+        at += thick
+    return parts
+
+
+def magazine(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One or two magazines."""
+    w, h, d = size
+    turn = rotation(y=float(rng.uniform(0.1, 0.3)))
+    return [
+        Block(centre=np.array([0, h / 4, 0]), half=np.array([w, h / 2, d]) / 2, material="paper"),
+        Block(centre=np.array([0, 3 * h / 4, 0]), half=np.array([w, h / 2, d]) / 2, turn=turn, material="book_b"),
+    ]
+
+
+def notebook(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A closed notebook with a pencil on it."""
+    w, h, d = size
+    book = h * 0.6
+    parts = _flat(0.0, book, w, d, rotation(), "book_a")
+    pencil = Block(
+        centre=np.array([w * 0.12, book + (h - book) / 2, 0]),
+        half=np.array([(h - book) / 2, (h - book) / 2, d * 0.36]),
+        turn=rotation(y=0.35),
+        material="frame",
+    )
+    return [*parts, pencil]
+
+
+def _flat(at: float, thick: float, w: float, d: float, turn: np.ndarray, cover: str) -> list[Solid]:
+    half, board = np.array([w / 2, thick / 2, d / 2]), min(COVER, thick / 5)
+    middle = np.array([0.0, at + thick / 2, 0.0])
+    lower, upper = (middle + np.array([0, s * (thick / 2 - board / 2), 0]) for s in (-1, 1))
+    plate = np.array([w / 2, board / 2, d / 2])
+    return [
+        Block(centre=lower, half=plate, turn=turn, material=cover),
+        Block(centre=upper, half=plate, turn=turn, material=cover),
+        Block(
+            centre=middle + turn @ np.array([-w / 2 + board / 2, 0, 0]),
+            half=np.array([board / 2, thick / 2, d / 2]),
+            turn=turn,
+            material=cover,
+        ),
+        Block(centre=middle, half=half - (0.004, board, 0.004), turn=turn, material="paper"),
+    ]

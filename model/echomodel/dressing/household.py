@@ -1,0 +1,165 @@
+"""What hangs on walls, lies on desks and stands by doors: pictures, mirrors, clocks, laptops, pens, shoes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.dressing.solids import Lathe
+from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.solids import Ball, Block, Solid, Tube, Turned, rotation
+
+
+def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A framed picture behind a mount; its back is at the wall."""
+    w, h, d = size
+    bar = float(np.clip(0.035 * max(w, h), 0.012, 0.028))
+    mount = float(np.clip(0.11 * min(w, h), 0.02, 0.09)) if rng.random() < 0.7 else 0.0
+    x, back, front = w / 2, -d / 2, d / 2
+    parts = _frame(w, h, d, bar)
+    parts.append(box((-x + bar / 2, bar / 2, back), (x - bar / 2, h - bar / 2, front - 0.012), "paper"))
+    inset = bar + mount
+    parts.append(box((-x + inset, inset, back), (x - inset, h - inset, front - 0.0105), _painting(rng)))
+    return parts
+
+
+def _painting(rng: np.random.Generator) -> str:
+    return f"picture_{int(rng.integers(3))}"
+
+
+def _frame(w: float, h: float, d: float, bar: float) -> list[Solid]:
+    x, z = w / 2, d / 2
+    return [
+        box((-x, 0, -z), (x, bar, z), "frame", 0.002),
+        box((-x, h - bar, -z), (x, h, z), "frame", 0.002),
+        box((-x, 0, -z), (-x + bar, h, z), "frame", 0.002),
+        box((x - bar, 0, -z), (x, h, z), "frame", 0.002),
+    ]
+
+
+def mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A framed mirror."""
+    w, h, d = size
+    bar = 0.03
+    glass = box((-w / 2 + bar / 2, bar / 2, -d / 2), (w / 2 - bar / 2, h - bar / 2, d / 2 - 0.008), "mirror")
+    return [*_frame(w, h, d, bar), glass]
+
+
+def round_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A round mirror in a narrow frame."""
+    w, h, d = size
+    face = rotation(x=np.pi / 2)
+    back = np.array([0.0, h / 2, -d / 2])
+    rim = Turned(centre=back, low=(w / 2, h / 2), high=(w / 2, h / 2), height=d * 0.8, turn=face, material="frame")
+    inner = (w / 2 - 0.018, h / 2 - 0.018)
+    return [rim, Turned(centre=back, low=inner, high=inner, height=d, turn=face, material="mirror")]
+
+
+def photo(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A small framed picture that leans on its strut."""
+    w, h, d = size
+    lean = rotation(x=-0.2)
+    thick, bar = 0.012, 0.014
+    parts: list[Solid] = []
+    for low, high, material in (
+        ((-w / 2, 0, 0), (w / 2, bar, thick), "frame"),
+        ((-w / 2, h - bar, 0), (w / 2, h, thick), "frame"),
+        ((-w / 2, 0, 0), (-w / 2 + bar, h, thick), "frame"),
+        ((w / 2 - bar, 0, 0), (w / 2, h, thick), "frame"),
+        ((-w / 2 + bar / 2, bar / 2, 0), (w / 2 - bar / 2, h - bar / 2, thick * 0.6), _painting(rng)),
+    ):
+        block = box(low, high, material)
+        parts.append(Block(centre=lean @ block.centre, half=block.half, turn=lean, material=material))
+    strut = np.array([[0, h * 0.7, -0.13 * h], [0, 0.004, -d]])
+    parts.append(Tube(points=strut, radius=0.004, material="frame"))
+    return parts
+
+
+def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A round clock on two feet, or without them on a wall."""
+    w, h, d = size
+    face, middle = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
+    half = (w / 2, h / 2)
+    parts: list[Solid] = [Turned(centre=middle, low=half, high=half, height=d * 0.9, turn=face, material="frame")]
+    inner = (w * 0.44, h * 0.44)
+    parts.append(Turned(centre=middle, low=inner, high=inner, height=d * 0.92, turn=face, material="paper"))
+    for angle, length in ((0.9, 0.24), (-2.1, 0.36)):
+        turn = rotation(z=angle)
+        half3 = np.array([0.012 * w + 0.001, length * h / 2, d * 0.02])
+        centre = np.array([0, h / 2, d * 0.45]) + turn @ np.array([0, length * h / 2, 0])
+        parts.append(Block(centre=centre, half=half3, turn=turn, material="soil"))
+    return parts
+
+
+def laptop(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A laptop, open."""
+    w, h, d = size
+    base, deep = 0.016, d * 0.86
+    lean = rotation(x=-0.3)
+    tall = (h - base) / np.cos(0.3)
+    hinge = np.array([0.0, base * 0.8, d / 2 - deep])
+    front = d / 2
+    parts: list[Solid] = [
+        box((-w / 2, 0, front - deep), (w / 2, base, front), "metal", 0.004),
+        box((-w * 0.43, base * 0.9, front - deep * 0.9), (w * 0.43, base + 0.001, front - deep * 0.45), "screen"),
+        box((-w * 0.16, base * 0.9, front - deep * 0.38), (w * 0.16, base + 0.0006, front - deep * 0.08), "metal"),
+    ]
+    for half, forward, material in (((w / 2, tall / 2, 0.004), 0.0, "metal"), ((w * 0.475, tall * 0.46, 0.003), 0.002,
+                                                                                "screen")):  # fmt: skip
+        centre = hinge + lean @ np.array([0, tall / 2, forward])
+        parts.append(Block(centre=centre, half=np.array(half), turn=lean, radius=0.002, material=material))
+    return parts
+
+
+def television(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A flat television on two feet."""
+    w, h, d = size
+    foot, thick = 0.06, 0.03
+    parts: list[Solid] = [
+        box((-w / 2, foot, -thick / 2), (w / 2, h, thick / 2), "soil", 0.006),
+        box((-w / 2 + 0.012, foot + 0.02, 0), (w / 2 - 0.012, h - 0.012, thick / 2 + 0.001), "screen"),
+    ]
+    for x in (-0.32 * w, 0.32 * w):
+        for z in (-d / 2, d / 2):
+            leg = np.array([[x, foot + 0.02, 0], [x, 0.006, z * 0.97]])
+            parts.append(Tube(points=leg, radius=0.006, material="metal"))
+    return parts
+
+
+def pens(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A pot with pens."""
+    w, h, d = size
+    r, tall = min(w, d) / 2 * 0.9, h * 0.6
+    pot = np.array([[r, 0], [r, tall], [r - 0.004, tall], [r - 0.004, tall * 0.1], [0.001, tall * 0.1]])
+    parts: list[Solid] = [Lathe(profile=pot, material="ceramic")]
+    for number in range(5):
+        yaw = 2 * np.pi * number / 5
+        foot = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * r * 0.4 + (0, tall * 0.15, 0)
+        tip = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * r * 0.95 + (0, h * rng.uniform(0.85, 1.0), 0)
+        material = ("frame", "book_a", "soil", "metal", "book_c")[number]
+        parts.append(Tube(points=np.array([foot, tip]), radius=0.0036, material=material))
+    return parts
+
+
+def remote(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A remote control."""
+    w, h, d = size
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), "screen", min(0.006, h * 0.4))]
+
+
+def shoes(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A pair of shoes side by side, the toes to the front."""
+    w, h, d = size
+    parts: list[Solid] = []
+    for side in (-1, 1):
+        x, wide = side * w * 0.27, w * 0.21
+        slip = float(rng.uniform(-0.03, 0.03)) * d
+        sole = Turned(centre=np.array([x, 0, slip]), low=(wide, d * 0.46), high=(wide, d * 0.46), height=h * 0.2,
+                      power=2.6, material="paper")  # fmt: skip
+        toe = Ball(centre=np.array([x, h * 0.3, slip + d * 0.12]), half=np.array([wide * 0.96, h * 0.28, d * 0.34]),
+                   power=2.4, material="leather")  # fmt: skip
+        heel = Ball(centre=np.array([x, h * 0.48, slip - d * 0.2]), half=np.array([wide * 0.94, h * 0.5, d * 0.25]),
+                    power=2.6, material="leather")  # fmt: skip
+        mouth = Ball(centre=np.array([x, h * 0.86, slip - d * 0.21]), half=np.array([wide * 0.62, h * 0.14, d * 0.17]),
+                     material="soil")  # fmt: skip
+        parts += [sole, toe, heel, mouth]
+    return parts

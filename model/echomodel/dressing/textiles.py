@@ -1,0 +1,96 @@
+"""Cloth: rugs, curtains, cushions, throws."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.dressing.solids import Sheet
+from echomodel.furniture.carpentry import Size, box
+from echomodel.furniture.solids import Ball, Solid, Turned
+
+RUGS = ("rug", "rug_striped", "rug_lattice")  # what is woven into them
+FOLD = 0.14  # metres of curtain from one fold to the next
+
+
+def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A rectangle of pile."""
+    w, h, d = size
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), str(rng.choice(RUGS)), h * 0.45)]
+
+
+def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A round of pile."""
+    w, h, d = size
+    return [Turned(low=(w / 2, d / 2), high=(w / 2, d / 2), height=h, rounding=h * 0.45, material="rug")]
+
+
+def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """One curtain in folds, which spread towards its foot."""
+    w, h, d = size
+    folds = max(2, round(w / FOLD))
+    x = np.linspace(-w / 2, w / 2, 6 * folds + 1)
+    phase, drift = rng.uniform(0, 2 * np.pi), rng.uniform(-0.4, 0.4, 3)
+    rows = []
+    for share in np.linspace(0, 1, 5):
+        depth = (d - 0.012) / 2 * (1.0 - 0.35 * share)
+        bend = drift[0] * np.sin(2.1 * x / w + drift[1]) * (1 - share)
+        z = depth * np.sin(2 * np.pi * folds * (x + w / 2) / w + phase + bend)
+        rows.append(np.stack([x * (1.0 - 0.04 * share), np.full_like(x, share * h), z], 1))
+    front, thick = np.stack(rows), np.array([0, 0, 0.004])
+    return [Sheet(front=front + thick, back=front - thick, material="curtain")]
+
+
+def blind(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A roller blind let down: cloth from the roller at its top to the bar at its foot."""
+    w, h, d = size
+    roller, bar = min(0.03, 0.2 * h), min(0.02, 0.1 * h)
+    return [
+        box((-w / 2, h - roller, -d / 2), (w / 2, h, d / 2), "frame", 0.3 * d),
+        box((-0.49 * w, bar, -0.001), (0.49 * w, h - roller, 0.001), "curtain"),
+        box((-0.49 * w, 0, -0.3 * d), (0.49 * w, bar, 0.3 * d), "frame", 0.1 * d),
+    ]
+
+
+def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A square cushion that leans back."""
+    w, h, d = size
+    half = np.array([w / 2, h / 2, d / 2])
+    # A pillow is thick in the middle and thin at its seams: a flat superellipsoid, drawn in at the sides.
+    material = str(rng.choice(("accent_cloth", "accent_plain")))
+    return [Ball(centre=np.array([0, h / 2, 0]), half=half, power=3.2, material=material)]
+
+
+def throw(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A blanket over the foot of a bed: it lies across and hangs down at both sides by its height."""
+    w, h, d = size
+    thick, round_off = 0.012, 0.05
+    flat = w / 2 - round_off
+    turn = np.linspace(0, np.pi / 2, 4)
+    corner = np.stack([flat + round_off * np.sin(turn), h - round_off * (1 - np.cos(turn))], 1)
+    hang = np.stack([np.full(3, w / 2), np.linspace(h - round_off, 0, 4)[1:]], 1)
+    side = np.concatenate([[[flat * 0.5, h]], corner, hang])
+    profile = np.concatenate([side[::-1] * (-1, 1), [[0.0, h]], side])
+    inner = np.stack([profile[:, 0] * (1 - 2 * thick / w), profile[:, 1] - thick * (profile[:, 1] > h - round_off)], 1)
+    z = np.linspace(-d / 2, d / 2, 7)
+    ripple = 0.006 * np.sin(np.linspace(0, 9, len(z)) + rng.uniform(0, 6))
+
+    def spread(line: np.ndarray) -> np.ndarray:
+        rows = [np.stack([line[:, 0], line[:, 1], np.full(len(line), at)], 1) for at in z]
+        out = np.stack(rows)
+        hanging = np.clip((h - line[:, 1]) / max(h, 1e-6), 0, 1)
+        out[..., 0] += np.sign(line[:, 0]) * hanging * ripple[:, None]
+        return out
+
+    return [Sheet(front=spread(profile), back=spread(inner), material="accent_cloth")]
+
+
+def folded_throw(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A blanket folded twice: soft layers, each a little shorter than the one below."""
+    w, h, d = size
+    thick = h / 3
+    parts: list[Solid] = []
+    for layer in range(3):
+        share = 1.0 - 0.025 * layer
+        low, high = (-w / 2 * share, thick * layer, -d / 2), (w / 2 * share, thick * (layer + 1), d / 2 * share)
+        parts.append(box(low, high, "blanket", thick * 0.45))
+    return parts

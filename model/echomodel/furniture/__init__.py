@@ -1,0 +1,99 @@
+"""Parametric furniture for every category: solids that give a watertight mesh and a signed distance."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+
+from echomodel.furniture import (
+    armchairs,
+    bathrooms,
+    beds,
+    bunks,
+    chairs,
+    decor,
+    household,
+    kitchens,
+    lamps,
+    shelving,
+    sofas,
+    stools,
+    storage,
+    tables,
+)
+from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.sizes import sample_size
+from echomodel.furniture.solids import Joint, Solid
+from echomodel.furniture.style import Style
+from echomodel.vocabulary import vocabulary
+
+__all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
+
+Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
+MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor,
+           kitchens, bathrooms, household)  # fmt: skip
+UNSAID = ("", "board")
+BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
+
+
+def solids(category: str, style: Style, choices: Choices, size: np.ndarray) -> list[Solid]:
+    """The parts of one piece of furniture, about as large as `size`.
+
+    Arguments:
+        category: a word of the vocabulary; raises `UnknownWord` for others.
+        style: what the piece shares with its suite.
+        choices: what the style leaves open.
+        size: (3,) width x, height y, depth z in metres.
+
+    Raises ValueError for a size that is not three positive numbers.
+    """
+    name = vocabulary().category(category).name
+    size = np.asarray(size, float)
+    if size.shape != (3,) or not (np.isfinite(size).all() and (size > 0).all()):
+        raise ValueError(f"size of {name} is {size.tolist()}, need three positive numbers in metres")
+    return _named(_builder(name)(size, style, choices))
+
+
+def furniture(category: str, style: Style, rng: np.random.Generator, size: np.ndarray | None = None) -> trimesh.Trimesh:
+    """One piece of furniture as a watertight mesh in the object frame (+Y up, +Z front, standing on y = 0), metres.
+
+    Arguments as for `solids`; `rng` draws the choices and, where it is None, the size. The mesh fills `size`, what is
+    round at least in width or in depth. Part numbers, materials and texture coordinates are face attributes, see
+    `mesh_of`.
+    """
+    if size is None:
+        size = sample_size(category, rng, style)
+    return mesh_of(solids(category, style, Choices.draw(rng), size), size, round=vocabulary().category(category).round)
+
+
+def _named(parts: list[Solid]) -> list[Solid]:
+    """The parts with their moving bodies numbered: drawer_1, drawer_2, door_1 ... in the order of the program.
+
+    Those that the program gave no role have one by what they are made of.
+    """
+    names: dict[int, Joint] = {}
+    counts: Counter[str] = Counter()
+    out = []
+    for part in parts:
+        if part.joint is not None:
+            if id(part.joint) not in names:
+                counts[part.joint.body] += 1
+                names[id(part.joint)] = replace(part.joint, body=f"{part.joint.body}_{counts[part.joint.body]}")
+            part = replace(part, joint=names[id(part.joint)])
+        out.append(part if part.role not in UNSAID else replace(part, role=BY_MATERIAL.get(part.material, "body")))
+    return out
+
+
+def _builder(name: str) -> Builder:
+    """The program of a category, or of the one that its row is like."""
+    row = vocabulary().category(name)
+    for word in (name, row.like or row.sgfront):
+        for module in MODULES:
+            if hasattr(module, word):
+                return getattr(module, word)
+    raise ValueError(f"no furniture is made for {name}")

@@ -1,0 +1,116 @@
+"""Solids put together: one mesh with materials and texture coordinates, and one signed distance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+
+from echomodel.furniture.solids import FINEST, Joint, Solid, Tube
+from echomodel.triangles import area_normals
+from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
+
+THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
+THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
+MATERIALS = (
+    "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
+    "cushion", "linen", "blanket", "mirror", "book", "stem",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One solid as a closed mesh in its place: vertices (n, 3) in metres, faces (m, 3), and its joint there."""
+
+    solid: Solid
+    vertices: np.ndarray
+    faces: np.ndarray
+    joint: Joint | None
+
+
+def pieces_of(
+    solids: Sequence[Solid], size: np.ndarray | None = None, detail: int = FINEST, *, round: bool = False
+) -> list[Piece]:
+    """Every solid meshed, all of them stretched together to fill `size`, standing on y = 0, centred in x and z.
+
+    Arguments:
+        solids: parts in the object's frame, metres.
+        size: (3,) float, the box to fill, metres; None keeps the parts' own extents.
+        round: fill it in width or in depth, so that what is round stays round.
+        detail: 0 (boxes and hexagons) to 3.
+    """
+    seen = [solid for solid in solids if not solid.core]
+    meshes = [solid.mesh(detail) for solid in seen]
+    lower = np.min([vertices.min(0) for vertices, _ in meshes], axis=0)
+    upper = np.max([vertices.max(0) for vertices, _ in meshes], axis=0)
+    stretch = np.ones(3) if size is None else np.asarray(size, float) / np.maximum(upper - lower, 1e-9)
+    if round:
+        stretch[[0, 2]] = stretch[[0, 2]].min()
+    origin = np.array([(lower[0] + upper[0]) / 2, lower[1], (lower[2] + upper[2]) / 2])
+    return [
+        Piece(solid, (vertices - origin) * stretch, faces, _stretched(solid.joint, origin, stretch))
+        for solid, (vertices, faces) in zip(seen, meshes, strict=True)
+    ]
+
+
+def _stretched(joint: Joint | None, origin: np.ndarray, stretch: np.ndarray) -> Joint | None:
+    if joint is None:
+        return None
+    anchor = (np.asarray(joint.anchor) - origin) * stretch
+    longer = float(np.linalg.norm(np.asarray(joint.axis) * stretch)) if joint.kind == "prismatic" else 1.0
+    x, y, z = (float(v) for v in anchor)
+    return replace(joint, anchor=(x, y, z), reach=joint.reach * longer)
+
+
+def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: bool = False) -> trimesh.Trimesh:
+    """All solids as one mesh of closed parts that overlap as boards and cushions do; arguments as for `pieces_of`.
+
+    `face_attributes["part"]` (m,) int numbers the solids, `face_attributes["material"]` (m,) int indexes `MATERIALS`,
+    `face_attributes["uv"]` (m, 3, 2) float holds texture coordinates per corner, box-projected, in metres.
+    """
+    pieces = pieces_of(solids, size, round=round)
+    offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
+    faces = [piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)]
+    counts = [len(piece.faces) for piece in pieces]
+    mesh = trimesh.Trimesh(np.concatenate([p.vertices for p in pieces]), np.concatenate(faces), process=False)
+    mesh.face_attributes["part"] = np.repeat(np.arange(len(pieces)), counts)
+    mesh.face_attributes["material"] = np.repeat([MATERIALS.index(p.solid.material) for p in pieces], counts)
+    mesh.face_attributes["uv"] = box_uv(mesh.vertices, mesh.faces)
+    return mesh
+
+
+def box_uv(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Texture coordinates (m, 3, 2) per corner: each triangle projected along the main axis of its normal, metres."""
+    corners = np.asarray(vertices)[faces]
+    normal = np.abs(area_normals(corners))
+    axis = normal.argmax(1)
+    first, second = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
+    rows = np.arange(len(faces))[:, None]
+    columns = np.arange(3)[None]
+    return np.stack([corners[rows, columns, first[:, None]], corners[rows, columns, second[:, None]]], axis=-1)
+
+
+def tsdf_of(solids: Sequence[Solid]) -> np.ndarray:
+    """Box-normalised TSDF (64, 64, 64) float32 of the solids' union, boards of at least one voxel, rods of two."""
+    boxes = [solid.mesh()[0] for solid in solids]
+    lower = np.min([vertices.min(0) for vertices in boxes], axis=0)
+    upper = np.max([vertices.max(0) for vertices in boxes], axis=0)
+    scale = np.maximum(upper - lower, 1e-6) / FILLED
+    axes = [
+        ((np.arange(RESOLUTION) - (RESOLUTION - 1) / 2) * scale[i] + (upper[i] + lower[i]) / 2).astype(np.float32)
+        for i in range(3)
+    ]
+    margin = int(np.ceil(TRUNCATION))
+    grid = np.full((RESOLUTION,) * 3, TRUNCATION, np.float32)
+    for solid, vertices in zip(solids, boxes, strict=True):
+        reach = voxels_from_points(vertices, lower, upper)
+        start = np.maximum(np.floor(reach.min(0)).astype(int) - margin, 0)
+        stop = np.minimum(np.ceil(reach.max(0)).astype(int) + margin + 1, RESOLUTION)
+        where = tuple(slice(a, b) for a, b in zip(start, stop, strict=True))
+        x, y, z = axes[0][where[0], None, None], axes[1][None, where[1], None], axes[2][None, None, where[2]]
+        thinnest = THINNEST_ROD_OR_LEAF if isinstance(solid, Tube) or solid.material == "leaf" else THINNEST
+        distance = solid.distance(x, y, z, scale) - max(0.0, thinnest - solid.inradius(scale))
+        np.minimum(grid[where], distance, out=grid[where])
+    return truncated(grid)

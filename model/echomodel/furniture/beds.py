@@ -1,0 +1,177 @@
+"""Beds: a frame, a headboard, a mattress and bedding; double and single ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, base, box, core, cushion, of_role
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.furniture.style import Style
+
+
+def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
+    """The board at the head of a bed, its rear on the plane z, `w` wide and `h` high."""
+    t = 0.05 + 0.04 * style.bulk
+    kind = style.headboard
+    if kind == "panel":
+        parts: list[Solid] = [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.8), "wood", 0.015 * style.corner)]
+        if style.softness > 0.45:
+            parts.append(box((-w * 0.46, 0.35, z + t * 0.4), (w * 0.46, h - 0.06, z + t * 1.5), "fabric", 0.025))
+        return parts
+    if kind == "low":
+        return [box((-w / 2, 0.02, z), (w / 2, h, z + t * 0.7))]
+    if kind == "channels":
+        count = int(4 + 6 * style.tufting)
+        edges = np.linspace(-w / 2, w / 2, count + 1)
+        return [
+            Block(
+                centre=np.array([(a + b) / 2, (0.1 + h) / 2, z + t * 0.75]),
+                half=np.array([(b - a) / 2, (h - 0.1) / 2, t * 0.75]),
+                radius=min((b - a) * 0.4, t * 0.7),
+                material="fabric",
+            )
+            for a, b in pairwise(edges)
+        ]
+    if kind == "cushions":
+        frame = box((-w / 2, 0.02, z), (w / 2, h * 0.85, z + t * 0.6))
+        turn = rotation(x=-0.1)
+        pads = [
+            cushion(
+                (s * w * 0.25 - w * 0.23, h * 0.4, z + t * 0.4),
+                (s * w * 0.25 + w * 0.23, h, z + t * 1.9),
+                style,
+                turn=turn,
+            )
+            for s in (-1, 1)
+        ]
+        return [frame, *pads]
+    if kind == "slats":
+        parts = [box((s * (w / 2 - 0.03) - 0.03, 0, z), (s * (w / 2 - 0.03) + 0.03, h, z + 0.06)) for s in (-1, 1)]
+        parts += [
+            box((-w / 2, h - 0.1, z), (w / 2, h, z + 0.05)),
+            box((-w / 2, h * 0.45, z), (w / 2, h * 0.45 + 0.06, z + 0.05)),
+            box((-w / 2, 0.12, z), (w / 2, 0.3, z + 0.05)),
+        ]
+        count = int(5 + 9 * style.tufting)
+        xs = np.linspace(-w / 2, w / 2, count + 2)[1:-1]
+        return parts + [box((x - 0.025, h * 0.45, z + 0.01), (x + 0.025, h, z + 0.04)) for x in xs]
+    if kind == "posts":
+        r = 0.045 * style.bulk
+        parts = [
+            Turned(centre=np.array([s * (w / 2 - r), 0, z + r]), low=(r, r), high=(r * 0.8, r * 0.8), height=h - r)
+            for s in (-1, 1)
+        ]
+        parts += [Ball(centre=np.array([s * (w / 2 - r), h - r, z + r]), half=np.full(3, r * 1.2)) for s in (-1, 1)]
+        return [*parts, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
+    arch = Turned(
+        centre=np.array([0, h * 0.6, z + t * 0.5]),
+        low=(w / 2, h * 0.4),
+        high=(w / 2, h * 0.4),
+        height=t,
+        turn=rotation(x=np.pi / 2),
+        power=2.4,
+        material="fabric" if style.softness > 0.5 else "wood",
+    )
+    arch = replace(arch, centre=np.array([0, h * 0.6, z]))
+    return [arch, box((-w / 2, 0.02, z), (w / 2, h * 0.62, z + t), "fabric" if style.softness > 0.5 else "wood")]
+
+
+def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int) -> list[Solid]:
+    """Mattress, pillows and a cover from z0 (head) to z1."""
+    thick = 0.2
+    parts: list[Solid] = [box((-w / 2, low, z0), (w / 2, low + thick, z1), "linen", 0.05, "mattress")]
+    each = w / pillows
+    for i in range(pillows):
+        x = -w / 2 + each * (i + 0.5)
+        parts.append(
+            Ball(
+                centre=np.array([x, low + thick + 0.06, z0 + 0.26]),
+                half=np.array([min(each * 0.44, 0.38), 0.09, 0.22]),
+                power=2.8,
+                turn=rotation(x=-0.25),
+                material="linen",
+                role="pillow",
+            )
+        )
+    if choices.chance("cover", 0.75):
+        start = z0 + (z1 - z0) * choices.between("spread", 0.28, 0.55)
+        over = 0.02 + 0.05 * style.softness
+        parts.append(
+            box(
+                (-w / 2 - over, low + thick * 0.35, start),
+                (w / 2 + over, low + thick + 0.045, z1 + over * 0.5),
+                "blanket",
+                0.035,
+                "cover",
+            )
+        )
+        fold = 0.1 + 0.08 * style.softness  # the sheet turned back over it
+        parts.append(
+            box(
+                (-w / 2 - over - 0.004, low + thick * 0.4, start - 0.01),
+                (w / 2 + over + 0.004, low + thick + 0.056, start + fold),
+                "linen",
+                0.03,
+                "cover",
+            )
+        )
+    return parts
+
+
+def bed(size: Size, style: Style, choices: Choices, pillows: int) -> list[Solid]:
+    """A frame on legs or a plinth, a headboard, bedding, perhaps a footboard."""
+    w, h, d = size
+    z0, z1 = -d / 2, d / 2
+    wide = w - (0.0 if choices.chance("form", 0.75) else min(0.5, w * 0.2))
+    frame = wide * 0.99
+    foot = 0.06 if style.legs in ("plinth", "bun") else float(np.clip(style.leg_height + 0.06, 0.1, 0.25))
+    rail = choices.between("share", 0.12, 0.24)
+    deck = min(foot + rail, 0.42)
+    head = 0.13
+    kind = style.legs if style.legs not in ("trestle", "hairpin", "sled", "splayed") else "straight"
+    near = z0 + 0.03  # the frame reaches into the headboard
+    parts: list[Solid] = [
+        replace(part, centre=part.centre + np.array([0, 0, 0.015]))
+        for part in base(style, frame * 0.98, (d - 0.03) * 0.98, foot, 0.07 * style.bulk, kind)
+    ]
+    parts.append(box((-frame / 2, foot, near), (frame / 2, foot + 0.015, z1 - 0.03), role="rail"))
+    board = style.headboard in ("slats", "posts", "arched") and choices.chance("second", 0.6)
+    end = z1 - (0.052 if board else 0.0)  # a footboard stands before the frame, not in it
+    upholstered = style.softness > 0.5
+    stuff, radius = ("fabric", 0.025) if upholstered else ("wood", 0.004 + 0.008 * style.edge)
+    t = 0.07 if upholstered else 0.04
+    parts += [
+        box(
+            (s * frame / 2 - t * (s > 0), foot, near),
+            (s * frame / 2 + t * (s < 0), deck, end),
+            stuff,
+            radius,
+            "rail",
+        )
+        for s in (-1, 1)
+    ]
+    parts += [box((-frame / 2, foot, z), (frame / 2, deck, z + t), stuff, radius, "rail") for z in (near, end - t)]
+    parts.append(
+        box((-frame / 2 + t / 2, deck - 0.09, z0 + head), (frame / 2 - t / 2, deck - 0.06, end - t / 2), role="rail")
+    )
+    parts.append(core((-frame / 2, foot, near), (frame / 2, deck, z1), stuff))
+    parts += of_role("headboard", _headboard(style, w, h, z0))
+    parts += bedding(frame * 0.95, z0 + head, end - 0.04, deck - 0.06, choices, style, pillows)
+    if board:
+        tall = deck + min(0.3, 0.35 * (h - deck))
+        parts.append(box((-frame / 2, 0, z1 - 0.055), (frame / 2, tall, z1), "wood", 0.01, "footboard"))
+    return parts
+
+
+def double_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Two pillows, or four in a broad bed."""
+    return bed(size, style, choices, 2 if size[0] < 2.4 else 3)
+
+
+def single_bed(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """One pillow."""
+    return bed(size, style, choices, 1)

@@ -1,0 +1,295 @@
+"""Chairs to sit upright on: dining, plain, Chinese, dressing, bar and office chairs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from echomodel.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
+from echomodel.furniture.carpentry import Size, base, box, of_role, top
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.solids import Ball, Shell, Solid, Tube, Turned, rotation
+from echomodel.furniture.stools import stool
+from echomodel.furniture.style import Style
+
+
+def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Four legs or a sled, a seat, and the style's back; sometimes slim arms."""
+    w, h, d = size
+    seat = float(np.clip(0.46, 0.4 * h, 0.62 * h))
+    thick = 0.035 + 0.05 * style.softness
+    rake = style.rake * 0.8
+    leg_thick = 0.038 * style.bulk
+    sw, sd = w * 0.94, d * 0.86
+    parts: list[Solid] = [seat_of(style, sw, sd, seat, thick, d * 0.05)]
+    parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
+    if style.back == "shell":
+        arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
+        shell = Shell(
+            centre=np.array([0, seat - thick * 0.6, d * 0.15]),
+            half=(w / 2, d * 0.62),
+            thickness=0.035 + 0.04 * style.softness,
+            back=h - seat,
+            front=arms - seat,
+            power=2.4 + style.corner,
+            ease=2.5,
+            material="fabric",
+            role="back",
+        )
+        return [*parts, shell]
+    return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake)
+
+
+def chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A plain chair, with arms more often than a dining chair."""
+    parts = dining_chair(size, style, choices)
+    w, h, d = size
+    if h > 0.7 and style.back != "shell" and choices.chance("extra", 0.45):
+        parts += slim_arms(w * 1.04, d, 0.46, h, style, 0.03)
+    return parts
+
+
+def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Ming style: round posts, a board seat, a splat in the middle, a yoke or a horseshoe arm, stretchers all round."""
+    w, h, d = size
+    r = 0.016 * (0.9 + 0.3 * style.bulk)
+    seat = min(0.5, h * 0.52)
+    x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
+    parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
+    corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
+    legs: list[Solid] = [
+        Tube(points=np.array([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]]), radius=r) for cx, cz in corners
+    ]
+    legs += [Tube(points=np.array([[-x, y, cz], [x, y, cz]]), radius=r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
+    legs += [Tube(points=np.array([[cx, 0.13, -z], [cx, 0.13, z]]), radius=r * 0.7) for cx in (-x, x)]
+    parts += of_role("leg", legs)
+    splat = w * choices.between("share", 0.14, 0.24)
+    parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
+    arm = seat + (h - seat) * 0.48
+    if choices.chance("kind", 0.5):
+        t = np.linspace(-np.pi / 2, np.pi / 2, 13)
+        fall = np.abs(t) / (np.pi / 2)
+        bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
+        arms: list[Solid] = [Tube(points=bow, radius=r * 1.1)]
+        arms += [
+            Tube(points=np.array([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]]), radius=r * 0.8) for s in (-1, 1)
+        ]
+        head = bow[int(np.abs(bow[:6, 2] + z * 0.5).argmin())]  # where the posts behind meet the bow
+        arms += [
+            Tube(points=np.array([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]]), radius=r * 0.8)
+            for s in (-1, 1)
+        ]
+        return parts + of_role("arm", arms)
+    yoke = np.array(
+        [
+            [-w * 0.5, h - 0.03, -z - 0.07],
+            [-w * 0.25, h - r, -z - 0.08],
+            [w * 0.25, h - r, -z - 0.08],
+            [w * 0.5, h - 0.03, -z - 0.07],
+        ]
+    )
+    parts.append(Tube(points=yoke, radius=r * 1.2, role="back"))
+    posts = [Tube(points=np.array([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]]), radius=r) for s in (-1, 1)]
+    parts += of_role("back", [*posts])
+    for s in (-1, 1):
+        parts.append(
+            Tube(
+                points=np.array(
+                    [[s * x, arm + 0.03, -z - 0.03], [s * x, arm, z * 0.7], [s * x * 1.02, arm - 0.02, z * 0.8]]
+                ),
+                radius=r * 0.9,
+                role="arm",
+            )
+        )
+        post = np.array([[s * x, seat, z * 0.75], [s * x, arm, z * 0.75]])
+        parts.append(Tube(points=post, radius=r * 0.8, role="arm"))
+    return parts
+
+
+def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A vanity stool or a small chair with a low back."""
+    w, h, d = size
+    if h < 0.55:
+        return stool(size, style, choices)
+    seat = min(0.44, h * 0.7)
+    thick = 0.06 + 0.04 * style.softness
+    parts: list[Solid] = chair_legs(style, w * 0.82, d * 0.8, seat - thick * 0.5, 0.034 * style.bulk)
+    parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), w * 0.95, d * 0.92, seat, thick))
+    if style.back in ("shell", "cushion", "oval"):
+        return [
+            *parts,
+            Shell(
+                centre=np.array([0, seat - thick * 0.5, d * 0.05]),
+                half=(w / 2, d * 0.55),
+                thickness=0.05,
+                back=h - seat,
+                front=(h - seat) * 0.6,
+                ease=2.0,
+                material="fabric",
+                role="back",
+            ),
+        ]
+    return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5)
+
+
+def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A high seat with a foot rest, with a low back or without, on four legs or a column."""
+    w, h, d = size
+    backed = h > 0.88 or choices.chance("back", 0.3)
+    seat = min(0.75, h * 0.78) if backed else h
+    thick = 0.035 + 0.04 * style.softness
+    parts: list[Solid] = []
+    if choices.chance("form", 0.25):
+        r = 0.026
+        parts += [
+            Turned(low=(r, r), high=(r, r), height=seat - thick, material="metal"),
+            Turned(low=(w * 0.46, w * 0.46), high=(w * 0.42, w * 0.42), height=0.03, material="metal"),
+            Turned(
+                centre=np.array([0, seat * 0.35, 0]),
+                low=(w * 0.28, w * 0.28),
+                high=(w * 0.28, w * 0.28),
+                height=0.022,
+                material="metal",
+            ),
+        ]
+        parts = of_role("leg", parts)
+    else:
+        legs = style.legs if style.legs in ("tapered", "splayed", "straight", "sled") else "splayed"
+        upright_legs = legs != "splayed"
+        share = (0.7 if style.round_tops > 0.5 else 0.86) if upright_legs else 0.98
+        parts += base(style, w * share, d * share * 0.96, seat - thick * 0.6, 0.032 * style.bulk, legs)
+        spread = min(np.tan(style.splay) * (seat - thick * 0.6), 0.3 * min(w, d * 0.96) * share)
+        lean = 0.0 if upright_legs else spread * 0.35
+        x, z, y, t = w * share / 2 - 0.02 - lean, d * share * 0.48 - 0.02 - lean, seat * 0.35, 0.011
+        parts += [box((-x, y - t, s * z - t), (x, y + t, s * z + t), "metal", 0.0, "rail") for s in (-1, 1)]
+        parts += [box((s * x - t, y - t, -z), (s * x + t, y + t, z), "metal", 0.0, "rail") for s in (-1, 1)]
+    shape = "round" if style.round_tops > 0.5 else "corners"
+    parts.append(
+        replace(top(shape, w * 0.92, d * 0.88, seat, thick, style, "fabric"), rounding=thick * 0.4, role="seat")
+    )
+    if not backed:
+        return parts
+    wide = w * (0.5 if shape == "round" else 0.8)
+    if style.back in ("shell", "cushion", "oval"):
+        return [
+            *parts,
+            Shell(
+                centre=np.array([0, seat - thick * 0.5, 0]),
+                half=(w * 0.48, d * 0.46),
+                thickness=0.035,
+                back=h - seat,
+                front=(h - seat) * 0.4,
+                material="fabric",
+                role="back",
+            ),
+        ]
+    return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5)
+
+
+def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Five feet with casters, a column, a seat, a raked back, and arms."""
+    w, h, d = size
+    seat, reach = min(0.48, h * 0.52), min(w, d) * 0.48
+    wheel = 0.028
+    parts: list[Solid] = []
+    for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 2:
+        x, z = reach * np.cos(angle), reach * np.sin(angle)
+        parts.append(
+            Tube(points=np.array([[0, 0.1, 0], [x, wheel * 2 + 0.01, z]]), radius=0.018, material="metal", role="leg")
+        )
+        parts.append(Ball(centre=np.array([x, wheel, z]), half=np.full(3, wheel), material="metal", role="caster"))
+    parts.append(
+        Turned(
+            centre=np.array([0, 0.08, 0]), low=(0.03, 0.03), high=(0.026, 0.026), height=seat - 0.1, material="metal",
+            role="stem",
+        )
+    )  # fmt: skip
+    sw, sd = w * 0.86, d * 0.8
+    parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), sw, sd, seat, 0.08, d * 0.04))
+    rake = 0.1 + style.rake * 0.5
+    y0 = seat + 0.08 * style.contrast
+    if style.back == "shell":
+        parts.append(
+            Shell(
+                centre=np.array([0, seat - 0.05, d * 0.05]),
+                half=(sw / 2 + 0.02, d * 0.5),
+                thickness=0.05,
+                back=h - seat + 0.05,
+                front=0.12 + 0.1 * style.arm_height,
+                material="fabric",
+                role="back",
+            )
+        )
+        return parts
+    if style.corner > 0.45 or style.back == "oval":
+        tall = (h - y0) / np.cos(rake)
+        turn = rotation(x=-rake)
+        centre = turn @ np.array([0, y0 - seat + tall / 2, 0]) + [0, seat, -d * 0.4]
+        parts.append(
+            Ball(
+                centre=centre,
+                half=np.array([sw * 0.47, tall / 2, 0.04]),
+                power=2.6 + 2 * style.contrast,
+                turn=turn,
+                material="fabric",
+                role="back",
+            )
+        )
+    elif style.tufting > 0.6:
+        slats = np.linspace(y0, h, 5)
+        parts += [
+            leaning(
+                (-sw * 0.44, a + 0.01, -d * 0.4 - 0.02),
+                (sw * 0.44, b, -d * 0.4 + 0.02),
+                rake,
+                seat,
+                -d * 0.4,
+                material="fabric",
+                radius=0.018,
+            )
+            for a, b in pairwise(slats)
+        ]
+        parts.append(
+            leaning(
+                (-0.03, y0, -d * 0.4 - 0.04), (0.03, h * 0.98, -d * 0.4 - 0.015), rake, seat, -d * 0.4, material="metal"
+            )
+        )
+    else:
+        parts.append(
+            leaning(
+                (-sw * 0.46, y0, -d * 0.4 - 0.03),
+                (sw * 0.46, y0 + (h - y0) / np.cos(rake), -d * 0.4 + 0.03),
+                rake,
+                seat,
+                -d * 0.4,
+                material="fabric",
+                radius=0.028,
+            )
+        )
+    rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
+    rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
+    parts.append(
+        Tube(
+            points=np.array([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest]),
+            radius=0.016,
+            material="metal",
+            role="stem",
+        )
+    )
+    if choices.chance("extra", 0.75):
+        y = seat + 0.2
+        for s in (-1, 1):
+            x = s * (w / 2 - 0.025)
+            parts.append(
+                Tube(
+                    points=np.array([[s * sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]]),
+                    radius=0.016,
+                    material="metal",
+                    role="arm",
+                )
+            )
+            pad = box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012, "arm")
+            parts.append(pad)
+    return parts

@@ -1,0 +1,185 @@
+"""Fronts that open: drawers with their boxes, hinged and sliding doors, handles, and the cases behind them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from echomodel.furniture.carpentry import box, core
+from echomodel.furniture.solids import Ball, Joint, Solid, Tube
+from echomodel.furniture.style import Style
+
+Point = tuple[float, float]
+PANEL, SHEET = 0.018, 0.01  # metres: thickness of a front, and of the boards of a drawer
+OPEN = math.radians(100)  # of a hinged door
+PULL = 0.75  # share of its depth that a drawer comes out
+ENOUGH = 0.12  # metres of depth that a drawer needs
+SHELVES, HANGING = 0.38, 1.35  # metres between shelves behind doors; doors from this height on hide a rail
+
+
+def front(
+    low: Point, high: Point, z: float, rows: int, columns: int, kind: str, style: Style, depth: float = 0.0,
+    *, glazed: bool = False,
+) -> list[Solid]:  # fmt: skip
+    """Drawer fronts or doors that fill the rectangle `low` to `high` (x, y) on the plane z, gaps between, with handles.
+
+    Arguments:
+        kind: `drawer` or `door`; thickness and frames follow the style.
+        depth: metres behind the plane that are free; drawers get boxes there, doors hide shelves or a rail.
+        glazed: a pane in a frame instead of a panel.
+    """
+    parts: list[Solid] = []
+    face = PANEL + 0.012 * (style.fronts == "framed" and not glazed)
+    xs = np.linspace(low[0], high[0], columns + 1).tolist()
+    ys = np.linspace(low[1], high[1], rows + 1).tolist()
+    for i in range(columns):
+        for j in range(rows):
+            x0, x1 = xs[i] + style.gap / 2, xs[i + 1] - style.gap / 2
+            y0, y1 = ys[j] + style.gap / 2, ys[j + 1] - style.gap / 2
+            left = i % 2 == 0 if columns > 1 else style.contrast < 0.7
+            joint = _slide(z, depth) if kind == "drawer" else _hinge(x0 if left else x1, y0, z + face, left=left)
+            made: list[Solid] = [box((x0, y0, z - 0.004), (x1, y1, z + PANEL), "accent", 0.002 * style.edge, kind)]
+            if glazed:
+                made = _pane(x0, x1, y0, y1, z, kind)
+            elif style.fronts == "framed":
+                made += _frame(x0, x1, y0, y1, z + PANEL, 0.15 * min(x1 - x0, y1 - y0), kind)
+            made += _handle(x0, x1, y0, y1, z + PANEL, kind, hinge_left=left, style=style)
+            if kind == "drawer" and depth > ENOUGH:
+                made += _drawer(x0, x1, y0, y1, z - depth, z)
+            parts += [replace(part, joint=joint) for part in made]
+    if kind == "door" and depth > ENOUGH:
+        parts += _inside(low, high, z - depth, z - 0.02)
+    return parts
+
+
+def sliding(low: Point, high: Point, z: float, count: int, style: Style, material: str) -> list[Solid]:
+    """Doors that slide along x before one another."""
+    xs = np.linspace(low[0], high[0], count + 1).tolist()
+    wide = (high[0] - low[0]) / count
+    parts: list[Solid] = []
+    for i in range(count):
+        near = z + 0.026 * (i % 2)
+        reach = wide - 0.04
+        axis = (1.0, 0.0, 0.0) if i == 0 else (-1.0, 0.0, 0.0)
+        joint = Joint("door", "prismatic", axis, (xs[i], low[1], near), reach)
+        panel: list[Solid] = [
+            box(
+                (xs[i] - 0.015, low[1], near - 0.003), (xs[i + 1] + 0.015, high[1], near + 0.019), material, 0.0, "door"
+            )
+        ]
+        for x in (xs[i] + 0.02, xs[i + 1] - 0.02):
+            if i % 2 or material != "accent":
+                panel.append(
+                    box((x - 0.035, low[1], near + 0.012), (x + 0.015, high[1], near + 0.0235), "metal", 0.0, "handle")
+                )
+        parts += [replace(part, joint=joint) for part in panel]
+    return parts
+
+
+def case(low: tuple, high: tuple, thick: float = 0.016) -> list[Solid]:
+    """An open-fronted case of five boards between two corners (3,), with a core."""
+    (x0, y0, z0), (x1, y1, z1), t = low, high, thick
+    return [
+        core(low, high),
+        box((x0, y0, z0), (x0 + t, y1, z1), role="side"),
+        box((x1 - t, y0, z0), (x1, y1, z1), role="side"),
+        box((x0, y0, z0), (x1, y0 + t, z1), role="bottom"),
+        box((x0, y1 - t, z0), (x1, y1, z1), role="top"),
+        box((x0, y0, z0), (x1, y1, z0 + t / 2), role="back"),
+    ]
+
+
+def _slide(z: float, depth: float) -> Joint:
+    return Joint("drawer", "prismatic", (0.0, 0.0, 1.0), (0.0, 0.0, z), PULL * max(depth, ENOUGH))
+
+
+def _hinge(x: float, y: float, z: float, *, left: bool) -> Joint:
+    # about the front edge, so that the door swings away from its neighbour
+    return Joint("door", "revolute", (0.0, -1.0 if left else 1.0, 0.0), (x, y, z), OPEN)
+
+
+def _drawer(x0: float, x1: float, y0: float, y1: float, z0: float, z1: float) -> list[Solid]:
+    """The box behind a drawer's front."""
+    t, inset = SHEET, 0.012
+    a, b, low, high = x0 + inset, x1 - inset, y0 + 0.014, y0 + max(0.05, 0.7 * (y1 - y0))
+    return [
+        box((a, low, z0), (b, low + t, z1), role="drawer"),
+        box((a, low, z0), (a + t, high, z1), role="drawer"),
+        box((b - t, low, z0), (b, high, z1), role="drawer"),
+        box((a, low, z0), (b, high, z0 + t), role="drawer"),
+    ]
+
+
+def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
+    """What stands behind doors: shelves, or a shelf above a rail for clothes."""
+    (x0, y0), (x1, y1), tall = low, high, high[1] - low[1]
+    if tall > HANGING:
+        y, z = y1 - 0.3, (z0 + z1) / 2
+        rail = Tube(
+            points=np.array([[x0, y - 0.07, z], [x1, y - 0.07, z]]), radius=0.012, material="metal", role="rail"
+        )
+        return [box((x0, y, z0), (x1, y + 0.018, z1), role="shelf"), rail]
+    heights = np.linspace(y0, y1, int(np.clip(round(tall / SHELVES), 1, 6)) + 1)[1:-1]
+    return [box((x0, y - 0.009, z0), (x1, y + 0.009, z1), role="shelf") for y in heights]
+
+
+def _frame(x0: float, x1: float, y0: float, y1: float, z: float, border: float, role: str) -> list[Solid]:
+    b, t = max(border, 0.02), 0.012
+    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
+    return [box((*lo, z - 0.004), (*hi, z + t), "accent", 0.002, role) for lo, hi in bars]
+
+
+def _pane(x0: float, x1: float, y0: float, y1: float, z: float, role: str) -> list[Solid]:
+    """Glass in a frame of four bars."""
+    b = min(0.045, 0.2 * (x1 - x0))
+    bars = [((x0, y0), (x0 + b, y1)), ((x1 - b, y0), (x1, y1)), ((x0, y0), (x1, y0 + b)), ((x0, y1 - b), (x1, y1))]
+    pane = box((x0 + b / 2, y0 + b / 2, z + 0.006), (x1 - b / 2, y1 - b / 2, z + 0.01), "glass", 0.0, role)
+    return [pane, *(box((*lo, z), (*hi, z + PANEL), "accent", 0.002, role) for lo, hi in bars)]
+
+
+def _handle(
+    x0: float, x1: float, y0: float, y1: float, z: float, kind: str, *, hinge_left: bool, style: Style
+) -> list[Solid]:
+    if style.handles == "none":
+        return []
+    w, h, door = x1 - x0, y1 - y0, kind == "door"
+    x = (x1 - min(0.12 * w, 0.05) if hinge_left else x0 + min(0.12 * w, 0.05)) if door else (x0 + x1) / 2
+    y = (y0 + y1) / 2 if h < 1.5 else y0 + min(1.0, 0.5 * h)
+    deep = 0.004  # metres that a handle reaches into its front
+    if style.fronts == "framed":  # the frame stands out, the panel does not
+        z, deep = z + 0.012, 0.016
+    if style.handles == "knob":
+        r = 0.016
+        places = [-0.28 * w, 0.28 * w] if not door and w > 0.75 else [0.0]
+        stem = np.array([[0, 0, -deep], [0, 0, r]])
+        return [
+            part
+            for dx in places
+            for part in (
+                Tube(points=np.array([x + dx, y, z]) + stem, radius=0.006, material="metal", role="handle"),
+                Ball(
+                    centre=np.array([x + dx, y, z + r + 0.004]), half=np.array([r, r, r * 0.8]), material="metal",
+                    role="handle",
+                ),
+            )
+        ]  # fmt: skip
+    if style.handles == "edge":
+        if door:
+            return [
+                box((x - 0.008, y0 + 0.1 * h, z - deep), (x + 0.008, y1 - 0.1 * h, z + 0.02), "metal", 0.003, "handle")
+            ]
+        return [
+            box((x0 + 0.1 * w, y1 - 0.02, z - deep), (x1 - 0.1 * w, y1 - 0.004, z + 0.02), "metal", 0.003, "handle")
+        ]
+    length = min(0.3, 0.45 * h) / 2 if door else min(0.25, 0.4 * w) / 2
+    along = np.array([0.0, length, 0.0]) if door else np.array([length, 0.0, 0.0])
+    grip, out = np.array([x, y, z]), np.array([0.0, 0.0, 0.026])
+    ends = np.array([grip + out - along, grip + out + along])
+    bar = Tube(points=ends, radius=0.0055, material="metal", role="handle")
+    posts = [
+        Tube(points=np.array([end - np.array([0, 0, deep]), end + out]), radius=0.005, material="metal", role="handle")
+        for end in (grip - 0.85 * along, grip + 0.85 * along)
+    ]
+    return [bar, *posts]

@@ -1,0 +1,220 @@
+"""Hallways, children's rooms and what houses have besides: coats and shoes, toys, music, warmth, a table outdoors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, box, of_role
+from echomodel.furniture.cases import carcass
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.fronts import front
+from echomodel.furniture.solids import Ball, Solid, Tube
+from echomodel.furniture.style import Style
+
+SLAT = 0.09  # metres, width of a slat outdoors
+GRIP = 0.03  # metres that handles stand out
+
+
+def coat_rack(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A panel with hooks and a shelf for hats above a bench, or a rail of steel on two posts."""
+    w, h, d = size
+    hooks: list[Solid] = []
+    y, count = min(1.65, 0.86 * h), max(3, round(w / 0.18))
+    if choices.chance("kind", 0.4):
+        x, posts = w / 2 - 0.02, []
+        for s in (-1, 1):
+            posts.append(
+                Tube(points=np.array([[s * x, 0.014, -d / 2 + 0.014], [s * x, 0.014, d / 2 - 0.014]]), radius=0.014)
+            )
+            posts.append(Tube(points=np.array([[s * x, 0.01, 0.0], [s * x, h - 0.014, 0.0]]), radius=0.014))
+        posts.append(Tube(points=np.array([[-x, h - 0.014, 0.0], [x, h - 0.014, 0.0]]), radius=0.014))
+        shelf = box((-x, 0.16, -d / 2 + 0.03), (x, 0.18, d / 2 - 0.03), role="shelf")
+        return [*of_role("post", posts, material="metal"), shelf]
+    z = -d / 2 + 0.03
+    parts: list[Solid] = [
+        box((-w / 2, 0, -d / 2), (w / 2, h, z), "accent", 0.003, "panel"),
+        box((-w / 2, h - 0.025, -d / 2), (w / 2, h, min(d / 2, z + 0.27)), "wood", 0.003, "shelf"),
+        box((-w / 2, 0.43, z - 0.004), (w / 2, 0.47, d / 2), "wood", 0.004, "seat"),
+    ]
+    for x in (-w / 2, w / 2 - 0.03):
+        parts.append(box((x, 0, z - 0.004), (x + 0.03, 0.432, d / 2 - 0.01), "wood", 0.0, "side"))
+    for x in np.linspace(-w / 2 + 0.1, w / 2 - 0.1, count):
+        bend = np.array([[x, y, z - 0.004], [x, y - 0.01, z + 0.05], [x, y + 0.03, z + 0.075]])
+        hooks.append(Tube(points=bend, radius=0.008, material="metal", role="hook"))
+    return parts + hooks
+
+
+def shoe_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A shallow case of flaps, one above the other, on a plinth."""
+    w, h, d = size
+    parts, (x0, y0, x1, y1, z) = carcass(np.array([w, h, d - GRIP]), style, 0.06, kind="plinth")
+    return parts + front((x0, y0), (x1, y1), z, max(1, round((h - 0.06) / 0.38)), 1 if w < 0.8 else 2, "drawer", style)
+
+
+def radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A flat radiator with vertical ribs on two brackets, its valve at one side; or columns of tubes."""
+    w, h, d = size
+    parts: list[Solid] = []
+    low = 0.1
+    if choices.chance("kind", 0.35):
+        for x in np.linspace(-w / 2 + 0.03, w / 2 - 0.03, max(3, round(w / 0.06))):
+            for z in (0.022 - d / 2, d / 2 - 0.022):
+                parts.append(Tube(points=np.array([[x, low, z], [x, h - 0.022, z]]), radius=0.022))
+        for y in (low + 0.02, h - 0.04):
+            parts.append(box((-w / 2, y - 0.02, 0.02 - d / 2), (w / 2, y + 0.02, d / 2 - 0.02)))
+    else:
+        parts.append(box((-w / 2, low, -d / 2 + 0.03), (w / 2, h, d / 2 - 0.012), radius=0.004))
+        for x in np.arange(-w / 2 + 0.04, w / 2 - 0.02, 0.05):
+            parts.append(box((x - 0.012, low + 0.03, d / 2 - 0.014), (x + 0.012, h - 0.03, d / 2), radius=0.004))
+    feet = [box((s * 0.35 * w - 0.02, 0, -d / 2), (s * 0.35 * w + 0.02, low + 0.05, 0.0)) for s in (-1, 1)]
+    return [*of_role("body", parts, material="ceramic"), *of_role("foot", feet, material="metal")]
+
+
+def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A mantel on two piers about a dark hearth with logs, or a stove of steel behind a pane."""
+    w, h, d = size
+    if choices.chance("kind", 0.4):
+        body = box((-w / 2, 0.08, -d / 2), (w / 2, h, d / 2 - 0.02), "screen", 0.01, "stove")
+        pane = box((-0.36 * w, 0.4 * h, d / 2 - 0.024), (0.36 * w, 0.85 * h, d / 2), "glass", 0.0, "pane")
+        feet = [
+            box((x - 0.02, 0, z - 0.02), (x + 0.02, 0.084, z + 0.02), "metal", 0.0, "leg")
+            for x in (-0.4 * w, 0.4 * w)
+            for z in (-0.35 * d, 0.35 * d)
+        ]
+        return [body, pane, *feet]
+    pier, top = 0.17 * w, h - 0.06
+    inner = d / 2 - 0.05
+    parts: list[Solid] = [
+        box((-w / 2, top, -d / 2), (w / 2, h, d / 2), "ceramic", 0.006, "stone"),
+        box((-w / 2 + 0.03, 0.7 * h, -d / 2), (w / 2 - 0.03, top + 0.004, inner), "ceramic", 0.004, "stone"),
+        box((-w / 2 + 0.03, 0, -d / 2), (w / 2 - 0.03, 0.72 * h, -d / 2 + 0.06), "screen", 0.0, "hearth"),
+        box((-w / 2 + 0.03, 0, -d / 2), (w / 2 - 0.03, 0.06, inner), "ceramic", 0.002, "stone"),
+    ]
+    parts += [
+        box((min(a, b), 0, -d / 2), (max(a, b), 0.72 * h, inner), "ceramic", 0.004, "stone")
+        for a, b in ((-w / 2 + 0.03, -w / 2 + pier), (w / 2 - pier, w / 2 - 0.03))
+    ]
+    logs = [Tube(points=np.array([[-0.2 * w, 0.1 + 0.06 * k, z], [0.2 * w, 0.1 + 0.06 * k, z]]), radius=0.042)
+            for k, z in ((0, -0.05), (0, 0.03), (1, -0.01))]  # fmt: skip
+    return parts + of_role("log", logs, material="stem")
+
+
+def piano(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """An upright: its case, the keys on their bed before it, a lid, legs and pedals."""
+    w, h, d = size
+    z, keys, t = d / 2 - 0.3, 0.72, 0.035
+    material = choices.pick("cover", ["screen", "wood"], [0.55, 0.45])
+    parts: list[Solid] = [
+        box((-w / 2, 0, -d / 2), (w / 2, h - 0.03, z), material, 0.004, "case"),
+        box((-w / 2, h - 0.034, -d / 2), (w / 2, h, z + 0.02), material, 0.004, "lid"),
+        box((-w / 2, keys - 0.1, z - 0.004), (w / 2, keys - 0.02, d / 2), material, 0.004, "bed"),
+        box((-w / 2 + t, keys - 0.024, z), (w / 2 - t, keys, d / 2 - 0.03), "ceramic", 0.001, "keys"),
+        box((-0.45 * w, keys + 0.2, z - 0.004), (0.45 * w, keys + 0.22, z + 0.03), material, 0.0, "desk"),
+    ]
+    for s in (-1, 1):
+        x = s * (w / 2 - t / 2)
+        parts.append(box((x - t / 2, keys - 0.03, z - 0.004), (x + t / 2, keys + 0.1, d / 2), material, 0.004, "cheek"))
+        parts.append(box((x - t / 2, 0, d / 2 - 0.07), (x + t / 2, keys - 0.09, d / 2 - 0.02), material, 0.004, "leg"))
+    pitch = (w - 2 * t) / 52
+    x0 = -w / 2 + t
+    for k in range(51):
+        if k % 7 not in (1, 4):  # from A: no black key between B and C, E and F
+            x = x0 + (k + 1) * pitch
+            parts.append(
+                box(
+                    (x - 0.3 * pitch, keys - 0.004, z),
+                    (x + 0.3 * pitch, keys + 0.01, d / 2 - 0.12),
+                    "screen",
+                    0.0,
+                    "keys",
+                )
+            )
+    pedals = [
+        box((x - 0.012, 0.03, z - 0.01), (x + 0.012, 0.045, z + 0.09), "metal", 0.0, "pedal") for x in (-0.06, 0.06)
+    ]
+    return parts + pedals
+
+
+def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A child's bed behind bars on four posts, its mattress half way up."""
+    w, h, d = size
+    x, z, t = w / 2 - 0.02, d / 2 - 0.02, 0.02
+    low, floor = 0.12, min(0.35, 0.4 * h)
+    parts: list[Solid] = [
+        box((sx * x - t, 0, sz * z - t), (sx * x + t, h, sz * z + t), "wood", 0.004, "leg")
+        for sx in (-1, 1)
+        for sz in (-1, 1)
+    ]
+    for y in (low, h - 0.05):
+        parts += [box((-x, y, s * z - 0.013), (x, y + 0.04, s * z + 0.013), "wood", 0.0, "rail") for s in (-1, 1)]
+        parts += [box((s * x - 0.013, y, -z), (s * x + 0.013, y + 0.04, z), "wood", 0.0, "rail") for s in (-1, 1)]
+    for s in (-1, 1):
+        for at in np.arange(-z + 0.08, z - 0.05, 0.075):
+            parts.append(
+                Tube(points=np.array([[s * x, low + 0.02, at], [s * x, h - 0.03, at]]), radius=0.008, role="bar")
+            )
+        for at in np.arange(-x + 0.08, x - 0.05, 0.075):
+            parts.append(
+                Tube(points=np.array([[at, low + 0.02, s * z], [at, h - 0.03, s * z]]), radius=0.008, role="bar")
+            )
+    slab = box((-x, floor - 0.03, -z), (x, floor, z), role="slats")
+    mattress = box((-x + 0.03, floor - 0.002, -z + 0.03), (x - 0.03, floor + 0.1, z - 0.03), "linen", 0.02, "mattress")
+    cover = box((-x + 0.025, floor + 0.03, -0.2 * d), (x - 0.025, floor + 0.125, z - 0.028), "blanket", 0.02, "duvet")
+    return [*parts, slab, mattress, cover]
+
+
+def toy_box(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A chest with a lid and two holes to carry it by, on wheels or on the floor."""
+    w, h, d = size
+    foot = 0.05 if choices.chance("raised", 0.5) else 0.0
+    parts: list[Solid] = [
+        box((-w / 2 + 0.012, foot, -d / 2 + 0.012), (w / 2 - 0.012, h - 0.025, d / 2 - 0.012), "wood", 0.006, "body"),
+        box((-w / 2, h - 0.028, -d / 2), (w / 2, h, d / 2), "accent", 0.01, "lid"),
+        box((-0.08, 0.62 * h, d / 2 - 0.016), (0.08, 0.72 * h, d / 2 - 0.006), "accent", 0.0, "handle"),
+    ]
+    if foot:
+        wheels = [Ball(centre=np.array([sx * (w / 2 - 0.06), 0.027, sz * (d / 2 - 0.06)]), half=np.full(3, 0.027))
+                  for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+        parts += of_role("foot", wheels, material="screen")
+    return parts
+
+
+def garden_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Slats on a frame and four legs, rain falls through."""
+    w, h, d = size
+    material = choices.pick("cover", ["wood", "metal"], [0.7, 0.3])
+    t, x, z = 0.025, w / 2 - 0.05, d / 2 - 0.05
+    parts: list[Solid] = []
+    for z0, z1 in _slats(d):
+        parts.append(box((-w / 2, h - t, z0), (w / 2, h, z1), material, 0.003, "top"))
+    parts += [
+        box((s * x - 0.02, h - t - 0.06, -z), (s * x + 0.02, h - t + 0.003, z), material, 0.0, "apron") for s in (-1, 1)
+    ]
+    parts += [box((-x, h - t - 0.06, s * z - 0.02), (x, h - t, s * z + 0.02), material, 0.0, "apron") for s in (-1, 1)]
+    parts += [box((sx * x - 0.025, 0, sz * z - 0.025), (sx * x + 0.025, h - t, sz * z + 0.025), material, 0.003, "leg")
+              for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+    return parts
+
+
+def garden_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A slatted seat and back between two frames with arms."""
+    w, h, d = size
+    seat, t, x = 0.43, 0.02, w / 2 - 0.02
+    parts: list[Solid] = []
+    for z0, z1 in _slats(d - 0.08):
+        parts.append(box((-x, seat - t, z0), (x, seat, z1), "wood", 0.003, "seat"))
+    for s in (-1, 1):
+        parts.append(box((s * x - t, 0, -d / 2), (s * x + t, h, -d / 2 + 0.04), "wood", 0.004, "leg"))
+        parts.append(box((s * x - t, 0, d / 2 - 0.04), (s * x + t, 0.64, d / 2), "wood", 0.004, "leg"))
+        parts.append(box((s * x - t, seat - 0.07, -d / 2), (s * x + t, seat - t + 0.003, d / 2), "wood", 0.0, "apron"))
+        parts.append(box((s * x - t, 0.635, -d / 2), (s * x + t, 0.665, d / 2), "wood", 0.006, "arm"))
+    for y in np.arange(seat + 0.08, h - 0.06, 0.1):
+        parts.append(box((-x, y, -d / 2 + 0.008), (x, y + 0.07, -d / 2 + 0.03), "wood", 0.003, "back"))
+    return parts
+
+
+def _slats(depth: float) -> list[tuple[float, float]]:
+    """Slats over a depth, with gaps of a centimetre."""
+    count = max(2, round(depth / SLAT))
+    pitch = (depth + 0.01) / count
+    return [(-depth / 2 + k * pitch, -depth / 2 + (k + 1) * pitch - 0.01) for k in range(count)]

@@ -1,0 +1,271 @@
+"""Kitchens: fitted units on a plinth below one worktop, cut to the length of their run, and what is built in.
+
+Heights after DIN EN 1116: worktops at 0.9 m, 0.6 m deep, units in steps of 0.1 or 0.15 m.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, box, core, of_role
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.fronts import front
+from echomodel.furniture.solids import Solid, Tube, Turned, rotation
+from echomodel.furniture.style import Style
+
+PLINTH, WORKTOP = 0.1, 0.04  # metres: height of the plinth, thickness of the worktop
+TAP = 0.27  # metres over the worktop
+GRIP = 0.04  # metres that the worktop covers of the handles
+RECESS = 0.05  # metres that the plinth stands back, for feet
+SIDE, PANEL, BACK = 0.018, 0.022, 0.015  # metres: boards, what fronts need before them, and a back
+Span = tuple[float, float]
+UNIT = 0.6  # metres: a usual width; wider runs are divided into such units
+
+
+def base_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Doors or drawers on a plinth below a worktop; long runs in several units."""
+    w, h, d = size
+    parts = _worktop(size)
+    for low, high in _units(w):
+        kind = choices.pick("kind", ["door", "drawer", "both"], [0.45, 0.3, 0.25])
+        parts += _unit(low, high, (PLINTH, h - WORKTOP), _deep(d), kind, style)
+    return parts
+
+
+def wall_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Cupboards above a worktop: doors, some of glass, or an open shelf at one end."""
+    w, h, d = size
+    parts: list[Solid] = []
+    units = _units(w)
+    for number, (low, high) in enumerate(units):
+        glazed = choices.chance("front", 0.25)
+        if len(units) > 1 and number == len(units) - 1 and choices.chance("extra", 0.35):
+            parts += _shell(low, high, (0.0, h), _deep(d))
+            parts.append(box((low, h / 2 - 0.009, -d / 2), (high, h / 2 + 0.009, _deep(d)[1]), role="shelf"))
+        else:
+            parts += _unit(low, high, (0.0, h), _deep(d), "glass" if glazed else "door", style)
+    return parts
+
+
+def tall_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A larder of two doors, or one with an oven at the height of one's hands."""
+    w, h, d = size
+    if not choices.chance("kind", 0.5):
+        split = 0.55 * h
+        return [*_plinth(size), *_unit(-w / 2, w / 2, (PLINTH, split), _deep(d), "door", style),
+                *_unit(-w / 2, w / 2, (split, h), _deep(d), "door", style)]  # fmt: skip
+    low, high = 0.35 * h, 0.35 * h + 0.6
+    return [
+        *_plinth(size), *_unit(-w / 2, w / 2, (PLINTH, low), _deep(d), "drawer", style),
+        *_oven(-w / 2, w / 2, (low, high), _deep(d)), *_unit(-w / 2, w / 2, (high, h), _deep(d), "door", style),
+    ]  # fmt: skip
+
+
+def sink_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A basin let into the worktop, with a tap behind it and doors below."""
+    w, _, d = size
+    h = float(size[1]) - TAP
+    half, deep = min(0.27, 0.4 * w), 0.18
+    x0, x1, z0, z1 = -half, half, -0.16, d / 2 - 0.09
+    parts = _worktop(np.array([w, h, d]), hole=(x0, x1, z0, z1))
+    parts += basin((x0, x1, z0, z1), h, deep, "metal")
+    parts += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.16)
+    y, top, (back, z) = h - WORKTOP - deep - 0.01, h - WORKTOP, _deep(d)
+    parts += [box((x, y, back), (x + SIDE, top + 0.002, z), role="side") for x in (-w / 2, w / 2 - SIDE)]
+    parts.append(box((-w / 2, y + 0.003, z - 0.004), (w / 2, top, z + 0.018), "accent", 0.001, "panel"))
+    for low, high in _units(w):
+        parts += _unit(low, high, (PLINTH, y), (back, z), "door", style)
+    return parts
+
+
+def hob_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A glass hob with four rings on the worktop, the oven below it."""
+    w, h, d = size
+    half = min(0.29, 0.45 * w)
+    parts = _worktop(size)
+    parts.append(box((-half, h - 0.004, -0.24), (half, h + 0.005, 0.26), "screen", 0.002, "hob"))
+    for x, z, radius in ((-0.14, -0.1, 0.08), (0.14, -0.1, 0.1), (-0.14, 0.13, 0.1), (0.14, 0.13, 0.08)):
+        ring = Turned(
+            centre=np.array([x * half / 0.29, h + 0.003, z]), low=(radius, radius), high=(radius, radius),
+            height=0.0035, material="metal", role="hob",
+        )  # fmt: skip
+        parts.append(ring)
+    side = (w - UNIT) / 2
+    wide = (-w / 2, w / 2) if side < 0.15 else (-UNIT / 2, UNIT / 2)
+    parts += _oven(*wide, (PLINTH, h - WORKTOP), _deep(d))
+    if side >= 0.15:
+        for low, high in ((-w / 2, -UNIT / 2), (UNIT / 2, w / 2)):
+            parts += _unit(low, high, (PLINTH, h - WORKTOP), _deep(d), "drawer", style)
+    return parts
+
+
+def dishwasher(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A front like its neighbours', with a bar of switches, that tips down."""
+    w, h, d = size
+    parts = _worktop(size)
+    _, z = _deep(d)
+    parts += _shell(-w / 2, w / 2, (PLINTH, h - WORKTOP), _deep(d), closed=True)
+    panel = h - WORKTOP - 0.11
+    parts.append(box((-w / 2, panel + 0.003, z - 0.004), (w / 2, h - WORKTOP, z + 0.018), "metal", 0.002, "switches"))
+    return parts + front((-w / 2, PLINTH), (w / 2, panel), z, 1, 1, "door", style)
+
+
+def fridge(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A cold body of steel or enamel with two doors above each other, tall handles at one side."""
+    w, h, d = size
+    material = choices.pick("cover", ["metal", "ceramic"], [0.5, 0.5])
+    z, foot = d / 2 - 0.06, 0.05
+    split = foot + (h - foot) * choices.pick("split", [0.36, 0.62])
+    parts: list[Solid] = [
+        box((-w / 2, foot, -d / 2), (w / 2, h, z), material, 0.006, "cold"),
+        box((-w / 2 + 0.02, 0, -d / 2 + 0.03), (w / 2 - 0.02, foot + 0.002, z - 0.03), "screen", 0.0, "plinth"),
+    ]
+    for low, high in ((foot, split), (split, h)):
+        parts.append(box((-w / 2, low + 0.004, z - 0.002), (w / 2, high - 0.004, z + 0.045), material, 0.01, "front"))
+        y = (high - 0.12, high - 0.5) if high == split else (low + 0.12, low + 0.5)
+        points = np.array([[w * 0.4, min(y), z + 0.04], [w * 0.4, min(y), z + 0.06], [w * 0.4, max(y), z + 0.06],
+                           [w * 0.4, max(y), z + 0.04]])  # fmt: skip
+        parts.append(Tube(points=points, radius=0.009, material="metal", role="handle"))
+    return parts
+
+
+def range_hood(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A steel hood: a slab below a chimney, or a hood that slopes up to it."""
+    w, h, d = size
+    lip = 0.06
+    chimney = box((-0.15, lip, -d / 2), (0.15, h, -d / 2 + 0.26), "metal", 0.002, "chimney")
+    slab = box((-w / 2, 0, -d / 2), (w / 2, lip, d / 2), "metal", 0.004, "hood")
+    if choices.chance("kind", 0.5):
+        return [slab, chimney]
+    slope = Turned(
+        centre=np.array([0, lip - 0.002, 0.0]), low=(w / 2 * 0.98, d / 2 * 0.98), high=(0.2, d * 0.22),
+        height=max(0.1, 0.35 * h), power=np.inf, material="metal", role="hood",
+    )  # fmt: skip
+    return [slab, slope, chimney]
+
+
+def kitchen_island(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Units whose worktop reaches over at the back, where one sits on high stools."""
+    w, h, d = size
+    over = min(0.3, 0.35 * d)
+    z0 = over - d / 2
+    parts: list[Solid] = [
+        box((-w / 2, h - WORKTOP, -d / 2), (w / 2, h, d / 2), "ceramic", 0.004, "worktop"),
+        box((0.02 - w / 2, 0, z0 + RECESS), (w / 2 - 0.02, PLINTH, d / 2 - RECESS - GRIP), "accent", 0.0, "plinth"),
+    ]
+    kind = choices.pick("kind", ["door", "drawer"])
+    for low, high in _units(w - 0.04):
+        parts += _unit(low, high, (PLINTH, h - WORKTOP), (z0, _deep(d)[1]), kind, style)
+    return parts
+
+
+def _units(w: float) -> list[tuple[float, float]]:
+    """The left and right ends of equal units, about 0.6 m wide, that fill a width."""
+    edges = np.linspace(-w / 2, w / 2, max(1, round(w / UNIT)) + 1).tolist()
+    return list(pairwise(edges))
+
+
+def _plinth(size: Size) -> list[Solid]:
+    w, _, d = size
+    low, high = (-w / 2, 0, -d / 2 + 0.02), (w / 2, PLINTH + 0.002, d / 2 - RECESS - GRIP)
+    return [box(low, high, "accent", 0.0, "plinth")]
+
+
+def _worktop(size: Size, hole: tuple[float, float, float, float] | None = None) -> list[Solid]:
+    """A plinth and a worktop, with a hole (x0, x1, z0, z1) in it."""
+    w, h, d = size
+    low = h - WORKTOP
+
+    def slab(x0: float, x1: float, z0: float, z1: float) -> Solid:
+        return box((x0, low, z0), (x1, h, z1), "ceramic", 0.0 if hole else 0.004, "worktop")
+
+    if hole is None:
+        return [*_plinth(size), slab(-w / 2, w / 2, -d / 2, d / 2)]
+    x0, x1, z0, z1 = hole
+    return [
+        *_plinth(size), slab(-w / 2, w / 2, -d / 2, z0), slab(-w / 2, w / 2, z1, d / 2),
+        slab(-w / 2, x0, z0, z1), slab(x1, w / 2, z0, z1),
+    ]  # fmt: skip
+
+
+def _deep(d: float) -> Span:
+    """The planes of the back and of the fronts of a unit."""
+    return -d / 2, d / 2 - PANEL - GRIP
+
+
+def _shell(low: float, high: float, span: Span, deep: Span, *, closed: bool = False) -> list[Solid]:
+    """The boards of a unit between two x, two y and two z, open in front."""
+    (y0, y1), (z0, z1) = span, deep
+    parts: list[Solid] = [
+        box((low, y0, z0), (low + SIDE, y1, z1), role="side"),
+        box((high - SIDE, y0, z0), (high, y1, z1), role="side"),
+        box((low, y0, z0), (high, y0 + SIDE, z1), role="bottom"),
+        box((low, y1 - SIDE, z0), (high, y1, z1), role="top"),
+        box((low, y0, z0), (high, y1, z0 + 0.01), role="back"),
+    ]
+    return [*parts, core((low, y0, z0), (high, y1, z1))] if closed else parts
+
+
+def _unit(low: float, high: float, span: Span, deep: Span, kind: str, style: Style) -> list[Solid]:
+    """One unit with its fronts: `door`, `glass`, `drawer`, or `both` (a drawer above doors)."""
+    (y0, y1), z = span, deep[1]
+    parts = _shell(low, high, span, deep, closed=kind != "glass")
+    columns, depth = 2 if high - low > 0.75 else 1, z - deep[0] - BACK
+    if kind == "drawer":
+        return parts + front((low, y0), (high, y1), z, 3 if y1 - y0 > 0.6 else 2, 1, "drawer", style, depth)
+    if kind == "both":
+        split = y1 - 0.17
+        upper = front((low, split), (high, y1), z, 1, columns, "drawer", style, depth)
+        return [*parts, *upper, *front((low, y0), (high, split), z, 1, columns, "door", style, depth)]
+    return parts + front((low, y0), (high, y1), z, 1, columns, "door", style, depth, glazed=kind == "glass")
+
+
+def _oven(low: float, high: float, span: Span, deep: Span) -> list[Solid]:
+    """A steel oven in its niche: a dark pane with a bar to pull, knobs above."""
+    (y0, y1), z = span, deep[1]
+    top = y1 - 0.11
+    parts = _shell(low, high, span, deep, closed=True)
+    parts += [
+        box((low + 0.003, y0 + 0.003, z - 0.004), (high - 0.003, top, z + 0.016), "metal", 0.002, "oven"),
+        box((low + 0.06, y0 + 0.07, z + 0.012), (high - 0.06, top - 0.1, z + 0.0185), "screen", 0.001, "pane"),
+        box((low + 0.003, top + 0.003, z - 0.004), (high - 0.003, y1 - 0.003, z + 0.016), "metal", 0.002, "switches"),
+    ]
+    y = top - 0.045
+    grip = np.array([[low + 0.07, y, z + 0.012], [low + 0.07, y, z + 0.045], [high - 0.07, y, z + 0.045],
+                     [high - 0.07, y, z + 0.012]])  # fmt: skip
+    parts.append(Tube(points=grip, radius=0.007, material="metal", role="handle"))
+    for x in np.linspace(low + 0.1, high - 0.1, 4):
+        centre, ahead = np.array([x, (top + y1) / 2, z + 0.014]), rotation(x=np.pi / 2)
+        knob = Turned(centre=centre, low=(0.016, 0.016), high=(0.014, 0.014), height=0.02, turn=ahead)
+        parts += of_role("knob", [knob], material="screen")
+    return parts
+
+
+def basin(rect: tuple[float, float, float, float], rim: float, deep: float, material: str) -> list[Solid]:
+    """An open trough of five sheets below a rim, over a rectangle (x0, x1, z0, z1)."""
+    (x0, x1, z0, z1), y, t = rect, rim - deep, 0.008
+    edge = 0.012  # over the worktop's edge, so that it rests on it
+    return [
+        box((x0, y, z0), (x1, y + t, z1), material, 0.0, "basin"),
+        *(
+            box((a, y, z0 - edge), (b, rim + 0.002, z1 + edge), material, 0.0, "basin")
+            for a, b in ((x0 - edge, x0 + t), (x1 - t, x1 + edge))
+        ),
+        *(
+            box((x0, y, a), (x1, rim + 0.002, b), material, 0.0, "basin")
+            for a, b in ((z0 - edge, z0 + t), (z1 - t, z1 + edge))
+        ),
+    ]
+
+
+def spout(x: float, y: float, z: float, high: float, reach: float) -> list[Solid]:
+    """A spout that bends forward over the basin, and its lever."""
+    bend = np.array([[0, 0, 0], [0, 0.75 * high, 0], [0, 0.95 * high, 0.12 * reach], [0, high, 0.5 * reach],
+                     [0, 0.93 * high, 0.9 * reach], [0, 0.8 * high, reach]])  # fmt: skip
+    lever = np.array([[0, 0.2 * high, 0], [0.06, 0.28 * high, 0]])
+    foot = Turned(centre=np.array([x, y - 0.003, z]), low=(0.024, 0.024), high=(0.024, 0.024), height=0.015)
+    at = np.array([x, y, z])
+    tubes = [Tube(points=points + at, radius=radius) for points, radius in ((bend, 0.011), (lever, 0.007))]
+    return of_role("tap", [foot, *tubes], material="metal")

@@ -1,0 +1,313 @@
+"""Sofas: two, three and more seats, with a chaise at one side, chaises longues and bean bags."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from echomodel.furniture.armchairs import upholstered_arms
+from echomodel.furniture.carpentry import Size, base, box, cushion, of_role
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.lathe import Lathe
+from echomodel.furniture.solids import Ball, Block, Shell, Solid, Tube, Turned, rotation
+from echomodel.furniture.style import Style
+
+
+def _foot(style: Style) -> float:
+    return {"plinth": 0.03, "bun": 0.06, "turned": 0.12}.get(style.legs, min(style.leg_height, 0.17))
+
+
+def _legs(style: Style, w: float, d: float, foot: float) -> list[Solid]:
+    kind = style.legs if style.legs not in ("trestle", "hairpin") else "straight"
+    if kind == "sled":
+        return [
+            box((s * w * 0.42 - 0.02, 0, -d * 0.4), (s * w * 0.42 + 0.02, foot, d * 0.4), "metal", 0.0, "leg")
+            for s in (-1, 1)
+        ]
+    return base(style, w * 0.94, d * 0.88, foot, 0.05 * style.bulk, kind)
+
+
+def _cushions(
+    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float, count: int, style: Style
+) -> list[Solid]:
+    """A row of cushions from x0 to x1."""
+    edges = np.linspace(x0, x1, count + 1)
+    gap = 0.004
+    pads = [cushion((a + gap, y0, z0), (b - gap, y1, z1), style) for a, b in pairwise(edges)]
+    if style.piping > 0.55:
+        pads += [part for pad in pads for part in _piping(pad)]
+    return pads
+
+
+def _piping(pad: Solid) -> list[Solid]:
+    """Cords along the seams of a cushion, above and below its side."""
+    if not isinstance(pad, Block) or min(pad.half) < 0.03:
+        return []
+    r = min(pad.radius, *pad.half)
+    sunk = r * (1 - 2**-0.5)
+    a, b = pad.half[0] - sunk, pad.half[2] - sunk
+    c = min(r * 0.8 + 0.01, a, b)
+    turn = np.linspace(0, np.pi / 2, 4)
+    corners = [(a - c, b - c, 0.0), (-a + c, b - c, 0.5), (-a + c, -b + c, 1.0), (a - c, -b + c, 1.5)]
+    loop = [
+        (x + c * np.cos(t + start * np.pi), z + c * np.sin(t + start * np.pi)) for x, z, start in corners for t in turn
+    ]
+    loop.append(loop[0])
+    plan = np.array(loop)
+    cords: list[Solid] = []
+    for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
+        points = np.insert(plan, 1, y, axis=1) @ pad.turn.T + pad.centre
+        cords.append(Tube(points=points, radius=0.005, material=pad.material, role="seam"))
+    return cords
+
+
+def _backs(x0: float, x1: float, y0: float, y1: float, z0: float, count: int, style: Style) -> list[Solid]:
+    """A row of leaning back cushions in front of the frame at z0."""
+    edges = np.linspace(x0, x1, count + 1)
+    thick = 0.12 + 0.08 * style.softness
+    turn = rotation(x=-0.12 - 0.3 * style.rake)
+    parts = []
+    for a, b in pairwise(edges):
+        low = (a + 0.004, y0, z0 - thick * 0.2)
+        parts.append(cushion(low, (b - 0.004, y1, z0 + thick * 0.8), style, turn=turn, role="back"))
+    return parts
+
+
+def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_depth: float = 0.0) -> list[Solid]:
+    """A sofa along x whose back stands at -z; with `chaise` -1 or +1 its last seat at that side reaches forward.
+
+    `chaise_depth` is the full depth there; size[2] is the depth of the rest.
+    """
+    w, h, d = size
+    foot = _foot(style)
+    seat = float(np.clip(0.43, 0.4 * h, 0.62 * h))
+    armless = style.arms == "none"
+    arm = 0.0 if armless else float(np.clip(w * 0.075 * (0.7 + 0.7 * style.softness), 0.07, 0.26))
+    y_arm = seat + (h - seat) * (0.2 + 0.55 * style.arm_height)
+    frame = 0.1 + 0.06 * style.softness
+    pad = 0.12 + 0.06 * style.softness
+    z0, z1 = -d / 2, d / 2
+    parts: list[Solid] = _legs(style, w, d, foot)
+    low, high = (-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015)
+    parts.append(box(low, high, "fabric", 0.015, "base"))
+    tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
+    lean = rotation(x=-0.5 * style.rake)
+    backrest = box(
+        (-w / 2 + arm * 0.4, foot + 0.02, z0),
+        (w / 2 - arm * 0.4, tall, z0 + frame),
+        "fabric",
+        0.02 + 0.05 * style.softness,
+        "back",
+    )
+    pivot = np.array([0, seat, z0 + frame / 2])
+    parts.append(replace(backrest, centre=lean @ (backrest.centre - pivot) + pivot, turn=lean))
+    if style.arms == "slim":
+        inner = arm = 0.05
+        for s in (-1, 1):
+            x0, x1 = sorted((s * w / 2, s * (w / 2 - arm)))
+            parts.append(box((x0, foot, z0 + 0.02), (x1, y_arm, z1 - 0.02), "fabric", 0.015, "arm"))
+    elif not armless:
+        parts += upholstered_arms(w, foot, y_arm, d, arm, style)
+    inner = w / 2 - arm
+    front_z = z1 + 0.01
+    xs = np.linspace(-inner, inner, seats + 1)
+    parts += _cushions(-inner, inner, seat - pad, seat, z0 + frame * 0.9, front_z, seats, style)
+    parts += _backs(-inner, inner, seat - 0.02, h, z0 + frame, seats, style)
+    if chaise:
+        x0, x1 = (xs[0] - arm, xs[1]) if chaise < 0 else (xs[-2], xs[-1] + arm)
+        reach = z0 + chaise_depth
+        parts.append(box((x0, foot, z1 - 0.1), (x1, seat - pad, reach - 0.015), "fabric", 0.015, "base"))
+        parts.append(cushion((x0, seat - pad, z1 - 0.04), (x1, seat, reach), style))
+        t = 0.05 * style.bulk
+        parts += [
+            box((x - t / 2, 0, reach - 0.12), (x + t / 2, foot, reach - 0.12 + t), role="leg")
+            for x in (x0 + 0.08, x1 - 0.08)
+        ]
+    if style.tufting > 0.75:
+        parts += _throw_pillows(inner, seat, h, z0 + frame + 0.14, style)
+    return parts
+
+
+def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) -> list[Solid]:
+    a = min(0.22, (h - seat) * 0.5, inner * 0.32)
+    turn = rotation(x=-0.35)
+    sides = (-1, 1) if style.contrast > 0.4 else (1,)
+    return [
+        Ball(
+            centre=np.array([s * (inner - a * 1.05), seat + a * 0.85, z + 0.06]),
+            half=np.array([a, a, 0.07]),
+            power=2.8,
+            turn=turn,
+            material="cushion",
+            role="cushion",
+        )
+        for s in sides
+    ]
+
+
+def multi_seat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Two to four seat cushions, or one long one."""
+    count = int(np.clip(round(size[0] / choices.between("count", 0.6, 0.85)), 2, 4))
+    return _couch(size, style, 1 if choices.chance("form", 0.12) else count)
+
+
+def loveseat_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Two seats, or one cushion across."""
+    if style.back == "shell" and choices.chance("kind", 0.5):
+        return _curved(size, style)
+    return _couch(size, style, 1 if choices.chance("form", 0.2) or size[0] < 1.0 else 2)
+
+
+def sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Any sofa: rows of cushions, or a curved one."""
+    if choices.chance("extra", 0.15) or (style.back == "shell" and choices.chance("kind", 0.5)):
+        return _curved(size, style)
+    return multi_seat_sofa(size, style, choices)
+
+
+def _curved(size: Size, style: Style) -> list[Solid]:
+    """A sofa with one wall bent round the back."""
+    w, h, d = size
+    foot, wall = _foot(style), 0.13
+    seat = min(0.43, h * 0.58)
+    parts: list[Solid] = _legs(style, w * 0.8, d * 0.9, foot)
+    parts.append(
+        Shell(
+            centre=np.array([0, foot, d * 0.4]),
+            half=(w / 2, d * 0.9),
+            thickness=wall,
+            back=h - foot,
+            front=(h - foot) * (0.55 + 0.3 * style.arm_height),
+            power=2.6 + 2 * style.corner,
+            ease=3,
+            material="fabric",
+            role="back",
+        )
+    )
+    parts.append(
+        Turned(
+            low=(w / 2 - wall * 0.6, d * 0.46),
+            high=(w / 2 - wall * 0.6, d * 0.46),
+            height=(seat - foot) * 0.6,
+            power=3.5,
+            centre=np.array([0, foot, 0.02]),
+            material="fabric",
+            role="base",
+        )
+    )
+    pads = 2 if style.tufting > 0.4 else 1
+    edges = np.linspace(-w / 2 + wall, w / 2 - wall, pads + 1)
+    for a, b in pairwise(edges):
+        parts.append(cushion((a, foot + (seat - foot) * 0.55, -d * 0.38), (b, seat, d / 2), style))
+    return parts
+
+
+def l_shaped_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A sofa whose end seat reaches forward as a chaise, left or right; or two sofas that meet in a corner."""
+    w, h, depth = size
+    d = float(np.clip(0.95, 0.5 * depth, 0.7 * depth))
+    side = -1 if choices.chance("side", 0.5) else 1
+    count = int(np.clip(round(w / 0.85), 3, 5))
+    parts = _couch(np.array([w, h, d]), style, count, chaise=side, chaise_depth=depth)
+    if choices.chance("extra", 0.35):
+        foot, seat, frame = _foot(style), 0.43, 0.14
+        y1 = h - 0.06
+        x0, x1 = sorted((side * w / 2, side * (w / 2 - frame)))
+        parts.append(box((x0, foot, -d / 2 + 0.05), (x1, y1, -d / 2 + depth - 0.05), "fabric", 0.04, "back"))
+        inner = side * (w / 2 - frame - 0.07)
+        z0, z1 = d * 0.05, -d / 2 + depth - 0.12
+        tilt = rotation(z=-side * 0.15)
+        parts.append(
+            Block(
+                centre=np.array([inner, (seat + y1) / 2, (z0 + z1) / 2]),
+                half=np.array([0.075, (y1 - seat) / 2, (z1 - z0) / 2]),
+                radius=0.05,
+                turn=tilt,
+                material="fabric",
+                role="back",
+            )
+        )
+    return parts
+
+
+def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """One long seat with a back at its end, and an arm at one side or none."""
+    w, h, d = size
+    foot = max(0.05, _foot(style))
+    seat, pad = min(0.43, h * 0.55), 0.14
+    parts: list[Solid] = _legs(style, w, d, foot)
+    low, high = (-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.015)
+    parts.append(box(low, high, "fabric", 0.02, "base"))
+    parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
+    rake = 0.15 + style.rake
+    back = box((-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), "fabric", 0.05, "back")
+    turn, pivot = rotation(x=-rake), np.array([0, seat - pad, -d / 2 + 0.08])
+    parts.append(replace(back, centre=turn @ (back.centre - pivot) + pivot, turn=turn))
+    if choices.chance("extra", 0.6):
+        s = -1 if choices.chance("side", 0.5) else 1
+        x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))
+        reach = -d / 2 + d * choices.between("share", 0.35, 0.6)
+        parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style, role="arm"))
+    if style.arms == "rolled":
+        parts.append(
+            Turned(
+                centre=np.array([-w * 0.46, seat + 0.09, -d / 2 + 0.28]),
+                low=(0.09, 0.09),
+                high=(0.09, 0.09),
+                height=w * 0.92,
+                turn=rotation(z=-np.pi / 2),
+                rounding=0.02,
+                material="accent",
+                role="cushion",
+            )
+        )
+    return parts
+
+
+def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A bean bag: pear-shaped, a ball with a hollow, or a low folded chair."""
+    w, h, d = size
+    kind = choices.pick("kind", ["pear", "lounger", "folded"])
+    if kind == "pear":
+        outline = [
+            (0.3, 0.0),
+            (0.44, 0.05),
+            (0.5, 0.2),
+            (0.47, 0.38),
+            (0.38, 0.58),
+            (0.28, 0.76),
+            (0.18, 0.9),
+            (0.07, 1.0),
+        ]
+        profile = np.array(outline) * [w, h]
+        bag = Lathe(profile=profile, squash=d / w, material="fabric", role="seat")
+        seams: list[Solid] = []
+        for turn in np.arange(6) * np.pi / 3 + 0.3:
+            around = np.array([np.cos(turn), np.sin(turn) * d / w])
+            line = np.insert(profile[1:, :1] * around, 1, profile[1:, 1], axis=1)
+            seams.append(Tube(points=line, radius=0.005, material="fabric", role="seam"))
+        return [bag, *seams]
+    if kind == "lounger":
+        lounger: list[Solid] = [
+            Ball(
+                centre=np.array([0, h * 0.27, d * 0.05]),
+                half=np.array([w / 2, h * 0.27, d * 0.46]),
+                power=2.8,
+                material="fabric",
+            ),
+            Ball(
+                centre=np.array([0, h * 0.55, -d * 0.27]),
+                half=np.array([w * 0.46, h * 0.46, d * 0.2]),
+                power=2.6,
+                turn=rotation(x=-0.25),
+                material="fabric",
+            ),
+        ]
+        return of_role("seat", lounger)
+    turn = rotation(x=-0.2 - style.rake)
+    return [
+        cushion((-w / 2, 0, -d * 0.4), (w / 2, h * 0.4, d / 2), replace(style, softness=0.8)),
+        cushion((-w / 2, h * 0.3, -d * 0.5), (w / 2, h, -d * 0.22), replace(style, softness=0.8), turn=turn),
+    ]

@@ -1,0 +1,339 @@
+"""The solids that furniture is made of: each is a closed mesh and, without any mesh query, a signed distance.
+
+A distance is asked for on the box-normalised grid, where one voxel spans a different length on each axis. With `f` the
+metric distance and `n` its unit gradient, the distance in voxels is `f / |S n|`, S = diag(metres per voxel): exact for
+planes and first-order exact elsewhere, which is what the few voxels inside the truncation need.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from echomodel.furniture.surfaces import cube_surface, loft, superellipse
+from echomodel.triangles import cross
+
+Array = np.ndarray
+IDENTITY = np.eye(3)
+FINEST = 3  # levels of detail that a solid can be meshed in: 0 to 3
+
+
+def rotation(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
+    """Rotation matrix (3, 3) about x, then z, then y; radians."""
+    cx, sx, cy, sy, cz, sz = np.cos(x), np.sin(x), np.cos(y), np.sin(y), np.cos(z), np.sin(z)
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_y @ about_z @ about_x
+
+
+def upright(bottom: Array, top: Array) -> Array:
+    """Rotation matrix whose y axis runs from `bottom` to `top`, with x as near to the world's x as can be."""
+    y = np.asarray(top, float) - bottom
+    y = y / np.linalg.norm(y)
+    x = IDENTITY[0] if abs(y[0]) < 0.9 else IDENTITY[2]
+    x = x - y * (x @ y)
+    x = x / np.linalg.norm(x)
+    return np.stack([x, y, cross(x, y)], axis=1)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """How a drawer or a door moves; solids with one joint move as one body.
+
+    Arguments:
+        body: name of the body, unique in the piece.
+        kind: `prismatic` slides along the axis, `revolute` turns about it.
+        axis: unit vector in the object's frame. anchor: a point of the axis of a hinge, metres.
+        reach: how far it moves from closed to open, metres or radians.
+    """
+
+    body: str
+    kind: Literal["prismatic", "revolute"]
+    axis: tuple[float, float, float]
+    anchor: tuple[float, float, float]
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed solid placed by `centre` (3,) and `turn` (3, 3) in the object's frame.
+
+    Arguments:
+        material: names its look. role: what it is in the piece: leg, top, seat, drawer, handle ...
+        joint: how it moves, None = it is fixed.
+        core: fills what boards enclose, so that a coarse grid sees one body; it has distances and no mesh.
+    """
+
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    turn: Array = field(default_factory=lambda: IDENTITY)
+    material: str = "wood"
+    role: str = ""
+    joint: Joint | None = None
+    core: bool = False
+
+    def mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        """Vertices (n, 3) in the object's frame and outward faces (m, 3) of the closed surface."""
+        vertices, faces = self.local_mesh(detail)
+        return vertices @ self.turn.T + self.centre, faces
+
+    def distance(self, x: Array, y: Array, z: Array, scale: Array) -> Array:
+        """Signed distance in voxels at broadcastable coordinates x, y, z (metres); `scale` (3,) metres per voxel."""
+        x, y, z = x - self.centre[0], y - self.centre[1], z - self.centre[2]
+        if self.turn is not IDENTITY:
+            t = self.turn
+            x, y, z = (x * t[0, i] + y * t[1, i] + z * t[2, i] for i in range(3))
+        # Columns: what one metre along a local axis is worth in voxel gradients.
+        local = self.turn * np.asarray(scale)[:, None]
+        return self.local_distance(x, y, z, local.T @ local)
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        """Distance in voxels at local coordinates; |S n| of a local direction n is sqrt(n^T metric n)."""
+        raise NotImplementedError
+
+    def inradius(self, scale: Array) -> float:
+        """Half the smallest thickness, in voxels (a lower estimate)."""
+        raise NotImplementedError
+
+
+def gradient_length(metric: Array, x: Array, y: Array, z: Array) -> Array:
+    """sqrt(n^T metric n) for directions n = (x, y, z)."""
+    m = metric
+    squared = m[0, 0] * x * x + m[1, 1] * y * y + m[2, 2] * z * z
+    if abs(m[0, 1]) + abs(m[0, 2]) + abs(m[1, 2]) > 1e-12:
+        squared = squared + 2 * (m[0, 1] * x * y + m[0, 2] * x * z + m[1, 2] * y * z)
+    return np.sqrt(np.maximum(squared, 1e-16))
+
+
+def intersection(a: Array, b: Array) -> Array:
+    """Distance to what two solids that meet at right angles have in common."""
+    return np.hypot(np.maximum(a, 0), np.maximum(b, 0)) + np.minimum(np.maximum(a, b), 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Block(Solid):
+    """A box with half extents `half` (3,), its edges and corners rounded by `radius`, metres."""
+
+    half: Array = field(default_factory=lambda: np.ones(3))
+    radius: float = 0.0
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        r = min(self.radius, *self.half)
+        q = [np.abs(c) - (h - r) for c, h in zip((x, y, z), self.half, strict=True)]
+        per_axis = np.sqrt(np.diag(metric))
+        inside = np.maximum(np.maximum((q[0] - r) / per_axis[0], (q[1] - r) / per_axis[1]), (q[2] - r) / per_axis[2])
+        k = [np.maximum(c, 0) for c in q]
+        length = np.sqrt(k[0] * k[0] + k[1] * k[1] + k[2] * k[2])
+        outside = (length - r) * length / gradient_length(metric, *k)
+        return np.where(length > 1e-9, outside, inside)
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        r = min(self.radius, *(self.half * 0.999))
+        steps = min(detail, 1 if r < 0.008 else 3)
+        if r <= 0 or not steps:
+            vertices, faces = cube_surface(1)
+            return vertices * self.half, faces
+        # On every axis `steps` cells carry the rounding at either end, one cell the flat between them.
+        cells = 2 * steps + 1
+        vertices, faces = cube_surface(cells)
+        node = np.rint((vertices + 1) / 2 * cells)
+        core = np.where(node <= steps, -1.0, 1.0)
+        corner = np.where(node <= steps, node - steps, node - steps - 1) / steps
+        corner = np.sign(corner) * np.tan(np.abs(corner) * np.pi / 4)
+        corner = np.where(np.abs(corner) < 1e-12, 0.0, corner)
+        length = np.linalg.norm(corner, axis=1, keepdims=True)
+        return core * (self.half - r) + r * corner / np.maximum(length, 1e-12), faces
+
+    def inradius(self, scale: Array) -> float:
+        local = self.turn * np.asarray(scale)[:, None]
+        return float(min(self.half / np.linalg.norm(local, axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Turned(Solid):
+    """A solid on a superellipse: `low` and `high` are the half widths (x, z) at its two ends, `height` apart along y.
+
+    `power` 2 makes cylinders and cones, about 4 to 10 rounded corners, `inf` square legs and frusta. The centre is that
+    of the bottom face; `rounding` rounds the rims, metres.
+    """
+
+    low: tuple[float, float] = (1.0, 1.0)
+    high: tuple[float, float] = (1.0, 1.0)
+    height: float = 1.0
+    power: float = 2.0
+    rounding: float = 0.0
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        w = np.clip(y / self.height, 0, 1)
+        a, b = (np.maximum(lo + (hi - lo) * w, 1e-4) for lo, hi in zip(self.low, self.high, strict=True))
+        slope_a, slope_b = ((hi - lo) / self.height for lo, hi in zip(self.low, self.high, strict=True))
+        u, v = np.abs(x) / a, np.abs(z) / b
+        if np.isinf(self.power):
+            first = u >= v
+            q = np.maximum(u, v)
+            gx, gz = np.where(first, 1 / a, 0), np.where(first, 0, 1 / b)
+            gy = -np.where(first, u * slope_a / a, v * slope_b / b)
+        else:
+            p = self.power
+            q = np.maximum((u**p + v**p) ** (1 / p), 1e-6)
+            wx, wz = (u / q) ** (p - 1), (v / q) ** (p - 1)
+            gx, gz = wx / a, wz / b
+            gy = -(wx * u * slope_a / a + wz * v * slope_b / b)
+        side = (q - 1) / gradient_length(metric, np.sign(x) * gx, gy, np.sign(z) * gz)
+        along = np.sqrt(metric[1, 1])
+        cap = np.maximum(y - self.height, -y) / along
+        if self.rounding <= 0:
+            return intersection(side, cap)
+        across = np.sqrt((metric[0, 0] + metric[2, 2]) / 2)
+        k = np.maximum(side * across + self.rounding, 0), np.maximum(cap * along + self.rounding, 0)
+        length = np.hypot(*k)
+        rim = (length - self.rounding) * length / np.sqrt((across * k[0]) ** 2 + (along * k[1]) ** 2 + 1e-16)
+        return np.where((k[0] > 0) & (k[1] > 0), rim, np.maximum(side, cap))
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        low, high = np.asarray(self.low), np.asarray(self.high)
+        outline = superellipse(self.power, _corners(detail, float(max(low.max(), high.max()))))
+        r = min(self.rounding, self.height * 0.49, *(0.95 * np.maximum(low, high)))
+        if r > 0:
+            arc = np.linspace(0, np.pi / 2, 2 + detail)
+            rims = [(r - r * np.sin(t), low - (r - r * np.cos(t))) for t in arc[::-1]]
+            rims += [(self.height - r + r * np.sin(t), high - (r - r * np.cos(t))) for t in arc]
+        else:
+            rims = [(0.0, low), (self.height, high)]
+        rings = [np.insert(outline * np.maximum(half, 1e-4), 1, y, axis=1) for y, half in rims]
+        return loft(rings)
+
+    def inradius(self, scale: Array) -> float:
+        local = np.linalg.norm(self.turn * np.asarray(scale)[:, None], axis=0)
+        thin = min(min(self.low[0], self.high[0]) / local[0], min(self.low[1], self.high[1]) / local[2])
+        return float(min(thin, self.height / 2 / local[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Ball(Solid):
+    """A superellipsoid with half axes `half` (3,); `power` 2 is an ellipsoid, 3 to 5 a cushion."""
+
+    half: Array = field(default_factory=lambda: np.ones(3))
+    power: float = 2.0
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        p = self.power
+        u, v, w = (np.abs(c) / h for c, h in zip((x, y, z), self.half, strict=True))
+        q = np.maximum((u**p + v**p + w**p) ** (1 / p), 1e-6)
+        g = (np.sign(c) * (t / q) ** (p - 1) / h for c, t, h in zip((x, y, z), (u, v, w), self.half, strict=True))
+        return (q - 1) / gradient_length(metric, *g)
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        vertices, faces = cube_surface((2, 4, 6, 8)[detail] if self.half.max() > 0.04 else 2 + detail)
+        vertices = np.tan(vertices * np.pi / 4)
+        length = (np.abs(vertices) ** self.power).sum(1, keepdims=True) ** (1 / self.power)
+        return vertices / length * self.half, faces
+
+    def inradius(self, scale: Array) -> float:
+        local = self.turn * np.asarray(scale)[:, None]
+        return float(min(self.half / np.linalg.norm(local, axis=0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Tube(Solid):
+    """A round rod of `radius` along the polyline `points` (k, 3), metres."""
+
+    points: Array = field(default_factory=lambda: np.zeros((2, 3)))
+    radius: float = 0.01
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        nearest: Array = np.array(np.inf)
+        last = len(self.points) - 2
+        for i in range(last + 1):
+            a, d = self.points[i], self.points[i + 1] - self.points[i]
+            projected = (x - a[0]) * d[0] + (y - a[1]) * d[1] + (z - a[2]) * d[2]
+            t = np.clip(projected / max(d @ d, 1e-12), 0, 1)
+            off = x - a[0] - t * d[0], y - a[1] - t * d[1], z - a[2] - t * d[2]
+            length = np.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2 + 1e-12)
+            found = (length - self.radius) * length / gradient_length(metric, *off)
+            voxels = gradient_length(metric, *d)  # of the step d; the ends are flat, not round
+            if i == 0:
+                found = np.maximum(found, -projected / voxels)
+            if i == last:
+                found = np.maximum(found, (projected - d @ d) / voxels)
+            nearest = np.minimum(nearest, found)
+        return nearest
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        tangents = np.gradient(self.points, axis=0)
+        circle = superellipse(2.0, (4, 6, 8, 12)[detail]) * self.radius
+        rings, x = [], None
+        for point, tangent in zip(self.points, tangents, strict=True):
+            y = tangent / np.linalg.norm(tangent)
+            if x is None:
+                x = upright(np.zeros(3), y)[:, 0]
+            x = x - y * (x @ y)
+            x = x / np.linalg.norm(x)
+            rings.append(point + circle[:, :1] * x + circle[:, 1:] * cross(x, y))
+        return loft(rings)
+
+    def inradius(self, scale: Array) -> float:
+        return float(self.radius / np.max(scale))
+
+
+@dataclass(frozen=True, eq=False)
+class Shell(Solid):
+    """A standing wall bent round the back: half a superellipse, `half` = half width and depth behind z = 0, metres.
+
+    It is `thickness` thick, rises from y = 0 to `back` in the middle and falls to `front` at its ends; `ease` above 1
+    keeps the back high for longer.
+    """
+
+    half: tuple[float, float] = (1.0, 1.0)
+    thickness: float = 0.1
+    back: float = 0.8
+    front: float = 0.6
+    power: float = 2.5
+    ease: float = 3.0
+
+    def _top(self, angle: Array) -> Array:
+        return self.back + (self.front - self.back) * np.clip(np.abs(angle) / (np.pi / 2), 0, 1) ** self.ease
+
+    def local_distance(self, x: Array, y: Array, z: Array, metric: Array) -> Array:
+        scale = np.sqrt(np.diag(metric))
+        behind = np.maximum(-z, 0)
+        walls = []
+        for inset, sign in ((0.0, 1.0), (self.thickness, -1.0)):
+            a, b, p = self.half[0] - inset, self.half[1] - inset, self.power
+            u, v = np.abs(x) / a, behind / b
+            q = np.maximum((u**p + v**p) ** (1 / p), 1e-6)
+            gx, gz = (u / q) ** (p - 1) / a, (v / q) ** (p - 1) / b
+            walls.append(sign * (q - 1) / gradient_length(metric, np.sign(x) * gx, 0 * gx, -gz))
+        top = self._top(np.arctan2(x / self.half[0], behind / self.half[1]))
+        upright_part = np.maximum(y - top, -y) / scale[1]
+        return intersection(intersection(np.maximum(*walls), z / scale[2]), upright_part)
+
+    def local_mesh(self, detail: int = FINEST) -> tuple[Array, Array]:
+        angle = np.linspace(-np.pi / 2, np.pi / 2, (9, 13, 21, 33)[detail])
+        s, c = np.sin(angle), np.cos(angle)
+        norm = (np.abs(s) ** self.power + np.abs(c) ** self.power) ** (1 / self.power)
+        top, rings = self._top(angle), []
+        for i in range(len(angle)):
+            outer = np.array([s[i] * self.half[0], -c[i] * self.half[1]]) / norm[i]
+            inner = (
+                np.array([s[i] * (self.half[0] - self.thickness), -c[i] * (self.half[1] - self.thickness)]) / norm[i]
+            )
+            rings.append(
+                np.array(
+                    [[p[0], h, p[1]] for p, h in zip((inner, outer, outer, inner), (0, 0, top[i], top[i]), strict=True)]
+                )
+            )
+        return loft(rings)
+
+    def inradius(self, scale: Array) -> float:
+        return float(self.thickness / 2 / max(scale[0], scale[2]))
+
+
+def _corners(detail: int, radius: float) -> int:
+    """Corners of a round outline: fewer for what is small."""
+    return ((8, 12, 20, 32) if radius > 0.05 else (6, 8, 12, 16))[detail]

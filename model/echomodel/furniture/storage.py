@@ -1,0 +1,197 @@
+"""Closed storage: nightstands, dressers, sideboards, cabinets, wardrobes and television stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, base, box, core
+from echomodel.furniture.cases import BOARD, carcass, depth_of, foot_height, fronted, mixed, shelves
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.fronts import case, front, sliding
+from echomodel.furniture.solids import Solid, Turned, rotation
+from echomodel.furniture.style import Style
+
+
+def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """One to three drawers, or a drawer over an open cell, on legs or a plinth; rarely a drum."""
+    w, h, d = size
+    foot = foot_height(style, h, 0.4)
+    kind = choices.pick("kind", ["drawers", "niche", "table", "drum"], [0.55, 0.27, 0.13, 0.05])
+    if kind == "drum" and style.profile == "round":
+        body = Turned(
+            centre=np.array([0, foot, 0]), low=(w / 2, d / 2), high=(w / 2, d / 2), height=h - foot, role="side"
+        )
+        lip = Turned(
+            centre=np.array([0, foot + (h - foot) * 0.55, 0]),
+            low=(w * 0.515, d * 0.515),
+            high=(w * 0.515, d * 0.515),
+            height=0.02,
+            material="accent",
+            role="side",
+        )
+        return [body, lip, *base(style, w * 0.7, d * 0.7, foot, 0.04)]
+    if kind == "niche":
+        parts, rect = carcass(size, style, foot, solid=False)
+        x0, y0, x1, y1, z = rect
+        mid = y0 + (y1 - y0) * choices.between("split", 0.4, 0.6)
+        low, high = ((x0, mid), (x1, y1)) if choices.chance("side", 0.7) else ((x0, y0), (x1, mid))
+        shelf = box((x0, mid - BOARD / 2, -d / 2), (x1, mid + BOARD / 2, z), role="shelf")
+        drawer = core((*low, -d / 2), (*high, z))
+        return [*parts, drawer, shelf, *front(low, high, z, 1, 1, "drawer", style, depth_of(d, z))]
+    if kind == "table":
+        t = style.top
+        low = h - max(0.12, h * 0.25)
+        legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
+        parts = [
+            box((-w / 2, h - t, -d / 2), (w / 2, h, d / 2), role="top"),
+            *case((-w * 0.46, low, -d * 0.44), (w * 0.46, h - t, d * 0.44)),
+        ]
+        parts += front((-w * 0.46, low), (w * 0.46, h - t), d * 0.44, 1, 1, "drawer", style, d * 0.85)
+        return parts + base(style, w * 0.95, d * 0.92, low, 0.035 * style.bulk, legs)
+    return fronted(size, style, foot, choices.pick("rows", [1, 2, 2, 3]), 1, "drawer")
+
+
+def dresser(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Rows of drawers, one to three columns; the top row sometimes split."""
+    w, h, d = size
+    foot = foot_height(style, h, 0.2)
+    rows = int(np.clip(round((h - foot) / choices.between("rows", 0.18, 0.26)), 2, 7))
+    columns = 1 if w < 0.75 else choices.whole("columns", 1, 3) if w < 1.3 else choices.whole("columns", 2, 4)
+    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot)
+    if columns == 1 and w > 0.6 and choices.chance("form", 0.5):
+        mid = y1 - (y1 - y0) / rows
+        upper = front((x0, mid), (x1, y1), z, 1, 2, "drawer", style, depth_of(d, z))
+        return parts + upper + front((x0, y0), (x1, mid), z, rows - 1, 1, "drawer", style, depth_of(d, z))
+    return parts + front((x0, y0), (x1, y1), z, rows, columns, "drawer", style, depth_of(d, z))
+
+
+def sideboard(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A low row of doors, drawers and cells; tall ones carry a shelf or a glazed upper part."""
+    w, h, d = size
+    if h > 1.3:
+        lower = 0.85
+        t = BOARD
+        parts = mixed(np.array([w, lower, d]), style, choices, foot_height(style, lower, 0.25), 0.5)
+        inner = w * 0.92
+        z1 = -d / 2 + d * 0.7
+        upper: list[Solid] = [
+            box((s * inner / 2 - t, lower, -d / 2), (s * inner / 2 + t, h, z1), role="side") for s in (-1, 1)
+        ]
+        levels = (lower + (h - lower) * 0.5, h - t)
+        upper += [box((-inner / 2, y, -d / 2), (inner / 2, y + t, z1), role="shelf") for y in levels]
+        upper.append(box((-inner / 2, lower, -d / 2), (inner / 2, h, -d / 2 + 0.012), "accent", 0.0, "back"))
+        return parts + upper
+    return mixed(size, style, choices, foot_height(style, h, 0.3), choices.between("columns", 0.38, 0.55))
+
+
+def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Doors above drawers, doors only, or mixed columns; tall ones may have open shelves on top."""
+    w, h, d = size
+    foot = foot_height(style, h, 0.22)
+    if h > 1.5:
+        parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
+        columns = int(np.clip(round((x1 - x0) / 0.48), 1, 8))
+        split = y0 + (y1 - y0) * choices.between("split", 0.33, 0.5)
+        low_kind, rows = ("door", 1) if choices.chance("front", 0.6) else ("drawer", choices.whole("rows", 2, 4))
+        parts.append(core((x0, y0, -d / 2), (x1, split, z)))
+        parts.append(box((x0, split - BOARD / 2, -d / 2), (x1, split + BOARD / 2, z), role="shelf"))
+        parts += front((x0, y0), (x1, split), z, rows, columns, low_kind, style, depth_of(d, z))
+        if style.fronts == "open" or choices.chance("extra", 0.4):
+            parts += shelves((x0, split, x1, y1, z), d, -d / 2, choices.whole("count", 2, 5), columns, style)
+            return parts
+        parts.append(core((x0, split, -d / 2), (x1, y1, z)))
+        return parts + front((x0, split), (x1, y1), z, 1, columns, "door", style, depth_of(d, z))
+    if choices.chance("kind", 0.4):
+        return fronted(size, style, foot, 1, int(np.clip(round(w / 0.45), 2, 8)), "door")
+    return mixed(size, style, choices, foot, choices.between("columns", 0.4, 0.6))
+
+
+def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A grid of cells, some with bins or drawers, sometimes with a gabled top."""
+    w, h, d = size
+    gable = choices.chance("form", 0.3)
+    body = h * 0.8 if gable else h
+    parts, (x0, y0, x1, y1, z) = carcass(
+        np.array([w, body, d]), style, min(0.06, style.leg_height), kind="plinth", solid=False
+    )
+    columns, rows = int(np.clip(round((x1 - x0) / 0.36), 1, 8)), int(np.clip(round((y1 - y0) / 0.34), 2, 7))
+    parts += shelves((x0, y0, x1, y1, z), d, -d / 2, rows, columns, style)
+    xs, ys = np.linspace(x0, x1, columns + 1), np.linspace(y0, y1, rows + 1)
+    rng = choices.stream("pattern")
+    for i in range(columns):
+        for j in range(rows):
+            if rng.random() < 0.42:
+                low, high = (float(xs[i]) + 0.01, float(ys[j])), (float(xs[i + 1]) - 0.01, float(ys[j + 1]))
+                parts.append(core((*low, -d / 2 + 0.03), (*high, z - 0.01)))
+                parts += front(low, high, z - 0.01, 1, 1, "drawer", style, depth_of(d, z) - 0.01)
+    if gable:
+        slope = np.arctan2(h - body, w / 2)
+        length = np.hypot(h - body, w / 2)
+        for s in (-1, 1):
+            panel = box((-length / 2, -0.015, -d / 2), (length / 2, 0.015, d / 2 - 0.02), role="roof")
+            parts.append(
+                replace(panel, centre=np.array([s * w / 4, (body + h) / 2 - 0.015, -0.01]), turn=rotation(z=-s * slope))
+            )
+    return parts
+
+
+def wardrobe(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Full-height doors, one to five, hinged or sliding; drawers below or an open column in some."""
+    w, _h, d = size
+    foot = 0.05 if style.family in ("modern", "scandinavian", "industrial") else 0.09
+    kind = "plinth" if style.legs not in ("bun", "turned") else "bun"
+    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, kind=kind)
+    doors = int(np.clip(round((x1 - x0) / choices.between("columns", 0.42, 0.58)), 1, 6))
+    choice = choices.pick("kind", ["doors", "drawers", "sliding", "open"], [0.45, 0.25, 0.15, 0.15])
+    if choice == "sliding" and w > 1.2:
+        count = 2 if w < 2.0 else 3
+        material = "mirror" if choices.chance("second", 0.3) else "accent"
+        return parts + sliding((x0, y0), (x1, y1), z, count, style, material)
+    if choice == "drawers":
+        split = y0 + (y1 - y0) * choices.between("split", 0.2, 0.32)
+        rows = choices.whole("rows", 1, 3)
+        parts += front((x0, y0), (x1, split), z, rows, max(1, doors // 2), "drawer", style, depth_of(d, z))
+        parts.append(box((x0, split - BOARD / 2, -d / 2), (x1, split + BOARD / 2, z), role="shelf"))
+        return parts + front((x0, split), (x1, y1), z, 1, doors, "door", style, depth_of(d, z))
+    if choice == "open" and doors >= 3:
+        edge = x1 - (x1 - x0) / doors
+        cabin, (_, cy0, _, cy1, cz) = carcass(size, style, foot, kind=kind, solid=False)
+        cabin.append(core((x0, cy0, -d / 2), (edge, cy1, z)))
+        cabin.append(box((edge - BOARD / 2, cy0, -d / 2), (edge + BOARD / 2, cy1, z), role="side"))
+        cabin += shelves((edge, cy0, x1, cy1, cz), d, -d / 2, choices.whole("rows", 4, 7), 1, style)
+        return cabin + front((x0, y0), (edge, y1), z, 1, doors - 1, "door", style, depth_of(d, z))
+    return parts + front((x0, y0), (x1, y1), z, 1, doors, "door", style, depth_of(d, z))
+
+
+def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Long and low: drawers, flaps and open cells in a row, on legs, a plinth or floating low."""
+    w, h, d = size
+    if h > 0.8 and choices.chance("form", 0.5):
+        low = np.array([w, 0.45, d])
+        parts = mixed(low, style, choices, foot_height(style, 0.45, 0.3), 0.5)
+        panel = box((-w / 2, 0.45, -d / 2), (w / 2, h, -d / 2 + 0.03), "accent", 0.0, "back")
+        return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0), role="shelf")]
+    foot = foot_height(style, h, 0.45)
+    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
+    count = int(np.clip(round(w / choices.between("columns", 0.42, 0.62)), 2, 6))
+    kinds = [
+        str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])
+    ]
+    if choices.chance("symmetry", 0.75):
+        kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
+    xs = np.linspace(x0, x1, count + 1)
+    for i, kind in enumerate(kinds):
+        low_corner, high_corner = (float(xs[i]), y0), (float(xs[i + 1]), y1)
+        if i:
+            parts.append(box((xs[i] - 0.01, y0, -d / 2), (xs[i] + 0.01, y1, z), role="side"))
+        if kind == "open":
+            if y1 - y0 > 0.25:
+                middle = (y0 + y1) / 2
+                parts.append(box((xs[i], middle - 0.01, -d / 2), (xs[i + 1], middle + 0.01, z), role="shelf"))
+            continue
+        rows = 2 if kind == "drawer" and y1 - y0 > 0.28 else 1
+        parts.append(core((*low_corner, -d / 2), (*high_corner, z)))
+        parts += front(low_corner, high_corner, z, rows, 1, kind, style, depth_of(d, z))
+    return parts

@@ -1,0 +1,310 @@
+"""Tables of every height: dining, coffee, side, console and corner tables, desks and dressing tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from echomodel.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, top, within
+from echomodel.furniture.choices import Choices
+from echomodel.furniture.fronts import case, front
+from echomodel.furniture.mirrors import mirror_of
+from echomodel.furniture.solids import Solid, Turned
+from echomodel.furniture.style import Style
+
+KNEES = 0.45  # metres between what stands on both sides of a seat
+
+
+def _leg(style: Style, width: float, height: float) -> float:
+    return float(np.clip(0.045 * style.bulk * (0.6 + 0.3 * width + 0.3 * height), 0.025, 0.14))
+
+
+def _outline(style: Style, size: Size, choices: Choices) -> str:
+    """Round where width and depth are alike and the style likes it, else with square or rounded corners."""
+    alike = max(size[0], size[2]) / min(size[0], size[2]) < 1.12
+    if style.round_tops > (0.35 if alike else 0.8):
+        return "round"
+    return "corners" if style.corner > 0.45 else "square"
+
+
+def dining_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Four legs, a trestle, a sled or a pedestal under a plain, rounded or round top, with an apron or without."""
+    w, h, d = size
+    shape, thick = _outline(style, size, choices), max(style.top * 1.1, 0.022)
+    parts: list[Solid] = [top(shape, w, d, h, thick, style)]
+    if shape == "round":
+        inner = within(shape, style) if style.legs not in ("splayed", "hairpin") else 0.86
+        if w / d < 1.3 and choices.chance("form", 0.65):
+            return parts + pedestal(w, d, h - thick, style)
+        kind = None if style.legs not in ("plinth", "bun", "trestle", "sled") else "straight"
+        return parts + base(style, w * inner, d * inner, h - thick, _leg(style, w, h), kind)
+    if style.legs == "plinth" and choices.chance("form", 0.5):
+        panel = max(0.05, 0.06 * w)
+        x, z = w / 2 * 0.72, d / 2 * 0.75
+        return parts + [box((s * x - panel / 2, 0, -z), (s * x + panel / 2, h - thick, z), role="leg") for s in (-1, 1)]
+    kind = "straight" if style.legs in ("plinth", "bun") else None
+    leg = _leg(style, w, h)
+    share = within(shape, style)
+    fw, fd = w * share - 1.5 * style.overhang, d * share - 1.5 * style.overhang
+    parts += base(style, fw, fd, h - thick, leg, kind)
+    if style.legs in ("straight", "tapered", "turned", "bun") and style.contrast < 0.7:
+        a = 0.04 + 0.05 * style.contrast
+        x, z = fw / 2 - leg * 0.6, fd / 2 - leg * 0.6
+        apron: list[Solid] = [box((-x, h - thick - a, s * z - 0.01), (x, h - thick, s * z + 0.01)) for s in (-1, 1)]
+        apron += [box((s * x - 0.01, h - thick - a, -z), (s * x + 0.01, h - thick, z)) for s in (-1, 1)]
+        parts += of_role("apron", apron)
+    return parts
+
+
+def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Low: legs, a shelf below, a solid block with drawers, a drum, a bowl or two nested tops."""
+    w, h, d = size
+    shape, thick = _outline(style, size, choices), max(style.top, 0.025)
+    kind = choices.pick("kind", ["legs", "shelf", "block", "drum", "nested"], [0.36, 0.24, 0.2, 0.12, 0.08])
+    if kind == "drum" and shape == "round":
+        drum = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
+        return [top(shape, w, d, h, thick, style), *of_role("leg", [drum])]
+    if kind == "block" and shape != "round":
+        foot = max(0.04, h * 0.15)
+        body = case((-w / 2 * 0.97, foot, -d / 2 * 0.95), (w / 2 * 0.97, h - thick, d / 2 * 0.95))
+        drawers = front(
+            (-w / 2 * 0.97 + 0.01, foot + 0.01),
+            (w / 2 * 0.97 - 0.01, h - thick - 0.01),
+            d / 2 * 0.95,
+            1,
+            choices.whole("columns", 1, 3),
+            "drawer",
+            style,
+            d * 0.9,
+        )
+        return [
+            top("square", w, d, h, thick, style),
+            *body,
+            *drawers,
+            *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
+        ]
+    if kind == "nested" and w > 0.7:
+        low_top = Turned(
+            centre=np.array([w * 0.28, h * 0.62, d * 0.1]),
+            low=(w * 0.22, w * 0.22),
+            high=(w * 0.22, w * 0.22),
+            height=thick,
+            material="accent",
+            role="top",
+        )
+        post = Turned(
+            centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62,
+            role="leg",
+        )  # fmt: skip
+        main = Turned(
+            centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2), height=thick,
+            role="top",
+        )  # fmt: skip
+        stem = Turned(
+            centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08), height=h - thick,
+            role="leg",
+        )  # fmt: skip
+        return [main, stem, low_top, post]
+    parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
+    legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
+    inner = within(shape, style)
+    leg = _leg(style, w * 0.7, h)
+    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
+    if kind == "shelf":
+        under = h - thick
+        parts.append(between_legs(shape, w * inner, d * inner, under, h * 0.4, thick * 0.7, leg, style, legs))
+    return parts
+
+
+def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Beside a sofa: legs, pedestal, drum, a cube with a niche or a C-shaped frame."""
+    w, h, d = size
+    shape, thick = _outline(style, size, choices), max(style.top * 0.8, 0.018)
+    kind = choices.pick("kind", ["legs", "pedestal", "drum", "cube", "c"], [0.45, 0.2, 0.12, 0.13, 0.1])
+    parts: list[Solid] = [top(shape, w, d, h, thick, style)]
+    if kind == "pedestal":
+        return parts + pedestal(w, d, h - thick, style)
+    if kind == "drum" and shape == "round":
+        waist = 0.3 + 0.16 * style.taper
+        lower = Turned(low=(w * 0.42, d * 0.42), high=(w * waist, d * waist), height=h / 2, material="accent")
+        upper = Turned(
+            centre=np.array([0, h / 2, 0]),
+            low=(w * waist, d * waist),
+            high=(w * 0.45, d * 0.45),
+            height=h / 2 - thick,
+            material="accent",
+        )
+        return [*parts, *of_role("leg", [lower, upper])]
+    if kind == "cube" and shape != "round":
+        t = 0.02
+        return [
+            top("square", w, d, h, thick, style),
+            box((-w / 2, 0, -d / 2), (-w / 2 + t, h - thick, d / 2), role="side"),
+            box((w / 2 - t, 0, -d / 2), (w / 2, h - thick, d / 2), role="side"),
+            box((-w / 2, 0, -d / 2), (w / 2, t * 1.5, d / 2), role="bottom"),
+            box((-w / 2, h * 0.5, -d / 2), (w / 2, h * 0.5 + t, d / 2), role="shelf"),
+            box((-w / 2, 0, -d / 2), (w / 2, h - thick, -d / 2 + t), role="back"),
+        ]
+    if kind == "c" and shape != "round":
+        t = 0.014
+        bars = [
+            box((-w / 2 * 0.9, 0, s * d * 0.4 - t), (w / 2 * 0.9, 2 * t, s * d * 0.4 + t), "metal") for s in (-1, 1)
+        ]
+        posts = [
+            box((-w / 2 * 0.9 - t, 0, s * d * 0.4 - t), (-w / 2 * 0.9 + t, h, s * d * 0.4 + t), "metal")
+            for s in (-1, 1)
+        ]
+        return [top("square", w, d, h, thick, style), *of_role("leg", [*bars, *posts])]
+    legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
+    inner = within(shape, style)
+    leg = _leg(style, w * 0.6, h) * 0.8
+    parts += base(style, w * inner, d * inner, h - thick, leg, legs)
+    if choices.chance("extra", 0.4):
+        parts.append(between_legs(shape, w * inner, d * inner, h - thick, h * 0.35, thick, leg, style, legs))
+    return parts
+
+
+def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Always round: three or four legs, a pedestal or a drum, sometimes a tray rim."""
+    w, h, d = size
+    thick = max(style.top * 0.8, 0.018)
+    parts: list[Solid] = [top("round", w, d, h, thick, style)]
+    kind = choices.pick("kind", ["legs", "pedestal", "drum"], [0.5, 0.3, 0.2])
+    if kind == "pedestal":
+        return parts + pedestal(w, d, h - thick, style)
+    if kind == "drum":
+        return [
+            *parts,
+            Turned(
+                low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent", role="leg"
+            ),
+        ]
+    legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
+    inner = 0.8 if legs == "splayed" else within("round", style)
+    parts += base(style, w * inner, d * inner, h - thick, 0.035 * style.bulk, legs)
+    if choices.chance("extra", 0.5):
+        leg = 0.035 * style.bulk
+        parts.append(between_legs("round", w * inner, d * inner, h - thick, h * 0.4, thick, leg, style, legs))
+    return parts
+
+
+def corner_side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Fits a corner: a cabinet-like cube with a drawer and a shelf, or square legs with two tops."""
+    w, h, d = size
+    t = max(style.top * 0.8, 0.018)
+    shape = "corners" if style.corner > 0.5 else "square"
+    parts: list[Solid] = [top(shape, w, d, h, t, style)]
+    legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
+    share = within(shape, style)
+    parts += base(style, w * share, d * share, h - t, 0.035 * style.bulk, legs)
+    parts += of_role("shelf", [top("square", w * share * 0.95, d * share * 0.95, h * 0.28, t, style, "accent")])
+    if choices.chance("extra", 0.6):
+        edge, rear = w * share * 0.47, d * share * 0.47
+        drawer = (-edge, h * 0.68), (edge, h - t)
+        parts += case((*drawer[0], -rear), (*drawer[1], rear))
+        parts += front(*drawer, rear, 1, 1, "drawer", style, 1.9 * rear)
+    return parts
+
+
+def console_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """Narrow against a wall: legs with or without drawers below the top, perhaps a shelf near the floor."""
+    w, h, d = size
+    t = max(style.top, 0.02)
+    shape = "corners" if style.corner > 0.7 else "square"
+    parts: list[Solid] = [top(shape, w, d, h, t, style)]
+    w, d = w * within(shape, style), d * within(shape, style)
+    legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
+    parts += base(style, w * 0.96, d * 0.92, h - t, _leg(style, w * 0.5, h) * 0.85, legs)
+    if choices.chance("front", 0.55):
+        low, high = (-w * 0.46, h - t - 0.14), (w * 0.46, h - t)
+        parts += case((*low, -d * 0.42), (*high, d * 0.42))
+        parts += front(low, high, d * 0.42, 1, choices.whole("columns", 1, 4), "drawer", style, d * 0.8)
+    if choices.chance("extra", 0.5):
+        parts.append(box((-w * 0.46, h * 0.18, -d * 0.42), (w * 0.46, h * 0.18 + t, d * 0.42), "accent", 0.0, "shelf"))
+    return parts
+
+
+def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A writing top at 0.75 m on legs or side panels, with drawers at one side or both; tall ones carry a hutch."""
+    w, h, d = size
+    hutch = h > 1.05
+    desk_height = 0.75 if hutch else h
+    t = max(style.top, 0.022)
+    shape = "square" if hutch or style.corner < 0.6 else "corners"
+    parts: list[Solid] = [top(shape, w, d, desk_height, t, style)]
+    if shape == "corners":
+        w, d = w * within(shape, style), d * within(shape, style)
+    kind = choices.pick("kind", ["legs", "left", "both", "shallow"], [0.25, 0.35, 0.2, 0.2])
+    unit = min(0.42, w * 0.3)
+    legs = "straight" if style.legs in ("plinth", "bun", "trestle") else style.legs
+    y1 = desk_height - t
+    if kind in ("left", "both"):
+        sides = (
+            (-1, 1) if kind == "both" and 0.96 * w - 2 * unit >= KNEES else (-1 if choices.chance("side", 0.5) else 1,)
+        )
+        for s in sides:
+            x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
+            foot = 0.1 if style.contrast > 0.5 else 0.02
+            parts += case((x0, foot, -d * 0.46), (x1, y1, d * 0.46))
+            rows = choices.whole("rows", 2, 4)
+            parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
+            parts += [
+                box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02), role="leg")
+                for x in (x0 + 0.04, x1 - 0.04)
+                for z in (-d * 0.42, d * 0.42)
+            ]
+        if len(sides) == 1:
+            x = -sides[0] * w * 0.47
+            parts += [
+                box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025), role="leg")
+                for s in (-1, 1)
+            ]
+    else:
+        parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
+        if kind == "shallow":
+            low, high = (-w * 0.42, y1 - 0.12), (w * 0.42, y1)
+            parts += case((*low, -d * 0.42), (*high, d * 0.42))
+            parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style, d * 0.8)
+    if hutch:
+        parts += _hutch(w, desk_height, h, d, choices)
+    return parts
+
+
+def _hutch(w: float, low: float, high: float, d: float, choices: Choices) -> list[Solid]:
+    """Shelves above the rear of a desk."""
+    t, z0, z1 = 0.02, -d / 2, -d / 2 + min(0.28, d * 0.45)
+    columns, rows = choices.whole("second", 1, 4), int(np.clip(round((high - low) / 0.38), 1, 6))
+    xs, ys = np.linspace(-w / 2 + t, w / 2 - t, columns + 1), np.linspace(low, high - t, rows + 1)
+    parts: list[Solid] = [box((x - t / 2, low, z0), (x + t / 2, high, z1), role="side") for x in xs]
+    parts += [box((-w / 2, y, z0), (w / 2, y + t, z1), role="shelf") for y in ys[1:]]
+    parts.append(box((-w / 2 + t, low, z0), (w / 2 - t, high, z0 + 0.012), "accent", 0.0, "back"))
+    return parts
+
+
+def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
+    """A small desk with drawers and, when tall enough, a round, oval or square mirror."""
+    w, h, d = size
+    mirror = h > 0.95
+    table = min(0.76, h * 0.6) if mirror else h
+    t = max(style.top * 0.9, 0.02)
+    shape = "corners" if style.corner > 0.5 else "square"
+    parts: list[Solid] = [top(shape, w, d, table, t, style)]
+    w, d = w * within(shape, style), d * within(shape, style)
+    legs = "tapered" if style.legs in ("plinth", "bun", "trestle") else style.legs
+    y1, low = table - t, table - t - 0.14
+    widest = 0.48 * w - KNEES / 2  # of the cupboards, which leave room for knees
+    if choices.chance("kind", 0.5) or widest < 0.15:
+        parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
+        parts += case((-w * 0.47, low, -d * 0.45), (w * 0.47, y1, d * 0.45))
+        columns = choices.whole("columns", 1, 4)
+        parts += front((-w * 0.47, low), (w * 0.47, y1), d * 0.45, 1, columns, "drawer", style, d * 0.86)
+    else:
+        unit = min(w * choices.between("share", 0.26, 0.36), widest)
+        for s in (-1, 1):
+            x0, x1 = sorted((s * w * 0.48, s * (w * 0.48 - unit)))
+            parts += case((x0, 0.06, -d * 0.45), (x1, y1, d * 0.45))
+            rows = choices.whole("rows", 2, 4)
+            parts += front((x0, 0.06), (x1, y1), d * 0.45, rows, 1, "drawer", style, d * 0.86)
+            parts.append(box((x0 + 0.02, 0, -d * 0.4), (x1 - 0.02, 0.06, d * 0.4), "accent", 0.0, "leg"))
+    if mirror:
+        parts += of_role("mirror", mirror_of(w, table, h, d, style, choices))
+    return parts

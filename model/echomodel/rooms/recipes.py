@@ -1,0 +1,312 @@
+"""Recipes: what a room of each kind holds and in which order it is furnished."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from echomodel.rooms.beds import BEDS, bed_group
+from echomodel.rooms.builder import HALF_PI, Builder, Item
+from echomodel.rooms.floor import Wall
+from echomodel.rooms.lamps import ceiling_lamps, on_top
+from echomodel.rooms.sofas import SOFAS, groups_left, sofa_group, television
+from echomodel.rooms.statistics import RoomTypeStatistics
+from echomodel.rooms.tables import VANITY_SEATS, desk_group, dining_group
+from echomodel.vocabulary import vocabulary
+
+# Classes that the statistics do not show appear in place of a similar one with this probability.
+SUBSTITUTES = {
+    "double_bed": (("single_bed", 0.06),),
+    "multi_seat_sofa": (("sofa", 0.08), ("chaise_longue_sofa", 0.03)),
+    "loveseat_sofa": (("lazy_sofa", 0.2),),
+    "lounge_chair": (("lazy_sofa", 0.06),),
+    "side_table": (("corner_side_table", 0.1), ("round_end_table", 0.12)),
+    "sideboard": (("console_table", 0.12), ("wine_cabinet", 0.1)),
+    "cabinet": (("children_cabinet", 0.12), ("wine_cabinet", 0.1)),
+    "desk": (("table", 0.12),),
+    "dining_chair": (("chinese_chair", 0.04),),
+    "stool": (("dressing_chair", 0.3),),
+}
+# Seldom seen things that the default graphs still ask for.
+EXTRAS = {"table_lamp": 0.05, "tv": 0.04, "wall_lamp": 0.03, "bench": 0.04}
+SOFA_KINDS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa")
+# Of these a room mostly holds one kind.
+EXCLUSIVE = (BEDS, SOFA_KINDS, ("pendant_lamp", "ceiling_lamp"))
+STORAGE = (
+    "wardrobe", "cabinet", "bookshelf", "sideboard", "dresser", "shelf", "console_table", "wine_cabinet",
+    "children_cabinet",
+)  # fmt: skip
+LOUNGERS = ("armchair", "lounge_chair")
+SMALL_TABLES = ("side_table", "corner_side_table", "round_end_table", "nightstand")
+BOARDS = ("dining_table", "desk", "table", "dressing_table")
+DINING_CHAIRS = ("dining_chair", "chinese_chair")
+DESK_SEATS = ("office_chair", "dining_chair", "chair", "dressing_chair", "stool")
+
+
+def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator) -> dict[str, int]:
+    """Draw how many of each category a room asks for; larger rooms ask for more."""
+    middle = math.log(statistics.area[2])
+    spread = (math.log(statistics.area[4]) - math.log(statistics.area[0])) / 3.29
+    lean = math.exp(0.45 * min(max((math.log(area) - middle) / spread, -2.0), 2.0))
+    want: dict[str, int] = {}
+    for category, (share, counts, cumulative) in statistics.presence.items():
+        if share < 0.75:
+            odds = share / (1 - share) * lean
+            share = odds / (1 + odds)
+        if rng.random() < share:
+            want[category] = counts[int(np.searchsorted(cumulative, rng.random()))]
+    for group in EXCLUSIVE:
+        held = [category for category in group if category in want]
+        keep = 0.0
+        if group[0] == "pendant_lamp":
+            keep = 0.12 if statistics.name == "bedroom" else 0.6
+        if len(held) > 1 and rng.random() >= keep:
+            weights = np.array([statistics.presence[category][0] for category in held])
+            chosen = held[int(np.searchsorted(np.cumsum(weights / weights.sum()), rng.random()))]
+            for category in held:
+                if category != chosen:
+                    del want[category]
+    for category, others in SUBSTITUTES.items():
+        for other, share in others:
+            if category in want and rng.random() < share:
+                want[other] = want.get(other, 0) + want.pop(category)
+    for category, share in EXTRAS.items():
+        if rng.random() < share:
+            want[category] = 1 + int(rng.random() < 0.4)
+    return want
+
+
+def furnish(room: Builder, name: str) -> None:
+    """Furnish an empty room of one type of the vocabulary; a type without a recipe like the one that its row names."""
+    recipes = {
+        "bedroom": _bedroom,
+        "living_room": _living_room,
+        "dining_room": _dining_room,
+        "living_dining_room": _living_dining_room,
+        "study": _study,
+    }
+    if name not in recipes:
+        name = vocabulary().room_type(name).like or "living_room"
+    recipes[name](room)
+
+
+def _bedroom(room: Builder) -> None:
+    beds = _beds(room)
+    if beds and room.take("tv_stand"):
+        television(room, beds[0])
+    _wardrobe(room, beds[0] if beds else None)
+    if room.take("dressing_table"):
+        yaw = beds[0].yaw + math.pi if beds and room.chance(0.9) else None
+        desk_group(room, "dressing_table", VANITY_SEATS, yaw=yaw)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, list(beds))
+
+
+def _beds(room: Builder) -> list[Item]:
+    """The beds, each with what belongs to it; sofas and tables of a sleeping and living room after them."""
+    beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
+    if room.wanted.get("coffee_table"):
+        _sofas(room)
+    if room.wanted.get("dining_table"):
+        _set_tables(room)
+    return beds
+
+
+def _wardrobe(room: Builder, bed: Item | None) -> None:
+    """Wardrobes along the side walls of the bed."""
+    for _ in range(room.take("wardrobe")):
+        size, style = room.size("wardrobe"), room.style()
+        if bed is None or not room.chance(0.88) or not _beside_bed(room, bed, size, style):
+            room.against_wall("wardrobe", size=size, style=style, corner=0.5, tries=16)
+
+
+def _beside_bed(room: Builder, bed: Item, size: tuple[float, float, float], style: int) -> Item | None:
+    """A wardrobe at a side wall, level with the bed or in the corner beside its head."""
+    walls = [wall for wall in room.floor.walls if abs(math.sin(wall.yaw - bed.yaw)) > 0.9 and wall.length >= size[0]]
+    for attempt in range(10):
+        if not walls:
+            return None
+        wall = walls[int(room.rng.integers(len(walls)))]
+        level = (bed.x - wall.x) * wall.dx + (bed.z - wall.z) * wall.dz
+        along = level + room.rng.normal(0.0, 0.12 + 0.06 * attempt)
+        ends = (size[0] / 2 + 0.01, wall.length - size[0] / 2 - 0.01)
+        if room.chance(0.5):
+            along = min(ends, key=lambda end: abs(end - level))
+        along = min(max(along, ends[0]), max(ends))
+        x, z = wall.point(along, size[2] / 2 + room.wall_gap("wardrobe"))
+        placed = room.put("wardrobe", size, x, z, wall.yaw, style)
+        if placed:
+            return placed
+    return None
+
+
+def _living_room(room: Builder) -> None:
+    sofa = _sofas(room)
+    if room.wanted.get("dining_table") or room.wanted.get("dining_chair", 0) > 2:
+        _set_tables(room)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, _anchors(room, sofa))
+
+
+def _dining_room(room: Builder) -> None:
+    tables = _set_tables(room, central=True)
+    _no_chairs_without(room, tables)
+    if room.wanted.get("coffee_table"):
+        _sofas(room)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, [table for table in tables if table])
+
+
+def _living_dining_room(room: Builder) -> None:
+    sofa = _sofas(room)
+    _no_chairs_without(room, _set_tables(room))
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, _anchors(room, sofa))
+
+
+def _set_tables(room: Builder, *, central: bool = False) -> list[Item | None]:
+    """The dining tables with their chairs; several chairs ask for one."""
+    if sum(room.wanted.get(chair, 0) for chair in DINING_CHAIRS) > 1:
+        room.wanted.setdefault("dining_table", 1)
+    count = room.take("dining_table")
+    return [dining_group(room, central=central, sharing=count - k) for k in range(count)]
+
+
+def _no_chairs_without(room: Builder, tables: list[Item | None]) -> None:
+    """Dining chairs stay out of a room whose table found no place."""
+    if not any(tables):
+        for chair in DINING_CHAIRS:
+            room.take(chair)
+
+
+def _study(room: Builder) -> None:
+    beds = _beds(room)
+    if not beds and not room.wanted.get("desk"):
+        room.wanted["desk"] = 1
+    if room.wanted.get("desk") and not any(room.wanted.get(seat) for seat in DESK_SEATS) and room.chance(0.5):
+        room.wanted["office_chair"] = 1
+    _desks(room)
+    _wardrobe(room, beds[0] if beds else None)
+    _rest(room)
+    ceiling_lamps(room, [item for item in room.items if item.category in (*BEDS, "desk")][:1])
+
+
+def _sofas(room: Builder) -> Item | None:
+    """The first sofa with its group; further coffee tables ask for further groups."""
+    first: Item | None = None
+    while groups_left(room) and (first is None or room.wanted.get("coffee_table")):
+        category = max(SOFAS, key=lambda name: room.wanted.get(name, 0))
+        room.wanted[category] -= 1
+        made = sofa_group(room, category)
+        if made is None:
+            break
+        first = first or made
+    if first is not None:
+        room.take("coffee_table")  # what found no place before a sofa has none
+    return first
+
+
+def _anchors(room: Builder, sofa: Item | None) -> list[Item]:
+    """What pendant lamps hang over, the most usual first."""
+    tables = [item for item in room.items if item.category == "dining_table"]
+    coffee = [item for item in room.items if item.category == "coffee_table"][:1]
+    anchors = tables + (coffee or ([sofa] if sofa else []))
+    return anchors if room.chance(0.75) else anchors[::-1]
+
+
+def _desks(room: Builder) -> None:
+    for category in ("desk", "table"):
+        for _ in range(room.take(category)):
+            desk_group(room, category, DESK_SEATS)
+    if room.take("dressing_table"):
+        desk_group(room, "dressing_table", ("dressing_chair", "stool", "chair"))
+
+
+def _rest(room: Builder) -> None:
+    """Everything still wanted: storage along the walls, plants and lamps in corners, loose seats on the floor."""
+    sofa = next((item for item in room.items if item.category in (*SOFAS, *BEDS)), None)
+    for _ in range(room.take("tv_stand")):
+        if sofa is None:
+            room.against_wall("tv_stand", corner=0.05, margin=0.2)
+        else:
+            television(room, sofa)
+    table = next((item for item in room.items if item.category == "dining_table"), None)
+    for category in STORAGE:
+        count = room.take(category)
+        if count:
+            size, style = room.size(category), room.style()
+            for k in range(count):
+                if k and room.chance(0.5):
+                    size = room.size(category)
+                near = table if category == "sideboard" and room.chance(0.7) else None
+                room.against_wall(category, size=size, style=style, corner=0.4, tries=14, near=near)
+    for category in ("plant", "floor_lamp"):
+        for _ in range(room.take(category)):
+            _by_the_wall(room, category)
+    for category in [c for c in room.wanted if c in SMALL_TABLES]:
+        for _ in range(room.take(category)):
+            if category != "nightstand" and room.chance(0.5):
+                room.against_wall(category, corner=0.3, near=sofa, gap=room.uniform(0.02, 0.4))
+    on_top(room)
+    if any(item.category in BOARDS for item in room.items):  # chairs that found no place at a table stay out
+        for category in (*DINING_CHAIRS, "chair", "office_chair", "dressing_chair"):
+            room.take(category)
+    for category in [c for c in room.wanted if c not in ("pendant_lamp", "ceiling_lamp")]:
+        count = room.take(category)
+        size, style = room.size(category), room.style()
+        for _ in range(min(count, 4)):
+            _loose(room, category, size, style)
+
+
+def _by_the_wall(room: Builder, category: str) -> None:
+    """A plant or lamp: beside the tv stand, in a corner, or along a wall."""
+    size, style = room.size(category), room.style()
+    stands = [item for item in room.items if item.category == "tv_stand"]
+    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.4, 0.25, 0.15, 0.2]) + room.askew(category)
+    sofas = [item for item in room.items if item.category in SOFAS]
+    if (stands or sofas) and category == "plant" and room.chance(0.8):
+        stand = (stands or sofas)[0] if room.chance(0.75) else (sofas or stands)[0]
+        for side in (1, -1) if room.chance(0.5) else (-1, 1):
+            lateral = side * (stand.size[0] / 2 + size[0] / 2 + room.uniform(-0.03, 0.3))
+            forward = size[2] / 2 - stand.size[2] / 2 + room.uniform(0.0, 0.15)
+            if room.beside(stand, category, size, lateral, forward, turn, style, play=0.06):
+                return
+    for _ in range(10):
+        spot = room.wall_spot(size[0], 0.7)
+        if spot is None:
+            return
+        x, z = spot[0].point(spot[1], size[2] / 2 + abs(room.rng.normal(0.02, 0.08)))
+        if room.put(category, size, x, z, spot[0].yaw + turn, style):
+            return
+
+
+def _loose(room: Builder, category: str, size: tuple[float, float, float], style: int) -> None:
+    """A loose seat: with its back to a wall, now and then turned into the room, or on open floor."""
+    group = [item for item in room.items if item.category in ("coffee_table", *SOFAS)]
+    if room.chance(0.6) or (group and category in LOUNGERS):
+        for attempt in range(8):
+            spot = room.wall_spot(size[0] + 0.1, 0.0, 0.25)
+            if spot is None:
+                break
+            if group and category in LOUNGERS and not _faces(*spot, group[0]):
+                continue
+            askew = category in LOUNGERS and not group and room.chance(0.45)
+            turn = room.pick([-1, 1], [1, 1]) * room.uniform(0.3, 0.8) if askew else 0.0
+            off = room.uniform(0.2, 0.9) if attempt < 5 else room.uniform(0.02, 0.1)  # seats stand in the room
+            x, z = spot[0].point(spot[1], size[2] / 2 + (max(off, 0.2) if askew else off))
+            if room.put(category, size, x, z, spot[0].yaw + turn, style, play=0.0):
+                return
+    if not (group and category in LOUNGERS):
+        room.somewhere(category, size=size, style=style)
+
+
+def _faces(wall: Wall, along: float, group: Item) -> bool:
+    """Whether what stands there with its back to the wall looks towards a group."""
+    x, z = wall.point(along, 0.0)
+    dx, dz = group.x - x, group.z - z
+    return math.sin(wall.yaw) * dx + math.cos(wall.yaw) * dz > 0.3 * math.hypot(dx, dz)

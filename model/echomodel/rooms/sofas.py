@@ -1,0 +1,196 @@
+"""A sofa with its coffee table, a television opposite, armchairs and side tables around."""
+
+from __future__ import annotations
+
+import math
+
+from echomodel.rooms.builder import HALF_PI, Builder, Item
+
+SOFAS = ("multi_seat_sofa", "l_shaped_sofa", "loveseat_sofa", "sofa", "chaise_longue_sofa", "lazy_sofa")
+
+
+def television(room: Builder, anchor: Item, nearest: float = 0.3, farthest: float = 9.0) -> Item | None:
+    """A tv stand at the wall that the anchor (a bed or sofa) faces, `nearest` to `farthest` metres off."""
+    size = room.size("tv_stand")
+    style = room.style()
+    x, z = anchor.x, anchor.z
+    for wall in room.floor.walls:
+        if math.cos(wall.yaw - anchor.yaw) > -0.5:
+            continue
+        nx, nz = math.sin(wall.yaw), math.cos(wall.yaw)
+        distance = (x - wall.x) * nx + (z - wall.z) * nz
+        along = (x - wall.x) * wall.dx + (z - wall.z) * wall.dz
+        fits = anchor.size[2] / 2 + size[2] + nearest <= distance <= farthest
+        if not fits or not 0.0 < along < wall.length:
+            continue
+        for attempt in range(6):
+            spread = 0.1 if attempt == 0 else 0.15 * attempt
+            place = along + room.rng.normal(0.0, spread)
+            place = min(max(place, size[0] / 2), max(wall.length - size[0] / 2, size[0] / 2))
+            px, pz = wall.point(place, size[2] / 2 + room.wall_gap("tv_stand"))
+            placed = room.put("tv_stand", size, px, pz, wall.yaw, style)
+            if placed:
+                return placed
+        size = (size[0] * 0.85, size[1], size[2])
+    return None
+
+
+def sofa_group(room: Builder, category: str) -> Item | None:
+    """A sofa, its coffee table, a television opposite, armchairs and side tables around."""
+    style = room.style()
+    size = room.size(category)
+    wants_tv = room.wanted.get("tv_stand", 0) > 0
+    sofa = None
+    sides = 0.4 if any(room.wanted.get(table) for table in ("side_table", "round_end_table", "floor_lamp")) else 0.15
+    pulled = room.chance(0.2)
+    for attempt in range(30):
+        spot = room.wall_spot(size[0], 0.3 if category == "l_shaped_sofa" else 0.02, sides if attempt < 20 else 0.0)
+        if spot is None:
+            break
+        wall, along = spot
+        spare = wall.length - size[0]
+        if spare > 2.5 and attempt < 20 and room.chance(0.6):  # towards one end of a long wall, with room for a seat
+            end = 0.3 + abs(room.rng.normal(0.0, 0.9))
+            along = size[0] / 2 + (min(end, spare) if room.chance(0.5) else max(spare - end, 0.0))
+        distance, _ = room.floor.opposite(wall, along)
+        gap = room.wall_gap(category)
+        low, high = (2.8, 4.3) if wants_tv else (2.0, 5.5)
+        if attempt < 14 and not (low < distance < high):
+            continue
+        if attempt < 22 and distance < (2.6 if wants_tv else 1.8):
+            continue
+        if wants_tv and distance > 4.8 and pulled:  # then the sofa comes towards its television
+            gap = max(min(distance - size[2] / 2 - room.uniform(2.9, 3.5), distance - 3.0), gap)
+        x, z = wall.point(along, size[2] / 2 + gap)
+        sofa = room.put(category, size, x, z, wall.yaw, style)
+        if sofa:
+            break
+    if sofa is None:
+        sofa = room.somewhere(category, size=size, style=style)
+    if sofa is None:
+        return None
+    if room.wanted.get("tv_stand") and television(room, sofa, nearest=1.0, farthest=9.0 if room.chance(0.2) else 4.4):
+        room.wanted["tv_stand"] -= 1
+    table = _coffee_table(room, sofa, style)
+    _second_sofa(room, sofa, table)
+    _seats(room, sofa, table, style)
+    _side_tables(room, sofa, style)
+    return sofa
+
+
+def groups_left(room: Builder) -> bool:
+    """Whether sofas are wanted that no group has yet."""
+    return any(room.wanted.get(category) for category in SOFAS)
+
+
+def _coffee_table(room: Builder, sofa: Item, style: int) -> Item | None:
+    count = room.wanted.get("coffee_table", 0)
+    if not count:
+        return None
+    size = room.size("coffee_table")
+    inner = 0.0
+    if sofa.category == "l_shaped_sofa":
+        # The hull of an L holds its empty inside; the table stands partly in it.
+        inner = sofa.size[2] * room.uniform(0.1, 0.4)
+    turn = room.pick([0.0, math.pi, HALF_PI, -HALF_PI], [0.6, 0.24, 0.09, 0.07])
+    depth = size[2] if abs(math.cos(turn)) > 0.5 else size[0]
+    for _ in range(8):
+        gap = min(max(0.38 + room.rng.normal(0.0, 0.06), 0.3), 0.5) - inner
+        lateral = min(max(room.rng.normal(0.0, 0.08), -0.2), 0.2)
+        if inner:
+            lateral += room.pick([-1, 1], [1, 1]) * sofa.size[0] * 0.12
+        forward = sofa.size[2] / 2 + depth / 2 + gap
+        placed = room.beside(sofa, "coffee_table", size, lateral, forward, turn, style, play=0.02,
+                             ignore=(sofa,) if inner else ())  # fmt: skip
+        if placed:
+            room.wanted["coffee_table"] -= 1
+            if count > 1 and not groups_left(room):
+                room.wanted["coffee_table"] -= 1
+                second = (size[0] * 0.75, size[1] * 0.85, size[2] * 0.75)
+                room.beside(placed, "coffee_table", second, placed.size[0] * 0.6, room.uniform(-0.3, 0.3), 0.0, style,
+                            ignore=(placed,))  # fmt: skip
+            return placed
+    return None
+
+
+def _second_sofa(room: Builder, sofa: Item, table: Item | None) -> None:
+    for category in SOFAS:
+        if not room.wanted.get(category):
+            continue
+        if room.wanted.get("coffee_table"):  # a group of its own
+            return
+        room.wanted[category] -= 1
+        size = room.size(category)
+        centre = table or sofa
+        for side in (1, -1) if room.chance(0.5) else (-1, 1):
+            lateral = side * (sofa.size[0] / 2 + size[2] / 2 + room.uniform(0.0, 0.4))
+            forward = (0.0 if table else sofa.size[2] / 2 + size[0] / 2) + room.rng.normal(0.0, 0.1)
+            if table:
+                lateral = side * (centre.hull_x + size[2] / 2 + room.uniform(0.25, 0.6))
+                dx, dz = table.x - sofa.x, table.z - sofa.z
+                forward += math.sin(sofa.yaw) * dx + math.cos(sofa.yaw) * dz
+                lateral = side * max(abs(lateral), sofa.size[0] / 2 + size[2] / 2 - 0.2)
+            if room.beside(sofa, category, size, lateral, forward, -side * HALF_PI, sofa.style):
+                break
+
+
+def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
+    """Armchairs, lounge chairs and ottomans around the coffee table, turned towards it."""
+    forward_table = sofa.size[2] / 2 + 0.8
+    reach = 0.6
+    if table:
+        dx, dz = table.x - sofa.x, table.z - sofa.z
+        forward_table = math.sin(sofa.yaw) * dx + math.cos(sofa.yaw) * dz
+        reach = (table.size[0] if abs(math.cos(table.yaw - sofa.yaw)) > 0.5 else table.size[2]) / 2
+    for category in ("armchair", "lounge_chair", "ottoman", "stool"):
+        count = room.wanted.get(category, 0)
+        if not count or not room.chance(0.85):
+            continue
+        size = room.size(category)
+        askew = room.chance({"armchair": 0.55, "lounge_chair": 0.75}.get(category, 0.0))
+        stray = category in ("ottoman", "stool")
+        chair_style = style if room.chance(0.6) else room.style()
+        side = 1 if room.chance(0.5) else -1
+        for _ in range(min(count, 4)):
+            for attempt in range(12):
+                if attempt < 9 or room.chance(0.8):
+                    lateral = side * max(
+                        reach + size[2] / 2 + room.uniform(0.2, 0.7), sofa.size[0] / 2 + room.uniform(-0.1, 0.7)
+                    )
+                    forward = forward_table + room.rng.normal(0.0, 0.3)
+                    turn = -side * HALF_PI
+                else:
+                    lateral = room.rng.normal(0.0, 0.5)
+                    forward = forward_table + reach * 0.6 + size[2] / 2 + room.uniform(0.3, 0.7)
+                    turn = math.pi
+                if askew:  # towards the middle of the group
+                    turn = math.atan2(-lateral, forward_table - forward) + room.rng.normal(0.0, 0.06)
+                if stray:
+                    turn = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [0.45, 0.28, 0.13, 0.14])
+                if room.beside(sofa, category, size, lateral, forward, turn, chair_style):
+                    room.wanted[category] -= 1
+                    side = -side
+                    break
+                if attempt in (3, 6):
+                    side = -side
+
+
+def _side_tables(room: Builder, sofa: Item, style: int) -> None:
+    """Side tables, floor lamps and plants at the sofa's ends."""
+    sides = [1, -1] if room.chance(0.5) else [-1, 1]
+    for category in ("side_table", "corner_side_table", "round_end_table", "floor_lamp"):
+        count = room.wanted.get(category, 0)
+        if not count or not room.chance(0.9):
+            continue
+        size = room.size(category)
+        for side in list(sides)[: min(count, 2)]:
+            for attempt in range(4):
+                gap = abs(room.rng.normal(0.08, 0.08)) + 0.08 * attempt
+                lateral = side * (sofa.size[0] / 2 + size[0] / 2 + gap)
+                forward = room.rng.normal(-0.02, 0.1) if attempt < 3 else -sofa.size[2] / 2 + size[2] / 2
+                turn = room.pick([0.0, -HALF_PI, HALF_PI, math.pi], [0.42, 0.25, 0.19, 0.14])
+                turn += room.askew(category)
+                if room.beside(sofa, category, size, lateral, forward, turn, style):
+                    room.wanted[category] -= 1
+                    break
+        sides.reverse()

@@ -1,0 +1,265 @@
+import sys
+import time
+from itertools import combinations
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Gf, Sdf, Usd, UsdGeom
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echousd.draw.drawables import read_drawables
+from echousd.draw.rendering import render, render_stage, render_turn
+from echousd.draw.scenery import class_color, read_scenery
+from echousd.draw.tracing import BACKGROUND, outside, smooth_light
+from echousd.options import RoomOptions
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+def pixels(picture):
+    return np.asarray(picture, float) / 255
+
+
+def cube_stage(up="Y", unit=1.0, size=1.0):
+    """A red-free cube of 1 m at (1, 0.5, 0), as a mesh."""
+    import trimesh
+
+    box = trimesh.creation.box((size / unit,) * 3)
+    points = box.vertices if up == "Y" else np.stack([box.vertices[:, 0], -box.vertices[:, 2], box.vertices[:, 1]], 1)
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, unit)
+    mesh = UsdGeom.Mesh.Define(stage, "/Cube")
+    mesh.CreatePointsAttr(points.astype(np.float32))
+    mesh.CreateFaceVertexCountsAttr([3] * 12)
+    mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
+    offset = (1 / unit, 0.5 / unit, 0) if up == "Y" else (1 / unit, 0, 0.5 / unit)
+    mesh.AddTranslateOp().Set(Gf.Vec3d(*offset))
+    return stage
+
+
+@pytest.mark.parametrize(("up", "unit"), [("Y", 1.0), ("Z", 1.0), ("Y", 0.01), ("Z", 0.01)])
+def test_up_axis_and_units_are_taken_care_of(up, unit):
+    scenery = read_scenery(cube_stage(up, unit))
+    np.testing.assert_allclose(scenery.bounds, [[0.5, 0, -0.5], [1.5, 1, 0.5]], atol=1e-5)
+    outward = (scenery.triangles.mean(1) - [1, 0.5, 0]) * scenery.normals.mean(1)
+    assert (outward.sum(1) > 0).all()
+
+
+def test_top_view_shows_things_where_they_are(root):
+    image = pixels(render(root, view="top", size=96, colors="class"))
+    assert image.shape == (96, 96, 3)
+    metre = 96 / (4.0 * 1.06)  # the floor is 4 m wide and fills the picture
+    hue = image - image.mean(-1, keepdims=True)
+
+    def at(x, z):
+        return hue[int(48 + z * metre), int(48 + x * metre)]
+
+    bed, wardrobe, floor = at(0, -0.9), at(-1.6, 0.9), at(1.4, 0.9)
+    for found, category in ((bed, "double_bed"), (wardrobe, "wardrobe")):
+        wanted = np.array(class_color(category)) ** (1 / 2.2)
+        wanted = wanted - wanted.mean()
+        assert found @ wanted / (np.linalg.norm(found) * np.linalg.norm(wanted)) > 0.95, category
+    assert np.abs(floor).max() < 0.08
+    np.testing.assert_allclose(image[1, 1], [0.90, 0.905, 0.915], atol=0.06)  # nothing but background in the corner
+
+
+def test_same_stage_gives_same_picture_and_materials_differ_from_classes(root):
+    first, second = (pixels(render(root, size=48)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    assert np.abs(first - pixels(render(root, size=48, colors="class"))).max() > 0.1
+
+
+def test_a_thing_throws_a_shadow_and_nothing_is_blown_out(root):
+    image = pixels(render(root, view="top", size=96))
+    metre = 96 / (4.0 * 1.06)
+    shadow, lit = (
+        image[int(48 - 0.2 * metre), int(48 - 1.7 * metre)],
+        image[int(48 + 1.3 * metre), int(48 + 0.8 * metre)],
+    )
+    assert shadow.mean() < 0.85 * lit.mean()
+    assert (image >= 0.999).mean() < 0.01
+
+
+def test_hidden_things_and_colliders_are_not_drawn(root):
+    stage = Usd.Stage.Open(str(root))
+    names = {mesh.component for mesh in read_drawables(stage)}
+    assert names == {"bed", "nightstand_left", "nightstand_right", "lamp", "wardrobe", "pendant", "Floor"}
+    stage.SetEditTarget(stage.GetSessionLayer())
+    UsdGeom.Imageable(stage.GetPrimAtPath("/Room/Objects/bed")).MakeInvisible()
+    assert "bed" not in {mesh.component for mesh in read_drawables(stage)}
+
+
+def test_instances_are_drawn():
+    stage = cube_stage()
+    copies = Usd.Stage.CreateInMemory()
+    for number in range(3):
+        prim = UsdGeom.Xform.Define(copies, f"/Copies/Copy{number}").GetPrim()
+        UsdGeom.Xformable(prim).AddTranslateOp().Set(Gf.Vec3d(10 * number, 0, 0))
+        inside = copies.DefinePrim(f"/Copies/Copy{number}/Inside")
+        inside.GetReferences().AddReference(stage.GetRootLayer().identifier, "/Furniture")
+        inside.SetInstanceable(True)
+    Sdf.CreatePrimInLayer(stage.GetRootLayer(), "/Furniture")
+    stage.GetRootLayer().GetPrimAtPath("/Furniture").specifier = Sdf.SpecifierDef
+    Sdf.CopySpec(stage.GetRootLayer(), "/Cube", stage.GetRootLayer(), "/Furniture/Cube")
+    found = [mesh.world[0, 3] for mesh in read_drawables(copies)]
+    UsdGeom.SetStageMetersPerUnit(copies, 1.0)
+    assert [mesh.world[0, 3] for mesh in read_drawables(copies)] == [1.0, 11.0, 21.0]
+    assert found == pytest.approx([0.01, 0.11, 0.21])  # USD's default unit is the centimetre
+
+
+def test_light_is_smoothed_within_a_plane_only():
+    rng = np.random.default_rng(0)
+    light = 1 + 0.3 * rng.normal(size=(20, 20, 3)).astype(np.float32)
+    normal = np.zeros((20, 20, 3), np.float32)
+    normal[:, :10, 1], normal[:, 10:, 0] = 1, 1
+    light[:, 10:] += 5
+    point = np.zeros((20, 20, 3), np.float32)
+    smooth = smooth_light(light, normal, point)
+    assert smooth[:, :10].std() < 0.4 * light[:, :10].std()
+    assert abs(smooth[:, :10].mean() - 1) < 0.1
+    assert abs(smooth[:, 10:].mean() - 6) < 0.1
+
+
+def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
+    data = echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True, dress="none")
+    )
+    scenery = read_scenery(Usd.Stage.Open(str(data.save(tmp_path / "bedroom", preview=False))))
+    windows = [opening for opening in data.graph.room.openings if opening.kind == "window"]
+    assert len(scenery.panes) == len(windows) > 0
+    middle, side, rise = scenery.panes[0].astype(float)
+    np.testing.assert_allclose(2 * np.linalg.norm(side), windows[0].width, atol=0.07)
+    np.testing.assert_allclose(2 * np.linalg.norm(rise), windows[0].height, atol=0.07)
+    eye = np.array([0.0, 1.4, 0.0])
+    aims = np.array([middle + 0.9 * rise, middle - 0.9 * rise, middle + 1.5 * side, 2 * eye - middle])
+    sky, field, beside, behind = outside(scenery.panes[:1], np.tile(eye, (4, 1)), aims - eye)
+    assert sky[2] > sky[1] > sky[0]
+    assert field[1] > field[2]
+    np.testing.assert_array_equal([beside, behind], [BACKGROUND] * 2)
+    outwards = middle + 5 * (middle - eye) * (1, 0, 1)
+    assert len(scenery.without_near_walls(outwards).panes) < len(scenery.panes)
+
+
+def test_a_small_picture_is_quick(root):
+    stage = Usd.Stage.Open(str(root))
+    render_stage(stage, size=16)
+    started = time.process_time()
+    render_stage(stage, size=256)
+    assert time.process_time() - started < 3.0  # 0.7 s on an idle core
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"view": "side"}, "view is 'side', allowed: top, perspective, eye"),
+        ({"colors": "pink"}, "colors is 'pink', allowed: materials, class"),
+        ({"size": 5}, "size is 5 pixels, allowed: 16 to 4096"),
+    ],
+)
+def test_bad_arguments_are_named(root, arguments, text):
+    with pytest.raises(ValueError, match=text):
+        render(root, **arguments)
+
+
+def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
+    with pytest.raises(ValueError, match="nothing to draw, found no visible mesh"):
+        render_stage(Usd.Stage.CreateInMemory())
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    with pytest.raises(ValueError, match=r'pip install "echousd\[render\]"'):
+        render(root, size=16)
+
+
+def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
+    options = RoomOptions(walls=True, dress="none")
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    scenery = read_scenery(stage)
+    assert scenery.wall.max() == 3
+    outside = scenery.without_near_walls(np.array([9.0, 3.0, 8.0]))
+    assert len(set(outside.wall[outside.wall >= 0])) == 2
+    centre = outside.triangles[outside.wall >= 0].reshape(-1, 3).mean(0)
+    assert centre[0] < 0
+    assert centre[2] < 0
+    image = pixels(render_stage(stage, size=64, colors="class"))
+    colourful = np.abs(image - image.mean(-1, keepdims=True)).max(-1) > 0.08
+    assert colourful.mean() > 0.05  # the furniture is in sight
+    inside = (
+        UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0).transform.ExtractTranslation()
+    )
+    assert abs(inside[0]) < 2.0
+    assert abs(inside[2]) < 1.7
+    assert 0.5 < inside[1] < 2.8
+
+
+@pytest.mark.parametrize(("up", "unit"), [("Y", 1.0), ("Z", 0.01)])
+def test_every_camera_draws_what_it_sees(up, unit):
+    stage = cube_stage(up, unit)
+    for name, across in (("a_at_it", 1.0), ("b_away", 40.0)):  # metres along x; each looks straight down, 2 m wide
+        camera = UsdGeom.Camera.Define(stage, f"/{name}")
+        camera.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+        camera.CreateHorizontalApertureAttr(20.0 / unit)
+        place = (across / unit, 5 / unit, 0) if up == "Y" else (across / unit, 0, 5 / unit)
+        camera.AddTranslateOp().Set(Gf.Vec3d(*place))
+        camera.AddRotateXOp().Set(-90.0 if up == "Y" else 0.0)
+    picture = pixels(render_stage(stage, view="every-camera", size=32, rays=1))
+    assert picture.shape == (32, 64, 3)
+    assert np.ptp(picture[:, 32:], axis=(0, 1)).max() < 0.02  # background alone
+    seen = np.abs(picture[:, :32] - picture[0, 40]).max(-1) > 1e-3  # grey in the sun on grey
+    assert 0.2 < seen.mean() < 0.3  # a quarter of the picture
+    assert seen[12:20, 12:20].all()
+
+
+def test_every_camera_needs_one():
+    with pytest.raises(ValueError, match="no camera, which --cameras and the view every-camera need"):
+        render_stage(cube_stage(), view="every-camera", size=32)
+
+
+def test_a_sheet_shows_six_views(root):
+    sheet = pixels(render(root, view="sheet", size=48, rays=1))
+    assert sheet.shape == (96, 144, 3)
+    for number, view in enumerate(("perspective", "eye", "top")):
+        alone = pixels(render(root, view=view, size=48, rays=1))
+        np.testing.assert_array_equal(sheet[:48, 48 * number : 48 * number + 48], alone)
+    cells = [sheet[48:, 48 * number : 48 * number + 48] for number in range(3)]
+    assert min(np.abs(a - b).mean() for a, b in combinations([sheet[:48, :48], *cells], 2)) > 0.01
+
+
+def test_a_turn_goes_all_around(root):
+    pictures = [pixels(picture) for picture in render_turn(root, frames=8, size=48, rays=1)]
+    assert len(pictures) == 8
+    assert min(np.abs(a - b).mean() for a, b in combinations(pictures, 2)) > 0.005
+    assert all(np.ptp(picture[0], axis=0).max() < 0.05 for picture in pictures)  # nothing reaches the upper border
+    with pytest.raises(ValueError, match="frames is 1, allowed: 2 to 360"):
+        render_turn(root, frames=1)
+
+
+def test_command_draws_turns_and_counts_samples(root, tmp_path, echousd_command):
+    path = tmp_path / "turn.gif"
+    done = echousd_command(
+        "render", root, "-o", path, "--view", "turntable", "--frames", 3, "--size", 32, "--samples", 1
+    )
+    assert done.code == 0, done.err
+    with Image.open(path) as moving:
+        assert (moving.format, moving.n_frames, moving.size) == ("GIF", 3, (32, 32))
+    assert (
+        echousd_command("render", root, "-o", path, "--view", "turntable", "--frames", 2, "--size", 32).code == 0
+    )  # ours
+    for words, told in (
+        (("-o", tmp_path / "turn.png", "--view", "turntable"), "a turntable is written as .gif, found '.png'"),
+        (
+            ("-o", tmp_path / "one.png", "--view", "side"),
+            "--view is 'side', allowed: top, perspective, eye, every-camera, sheet, turntable",
+        ),
+        (("-o", tmp_path / "one.gif"), "pictures are written as .png, found '.gif'"),
+        (("-o", tmp_path / "one.png", "--samples", 8), "--samples is 8, allowed: a square number, such as 4 or 9"),
+    ):
+        done = echousd_command("render", root, *words)
+        assert (done.code, told in done.err) == (2, True), done.err
+    assert [one.name for one in tmp_path.iterdir()] == ["turn.gif"]

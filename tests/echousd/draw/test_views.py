@@ -1,0 +1,101 @@
+"""Where a camera inside a room stands: it sees far, and nothing that hangs at a wall fills its picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from echousd.draw.sight import Furniture
+from echousd.draw.views import APERTURE, LENSES, bare_share, inside_view, view_matrix
+
+FLOOR = np.array([(0.0, 0.0), (0.0, 4.0), (5.0, 4.0), (5.0, 0.0)])
+
+
+def boxes(*rows: tuple[float, ...]) -> Furniture:
+    found = np.array(rows, float).reshape(-1, 7)
+    return Furniture(found[:, :3], found[:, 3:6], found[:, 6])
+
+
+BED = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 1.2, 0.0))
+
+
+def test_the_camera_stays_away_from_curtains() -> None:
+    free, _ = inside_view(FLOOR, BED, 2.8)
+    corner = free[[0, 2], 3]
+    spot = corner - 0.7 * free[[0, 2], 2] / np.linalg.norm(free[[0, 2], 2])  # on the way that it looks
+    curtain = boxes((0.4, 2.2, 0.09, spot[0], 0.0, spot[1], 0.0))
+    other, _ = inside_view(FLOOR, BED, 2.8, curtain)
+    assert np.linalg.norm(other[[0, 2], 3] - corner) > 1.0
+    far = corner - 2.6 * free[[0, 2], 2] / np.linalg.norm(free[[0, 2], 2])
+    assert np.allclose(inside_view(FLOOR, BED, 2.8, boxes((0.5, 0.5, 0.1, far[0], 1.5, far[1], 0.0)))[0], free)
+
+
+def test_the_camera_turns_away_from_what_its_picture_would_cut_off() -> None:
+    free, lens = inside_view(FLOOR, BED, 2.8)
+    eye, half = free[:3, 3], APERTURE / 2 / lens
+    edge = eye - 1.3 * free[:3, 2] + 1.1 * free[:3, 0]  # at the right border of its picture
+    plant = boxes((0.4, 1.3, 0.4, edge[0], 0.0, edge[2], 0.0))
+    other, lens = inside_view(FLOOR, BED, 2.8, plant)
+    assert plant.filled(other, APERTURE / 2 / lens, 2.0) < 0.25 * plant.filled(free, half, 2.0)
+
+
+def test_the_camera_looks_down_a_little_in_the_smallest_room() -> None:
+    floor = np.array([(0.0, 0.0), (0.0, 2.2), (2.2, 2.2), (2.2, 0.0)])
+    view, _ = inside_view(floor, boxes((1.0, 0.75, 0.5, 1.1, 0.0, 0.3, 0.0)), 2.8)
+    assert -0.37 < -view[1, 2] / np.linalg.norm(view[[0, 2], 2]) < 0.0
+
+
+def test_the_camera_comes_nearer_where_the_room_is_large() -> None:
+    floor = np.array([(0.0, 0.0), (0.0, 9.0), (10.0, 9.0), (10.0, 0.0)])
+    group = boxes((2.2, 0.8, 0.9, 5.0, 0.0, 4.0, 0.0), (1.1, 0.4, 0.6, 5.0, 0.0, 5.2, 0.0))
+    eye = inside_view(floor, group, 2.8)[0][[0, 2], 3]
+    assert 2.0 < np.linalg.norm(eye - (5.0, 4.4)) < 5.5
+
+
+NOTCHED = np.array([(0.0, 0.0), (0.0, 4.6), (2.8, 4.6), (2.8, 2.6), (5.2, 2.6), (5.2, 0.0)])
+
+
+@pytest.mark.parametrize("floor", [FLOOR, NOTCHED, NOTCHED[:, ::-1]], ids=["rectangle", "L", "other L"])
+@pytest.mark.parametrize("size", [(1.8, 1.0, 2.1), (2.4, 0.85, 0.95), (1.6, 0.75, 0.9)], ids=["bed", "sofa", "table"])
+@pytest.mark.parametrize("at", [(1.3, 1.2), (1.4, 3.2), (3.8, 1.3)])
+def test_the_main_piece_is_whole_in_the_picture_and_the_eye_in_the_room(floor, size, at):
+    room = shapely.Polygon(floor)
+    if not room.contains(shapely.box(at[0] - 1.2, at[1] - 1.1, at[0] + 1.2, at[1] + 1.1).buffer(-0.1)):
+        at = (at[1], at[0])
+    piece = boxes((*size, at[0], 0.0, at[1], 0.0), (0.5, 1.9, 0.4, 0.3, 0.0, 0.3, 0.0))
+    view, lens = inside_view(floor, piece, 2.6, main=0)
+    assert 24.0 <= lens <= 35.0
+    assert lens in LENSES
+    assert room.contains(shapely.Point(view[0, 3], view[2, 3]))
+    x, y, z = ((piece.corners[0] - view[:3, 3]) @ view[:3, :3]).T
+    assert (z < 0).all()
+    assert np.maximum(np.abs(x), np.abs(y)).max() < (-z * APERTURE / 2 / lens).max()
+    assert (np.maximum(np.abs(x), np.abs(y)) < -z * APERTURE / 2 / lens).all()
+
+
+def test_a_wall_is_bare_where_nothing_is_at_it():
+    view = view_matrix(np.array([2.5, 1.4, 0.5]), np.array([2.5, 1.4, 4.0]))
+    half = APERTURE / 2 / LENSES[0]
+    bare = bare_share(FLOOR, 2.8, [], view, half)
+    picture = boxes((3.5, 1.6, 0.05, 2.5, 0.6, 3.97, 0.0))
+    assert 0.4 < bare < 0.8
+    assert bare_share(FLOOR, 2.8, [picture], view, half) < bare - 0.1
+
+
+def test_the_camera_shows_no_bare_wall_where_it_need_not():
+    walls = boxes(*((2.4, 1.6, 0.05, x, 0.6, 3.96, 0.0) for x in (1.3, 3.7)))  # pictures at one long wall
+    bed = boxes((1.8, 0.6, 2.0, 2.5, 0.0, 2.8, 0.0))
+    view, lens = inside_view(FLOOR, bed, 2.8, walls)
+    assert bare_share(FLOOR, 2.8, [bed, walls], view, APERTURE / 2 / lens) < 1 / 3
+
+
+def test_only_what_is_near_and_in_the_picture_fills_it() -> None:
+    view = view_matrix(np.array([0.0, 1.5, 0.0]), np.array([1.0, 1.5, 0.0]))
+    ahead, behind, beside, far = (
+        boxes((0.3, 2.0, 0.3, x, 0.0, z, 0.0)) for x, z in ((0.8, 0.0), (-0.8, 0.0), (0.3, 0.9), (3.0, 0.0))
+    )
+    assert ahead.nearness(view[:3, 3], 1.0)[0] == behind.nearness(view[:3, 3], 1.0)[0] == pytest.approx(0.35)
+    assert ahead.filled(view, 1.0, 1.0) > 0.05
+    assert behind.filled(view, 1.0, 1.0) == far.filled(view, 1.0, 1.0) == 0
+    assert beside.filled(view, 0.5, 1.0) == 0  # a narrow picture does not reach so far

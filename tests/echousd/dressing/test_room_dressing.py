@@ -1,0 +1,321 @@
+"""Small things: where they stand, that they stay out of the way, and that the room is the same without them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+from pxr import Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdValidation
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echomodel.dressing import KINDS, SMALL
+from echomodel.openings import Opening
+from echousd.checks import check
+from echousd.dressing import upholstery
+from echousd.dressing.dress import RULES, dress, placed, setting_of
+from echousd.dressing.setting import Setting, Thing, meets, standing
+from echousd.dressing.surfaces import surfaces
+from echousd.dressing.upholstery import STEP, _Seat
+from echousd.dressing.walls import curtains
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.layers.compose import room_files
+from echousd.options import RoomOptions
+from echousd.shapes.geometry import Collider, Geometry, Origin, Part
+from echousd.shapes.sources.boxes import ORIGIN
+from echousd.shapes.sources.solid import solid_geometry
+from echousd.shapes.walls import walls
+from echousd.stage import read_graph
+
+
+@pytest.fixture(scope="module")
+def bare():
+    return echousd.generate(
+        "samples/living_room.usda", seed=1, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+    )
+
+
+@pytest.fixture(scope="module")
+def room(bare):
+    return replace(bare, options=RoomOptions(walls=True, dress="full"))
+
+
+@pytest.fixture(scope="module")
+def root(room, tmp_path_factory):
+    return room.save(tmp_path_factory.mktemp("rooms") / "living_room", preview=False)
+
+
+def test_nothing_else_changes(bare, room):
+    plain, dressed = room_files(bare), room_files(room)
+    small = {path for path in dressed if path not in plain}
+    assert small
+    assert all(path == "layers/dressing.usda" or path.startswith(("assets/small_", "textures/")) for path in small)
+    touched = {path for path in plain if dressed[path] != plain[path]}
+    assert touched <= {"living_room.usda", "layers/materials.usda"}
+
+
+def test_same_room_same_things(room):
+    assert room_files(room) == room_files(room)
+    assert not dress(replace(room, options=RoomOptions(walls=False, dress="none"))).layouts
+
+
+def test_muted_the_room_is_bare(root, room):
+    stage = Usd.Stage.Open(str(root))
+    assert stage.GetPrimAtPath("/Room/Dressing").GetChildren()
+    assert read_graph(stage) == room.graph
+    stage.MuteLayer(str(root.parent / "layers/dressing.usda"))
+    assert not stage.GetPrimAtPath("/Room/Dressing")
+    assert read_graph(stage) == room.graph
+
+
+def test_every_thing_is_a_proper_prim(root):
+    stage = Usd.Stage.Open(str(root))
+    assert stage.GetCompositionErrors() == []
+    words = {kind.name: kind for kind in KINDS.values()}
+    for prim in stage.GetPrimAtPath("/Room/Dressing").GetChildren():
+        assert Usd.ModelAPI(prim).GetKind() == "component", prim
+        word = UsdSemantics.LabelsAPI(prim, "category").GetLabelsAttr().Get()[0]
+        assert UsdSemantics.LabelsAPI(prim, "ade20k").GetLabelsAttr().Get()[0] == words[word].ade20k
+        if not words[word].fixed:
+            assert prim.HasAPI(UsdPhysics.RigidBodyAPI)
+            assert UsdPhysics.MassAPI(prim).GetMassAttr().Get() > 0
+            assert any(below.HasAPI(UsdPhysics.CollisionAPI) for below in Usd.PrimRange(prim))
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    assert [error.GetMessage() for error in errors] == []
+    assert check(root).ok
+
+
+def test_things_stay_in_the_room_and_out_of_each_other(room):
+    setting = setting_of(room)
+    things = placed(room)
+    upright = [t for t in things if not KINDS[t.kind].lies]
+    assert len(things) >= 30
+    for number, one in enumerate(upright):
+        assert setting.room.buffer(0.02).contains(one.footprint), one
+        for other in upright[number + 1 :]:
+            apart = min(one.position[1] + one.size[1], other.position[1] + other.size[1]) <= max(
+                one.position[1], other.position[1]
+            )
+            assert apart or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
+
+
+def test_a_window_without_room_for_curtains_has_a_blind_and_no_rail():
+    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
+    setting = Setting({}, floor, (window,), 2.7, True, False, 0)
+    setting.placed = [Thing("floor_vase", np.array([3.4, 2.4, 0.35]), np.array([0.0, 0.0, -1.8]), 0.0)]
+    curtains(setting)
+    (blind,) = setting.placed[1:]
+    assert blind.kind == "blind"
+    assert not setting.curtained
+    assert -2.02 < blind.footprint.bounds[1] < blind.footprint.bounds[3] < -2.0  # between the jambs, not in the room
+    assert blind.footprint.bounds[0] > -0.9
+    assert blind.position[1] + blind.size[1] < 2.2
+    for bare, rails in ((frozenset(), 1), (frozenset({"window"}), 0)):
+        pieces = [piece.name for part in walls(floor, 2.7, (window,), bare)[0].inner for piece in part.pieces]
+        assert len(pieces) == 3 + rails
+        assert sum(name.endswith("rail") for name in pieces) == rails
+
+
+def test_nothing_stands_over_an_edge_or_in_the_air(room):
+    setting = setting_of(room)
+    for rule in RULES:
+        rule(setting)
+    objects = {**setting.objects, **setting.carriers}
+    standing = [t for t in placed(room) if not KINDS[t.kind].fixed and t.on and t.kind != "cushion"]
+    assert standing
+    for thing in standing:
+        host = objects[thing.on]
+        assert host.footprint.contains(thing.footprint), thing
+        assert thing.position[1] == pytest.approx(host.top, abs=1e-6)  # boxes have one level
+
+
+@pytest.mark.parametrize(("name", "least"), [("living_room", 40), ("bedroom", 25)])
+def test_full_rooms_are_full_and_clean(name, least, tmp_path):
+    room = echousd.generate(f"samples/{name}.usda", seed=1, options=RoomOptions(walls=True, dress="full"))
+    things = placed(room)
+    assert len(things) >= least
+    assert len({thing.kind for thing in things}) >= 15
+    assert len(dress(room).geometry) < 50  # single books share their assets
+    setting = setting_of(room)
+    upright = [t for t in things if not KINDS[t.kind].lies and t.kind not in ("cushion", "folded_throw")]
+    for number, one in enumerate(upright):
+        assert setting.room.buffer(0.02).contains(one.footprint), one
+        low, high = one.position[1] + 2e-3, one.position[1] + one.size[1]
+        for other in upright[number + 1 :]:
+            over = min(high, other.position[1] + other.size[1]) - max(low, other.position[1])
+            assert over <= 0 or one.footprint.intersection(other.footprint).area < 1e-6, (one, other)
+        for host in setting.objects.values():
+            if one.on != host.name and one.kind not in ("curtain",):
+                within = host.top > low and host.position[1] < high
+                assert not within or not meets(host, low, high, one.footprint.buffer(-5e-3)), (one, host.name)
+    assert check(room.save(tmp_path / name, preview=False)).ok
+
+
+def test_kinds_of_one_category_agree():
+    for kind in KINDS.values():
+        same = SMALL[kind.name]
+        assert (kind.ade20k, kind.fixed, kind.lies) == (same.ade20k, same.fixed, same.lies), kind
+
+
+def test_doors_stay_free(room):
+    setting = setting_of(room)
+    for thing in placed(room):
+        if thing.kind != "curtain":
+            assert not any(way.intersects(thing.footprint) and thing.position[1] < o.height for way, o in setting.ways)
+
+
+def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
+    from echomodel.furniture import Choices, Style, solids
+    from echousd.dressing.setting import standing
+    from echousd.shapes.geometry import Origin
+    from echousd.shapes.joinery import assembled
+
+    size = np.array([1.0, 1.9, 0.35])
+    rng = np.random.default_rng(5)
+    parts = solids("bookshelf", Style.draw(rng), Choices.draw(rng), size)
+    host = standing(
+        "shelf", "bookshelf", size, np.zeros(3), 0.0, assembled(parts, size, faces=5000, origin=Origin("x"))
+    )
+    levels = surfaces(host)
+    assert len(levels) >= 3
+    for level in levels:
+        assert level.air >= 0.06
+        assert shapely.box(-0.51, -0.18, 0.51, 0.18).contains(level.area)
+
+
+def test_layouts_have_dressings_of_their_own(tmp_path):
+    graph = small_graph()
+    room = echousd.generate(
+        graph, seed=3, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(dress="some", walls=False)
+    )
+    moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
+    room = replace(room, layouts=(room.boxes, moved))
+    root = room.save(tmp_path / "two", preview=False)
+    stage = Usd.Stage.Open(str(root))
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    places = []
+    for name in ("layout_0", "layout_1"):
+        variants.SetVariantSelection(name)
+        things = stage.GetPrimAtPath("/Room/Dressing").GetChildren()
+        cache = UsdGeom.XformCache()
+        places.append([tuple(cache.GetLocalToWorldTransform(p).ExtractTranslation()) for p in things])
+    assert places[0] != places[1]
+
+
+def test_unknown_amount():
+    with pytest.raises(ValueError, match="dress is 'lots', allowed: none, some or full"):
+        RoomOptions(dress="lots", walls=False)
+
+
+def large_room(**options):
+    """A large square room with little in it, and a window in one wall."""
+    window = Opening("window", "window", 0, 2.2, 1.4, 1.3, 0.9)
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(6.4, 6.0), openings=(window,)))
+    made = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
+    return replace(made, options=RoomOptions(walls=True, dress="some", **options))
+
+
+def test_long_bare_walls_get_pictures_and_large_floors_plants():
+    room = large_room()
+    setting = setting_of(room)
+    things = placed(room)
+    alone = [thing for thing in things if thing.kind == "picture" and not thing.on]
+    yaws = {round(thing.yaw, 3) for thing in alone}
+    assert 1 <= len(yaws) <= 2  # the two barest walls
+    for yaw in yaws:
+        row = [thing for thing in alone if round(thing.yaw, 3) == yaw]
+        assert len(row) in (1, 3)
+        assert len({thing.size.tobytes() for thing in row}) == 1
+        assert all(1.4 < thing.position[1] + thing.size[1] / 2 < 1.65 for thing in row)
+    green = [thing for thing in things if thing.kind in ("floor_plant", "floor_vase")]
+    assert 1 <= len(green) <= 3
+    for thing in green:  # in corners where nothing stands
+        assert min(np.linalg.norm(setting.floor - thing.position[[0, 2]], axis=1)) < 0.75
+        assert all(thing.footprint.distance(o.footprint) > 0.15 for o in setting.objects.values() if o.top > 0.1)
+
+
+def test_rugs_are_as_large_as_fits_each_way():
+    room = large_room()
+    rug = next(thing for thing in placed(room) if thing.kind.startswith("rug"))
+    wide, _, deep = room.boxes.size[room.names.index("bed")].tolist()
+    assert rug.size[0] < wide + 1.2  # the wardrobe stands there
+    assert rug.size[2] == pytest.approx(min(0.75 * deep + 0.5, 2.4), abs=0.01)
+
+
+def test_armchairs_around_a_table_share_a_rug():
+    places = {"a": (-1.1, np.pi / 2), "b": (1.1, -np.pi / 2)}
+    chairs = [
+        Node(name, "armchair", size=(0.8, 0.8, 0.8), position=(x, 0.0, 0.0), yaw=yaw)
+        for name, (x, yaw) in places.items()
+    ]
+    table = Node("table", "coffee_table", size=(0.9, 0.4, 0.6), position=(0.0, 0.0, 0.0), yaw=0.0)
+    graph = SceneGraph(RoomSpec("living_room", size=(5.0, 4.4)), (*chairs, table))
+    made = echousd.generate(graph, shapes="boxes", repair=False, **BARE)
+    rugs = [t for t in placed(replace(made, options=RoomOptions(walls=True, dress="some"))) if t.kind == "rug"]
+    assert [rug.on for rug in rugs] == ["table"]
+    assert rugs[0].size[0] > 1.6  # under the chairs' feet, too
+
+
+def test_cushions_lie_before_the_pillows_of_wide_beds():
+    room = large_room()
+    number = room.names.index("bed")
+    wide, tall, deep = room.boxes.size[number].tolist()
+    mattress = trimesh.creation.box((wide, 0.45, deep))
+    mattress.apply_translation((0, 0.225, 0))
+    pillow = trimesh.creation.box((0.6, 0.16, 0.4))
+    pillow.apply_translation((0, 0.53, -deep / 2 + 0.3))
+    board = trimesh.creation.box((wide, tall, 0.04))
+    board.apply_translation((0, tall / 2, -deep / 2 + 0.02))
+    whole = solid_geometry(trimesh.util.concatenate([mattress, pillow, board]), "double_bed", ORIGIN)
+    geometry = {**room.geometry, "bed": replace(whole, colliders=(Collider("collider", board, "convexHull"),))}
+    setting = setting_of(replace(room, geometry=geometry))
+    upholstery.bed_cushions(setting)
+    assert [thing.kind for thing in setting.placed] == ["cushion", "cushion"]
+    bed = setting.objects["bed"]
+    for thing in setting.placed:
+        x, y, z = (thing.position - bed.position).tolist()
+        assert abs(abs(x) - 0.21 * wide) < 0.16
+        assert y == pytest.approx(0.45, abs=0.01)
+        assert z > -deep / 2 + 0.5  # not in the pillow
+
+
+def test_what_stands_at_a_height_reaches_there_with_its_foot():
+    foot = trimesh.creation.cone(radius=0.1, height=0.4)  # wide where it stands
+    foot.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    part = Part("mesh", foot, {"metal": np.arange(len(foot.faces))})
+    geometry = Geometry((part,), (Collider("collider", foot, "convexHull"),), Origin("test"))
+    lamp = standing("lamp", "table_lamp", np.array([0.2, 0.4, 0.2]), np.array([0.0, 0.5, 0.0]), 0.0, geometry)
+    assert meets(lamp, 0.5, 0.6, shapely.Point(0.096, 0).buffer(1e-3))
+    assert not meets(lamp, 0.5, 0.6, shapely.Point(0.11, 0).buffer(1e-3))
+    assert not meets(lamp, 0.8, 0.9, shapely.Point(0.096, 0).buffer(1e-3))
+
+
+def test_cushions_lie_on_what_is_level_below_them():
+    x = z = np.arange(-0.5, 0.5, STEP)
+    height = np.full((len(x), len(z)), 0.5)
+    height[:, z > 0.2] = 0.545  # a duvet, turned down
+    seat, size = _Seat(x, z, height, 0.5), np.array([0.4, 0.15, 0.3])
+    assert seat.below(np.array([0.0, 0.6, -0.2]), size) == pytest.approx(0.5)
+    assert seat.below(np.array([0.0, 0.6, 0.37]), size) == pytest.approx(0.545)
+    assert seat.below(np.array([0.0, 0.6, 0.13]), size) is None  # on the edge of the duvet
+    assert seat.below(np.array([3.0, 0.6, 0.0]), size) is None
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_curtains_hang_over_the_pane_where_something_stands_beside_it(beside):
+    floor = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+    window = Opening("window", "window", 0, 1.1, 1.8, 1.3, 0.9)
+    setting = Setting({}, floor, (window,), 2.7, True, False, 0)
+    shelf = Thing("floor_vase", np.array([0.7, 2.3, 0.35]), np.array([-1.2, 0.0, -1.8]), 0.0)
+    setting.placed = [shelf] if beside else []
+    curtains(setting)
+    hung = [thing for thing in setting.placed if thing.kind == "curtain"]
+    assert len(hung) == 2
+    left = min(hung, key=lambda thing: thing.position[0])
+    assert left.footprint.intersection(shelf.footprint).area == 0 or not beside
+    assert (left.position[0] > -0.85) == beside
+    assert all(thing.position[1] < 0.1 for thing in hung)

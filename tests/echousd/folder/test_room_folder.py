@@ -1,0 +1,146 @@
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+from stopped_disk import stopped_disk
+
+from echousd.folder.folder import check_writable, claim, recover, write_together
+from echousd.folder.lock import LOCK
+from echousd.pending import STAGING
+
+OLD = {"assets/a.usda": b"a old", "layers/one.usda": b"one old", "room.usda": b"root old"}
+NEW = {"assets/a.usda": b"a new", "assets/b.usda": b"b new", "layers/one.usda": b"one new", "room.usda": b"root new"}
+
+
+def manifest(files):
+    return {"room.json": json.dumps({"echousd_room": 1, "name": "room", "files": dict.fromkeys(files, "")}).encode()}
+
+
+def written(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file() and STAGING not in path.parts and path.name != LOCK
+    }
+
+
+def save(folder, files, remove=()):
+    return write_together(folder, {**files, **manifest(files)}, last=["room.usda", "room.json"], remove=remove)
+
+
+def test_writes_changes_only_and_leaves_other_files(tmp_path):
+    save(tmp_path, OLD)
+    (tmp_path / "notes.txt").write_text("mine")
+    untouched = (tmp_path / "assets/a.usda").stat().st_mtime_ns
+    changed = save(tmp_path, {**NEW, "assets/a.usda": OLD["assets/a.usda"]}, remove=["layers/gone.usda"])
+    assert changed == ["assets/b.usda", "layers/one.usda", "room.usda", "room.json"]
+    assert (tmp_path / "assets/a.usda").stat().st_mtime_ns == untouched
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert not (tmp_path / STAGING).exists()
+
+
+def test_removes_what_no_longer_belongs_and_empty_folders(tmp_path):
+    save(tmp_path, OLD)
+    save(tmp_path, {"room.usda": b"root"}, remove=["assets/a.usda", "layers/one.usda"])
+    assert set(written(tmp_path)) == {"room.usda", "room.json"}
+    assert not (tmp_path / "assets").exists()
+
+
+class Killed(Exception):
+    """Stands for the process being gone."""
+
+
+@pytest.mark.parametrize("moment", range(30))
+def test_killed_at_any_step_leaves_the_old_or_the_new_room(tmp_path, monkeypatch, moment):
+    """Every operation on the disk is a moment; after it nothing more happens, not even cleaning up."""
+    save(tmp_path, OLD)
+    with stopped_disk(monkeypatch, moment, Killed):
+        save(tmp_path, NEW, remove=["layers/gone.usda"])
+    found = written(tmp_path)
+    assert found["room.usda"] in (b"root old", b"root new")
+    if found["room.usda"] == b"root new":  # what the root refers to is there before the root
+        assert all(found[path] == NEW[path] for path in NEW)
+    recover(tmp_path)
+    found = written(tmp_path)
+    found.pop("room.json")
+    assert found in (OLD, NEW)
+
+
+def test_killed_process_leaves_a_room(tmp_path):
+    """The real thing: SIGKILL while rooms are written over and over."""
+    code = textwrap.dedent("""
+        import sys
+        from pathlib import Path
+        from echousd.folder.folder import claim, write_together
+        folder = Path(sys.argv[1])
+        print("go", flush=True)
+        for n in range(10**9):
+            files = {f"assets/{i}.usda": b"%d" % n for i in range(20)} | {"room.usda": b"%d" % n}
+            claim(folder, force=True)
+            write_together(folder, files, last=["room.usda"], remove=[])
+    """)
+    for delay in (0.01, 0.03, 0.08):
+        process = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE)
+        assert process.stdout.readline() == b"go\n"
+        try:
+            process.wait(delay)
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+        process.stdout.close()
+        recover(tmp_path)
+        values = set(written(tmp_path).values())
+        assert len(values) <= 1, f"a mixture of runs: {values}"
+
+
+@pytest.mark.parametrize("failing", ["write_bytes", "write_text", "mkdir"])
+def test_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch, failing):
+    save(tmp_path / "room", OLD)
+    before = written(tmp_path / "room")
+    real = getattr(Path, failing)
+
+    def full(self, *args, **kwargs):
+        if STAGING in self.parts or "fresh" in self.parts:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(self, *args, **kwargs)
+
+    monkeypatch.setattr(Path, failing, full)
+    with pytest.raises(ValueError, match=r"room: cannot be written \(No space left on device\); nothing was changed"):
+        save(tmp_path / "room", NEW)
+    assert written(tmp_path / "room") == before
+    assert not (tmp_path / "room" / STAGING).exists()
+    with pytest.raises(ValueError, match="nothing was changed"):
+        save(tmp_path / "fresh", NEW)
+    assert not (tmp_path / "fresh").exists()
+
+
+def test_folders_that_are_not_ours_are_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    with pytest.raises(
+        ValueError, match=r"holds thesis.tex and no room of EchoUSD; choose another folder or use --force"
+    ):
+        claim(tmp_path, force=False)
+    assert claim(tmp_path, force=True) == {}
+    (tmp_path / "data.json").write_text('{"files": {}}')
+    with pytest.raises(ValueError, match="no room of EchoUSD"):
+        claim(tmp_path, force=False)
+    save(tmp_path, OLD)
+    assert claim(tmp_path, force=False)["name"] == "room"
+    with pytest.raises(ValueError, match="is a file, the output must be a folder"):
+        claim(tmp_path / "thesis.tex", force=True)
+    assert claim(tmp_path / "new", force=False) == {}
+
+
+def test_places_where_nothing_can_be_written(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ValueError, match="file is a file, not a folder"):
+        check_writable(tmp_path / "file" / "room")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
+    with pytest.raises(ValueError, match="is not writable"):
+        check_writable(tmp_path / "room")

@@ -1,0 +1,69 @@
+"""What covers floors and walls: chosen by the seed, the paper behind the bed, and in every harmony."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from pxr import Usd, UsdShade
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.layers.coverings import floor_slot, papered_wall
+from echousd.options import RoomOptions
+from echousd.room import Provenance
+
+
+@pytest.fixture(scope="module")
+def room():
+    return echousd.generate(
+        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True, dress="none")
+    )
+
+
+def seeded(room, seed):
+    return replace(room, provenance=Provenance(seed=seed))
+
+
+def test_about_a_third_of_the_bedrooms_has_carpet_and_a_third_paper(room):
+    floors = [floor_slot(seeded(room, seed)) for seed in range(90)]
+    papers = [papered_wall(seeded(room, seed)) for seed in range(90)]
+    assert set(floors) == {"floor", "carpet"}
+    assert 18 < floors.count("carpet") < 42
+    assert 18 < 90 - papers.count("") < 42
+    assert len(set(papers)) == 2  # none, and the one behind the bed
+    assert (
+        papered_wall(replace(seeded(room, papers.index(max(papers))), options=RoomOptions(walls=False, dress="none")))
+        == ""
+    )
+
+
+@pytest.mark.parametrize(("x", "wall"), [(2.0, "Wall_5"), (-2.0, "Wall_1")])
+def test_of_two_walls_in_line_that_behind_the_bed_has_paper(room, x, wall):
+    corners = ((-3, -3), (-1, -3), (-1, 0), (1, 0), (1, -3), (3, -3), (3, 3), (-3, 3))
+    graph = SceneGraph(RoomSpec("bedroom", floor_polygon=corners), (Node("bed", "double_bed"),), ())
+    boxes = Boxes(torch.tensor([[1.8, 0.5, 2.0]]), torch.tensor([[x, 0.0, -2.0]]), torch.zeros(1))
+    papered = {papered_wall(replace(seeded(room, seed), graph=graph, boxes=boxes)) for seed in range(12)}
+    assert papered == {"", wall}
+
+
+def test_coverings_are_bound_and_have_their_images(room, tmp_path):
+    seed = next(s for s in range(99) if papered_wall(seeded(room, s)) and floor_slot(seeded(room, s)) == "carpet")
+    root = seeded(room, seed).save(tmp_path / "bedroom", preview=False)
+    stage = Usd.Stage.Open(str(root))
+
+    def look(path):
+        return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
+
+    wall = papered_wall(seeded(room, seed))
+    assert look(f"/Room/Shell/{wall}/{wall}_mesh") == "wallpaper"
+    assert look(f"/Room/Shell/{wall}/{wall}_skirting") == "trim"
+    others = [f"Wall_{n}" for n in range(1, 5) if f"Wall_{n}" != wall]
+    assert {look(f"/Room/Shell/{name}/{name}_mesh") for name in others} == {"wall"}
+    assert look("/Room/Shell/Floor/Floor_mesh") == "floor"
+    names = {path.name.split("_")[0] for path in (root.parent / "textures").iterdir()}
+    assert {"carpet", "papered"} <= names
+    assert "planks" not in names

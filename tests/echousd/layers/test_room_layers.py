@@ -1,0 +1,355 @@
+import json
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+from small_room import BARE, OBJECTS, StandIn, small_graph
+
+import echousd
+from echousd.draw.sight import Furniture
+from echousd.draw.views import perspective_view
+from echousd.options import RoomOptions
+from echousd.stage import read_graph
+
+
+@pytest.fixture(scope="module")
+def room():
+    return echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, faces=800, **BARE)
+
+
+@pytest.fixture(scope="module")
+def root(room, tmp_path_factory):
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+@pytest.fixture
+def stage(root):
+    return Usd.Stage.Open(str(root))
+
+
+def test_files_are_those_of_the_design(root):
+    found = {str(path.relative_to(root.parent)) for path in root.parent.rglob("*") if path.is_file()}
+    layers = {f"layers/{name}.usda" for name in ("materials", "physics", "layout", "graph", "geometry")}
+    layers.add("layers/shell.usdc")
+    names = set(OBJECTS) - {"nightstand_left", "nightstand_right"} | {"nightstand"}
+    assets = {f"assets/{n}/{n}{end}" for n in names for end in (".usda", "_geo.usdc")}
+    images = {path for path in found if path.startswith("textures/") and path.endswith(".jpg")}
+    assert any(path.startswith("textures/planks_") for path in images)
+    assert found == {"bedroom.usda", "bedroom.json"} | images | layers | assets
+
+
+def test_stage_opens_whole_and_carries_its_graph(stage, room):
+    assert stage.GetCompositionErrors() == []
+    assert stage.GetDefaultPrim().GetPath() == "/Room"
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    assert UsdPhysics.GetStageKilogramsPerUnit(stage) == 1.0
+    assert read_graph(stage) == room.graph
+
+
+def test_every_default_validator_is_content(stage):
+    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+    errors = UsdValidation.ValidationContext(validators).Validate(stage)
+    assert [error.GetMessage() for error in errors] == []
+
+
+def test_objects_stand_where_their_boxes_are(stage, room):
+    cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
+    for number, name in enumerate(room.names):
+        prim = stage.GetPrimAtPath(f"/Room/Objects/{name}")
+        matrix = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
+        np.testing.assert_allclose(matrix, room.pose(number), atol=1e-4)
+        box = cache.ComputeUntransformedBound(prim).GetRange()
+        x, y, z = room.boxes.size[number].tolist()
+        np.testing.assert_allclose([box.GetMin(), box.GetMax()], [[-x / 2, 0, -z / 2], [x / 2, y, z / 2]], atol=1e-4)
+
+
+def test_kinds_payloads_and_hints(stage):
+    kinds = {
+        str(prim.GetPath()): Usd.ModelAPI(prim).GetKind() for prim in stage.Traverse() if Usd.ModelAPI(prim).GetKind()
+    }
+    assert kinds.pop("/Room") == "assembly"
+    assert kinds.pop("/Room/Objects") == kinds.pop("/Room/Shell") == "group"
+    assert set(kinds.values()) == {"component"}
+    for path in kinds:
+        hint = UsdGeom.ModelAPI(stage.GetPrimAtPath(path)).GetExtentsHint()
+        assert len(hint) == 2
+    unloaded = Usd.Stage.Open(stage.GetRootLayer(), Usd.Stage.LoadNone)
+    assert not unloaded.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
+    unloaded.Load("/Room/Objects/bed")
+    assert unloaded.GetPrimAtPath("/Room/Objects/bed/geo/bed_mesh").IsA(UsdGeom.Mesh)
+
+
+def test_style_group_shares_one_asset(stage, room):
+    assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
+    assert room.meshes["nightstand_right"] is room.meshes["nightstand_left"]
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/geo/nightstand_mesh")
+
+
+def test_meshes_have_a_transform_of_their_own(stage):
+    """Else Blender makes one object of an Xform and its only mesh, under the mesh's name."""
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh):
+            (op,) = UsdGeom.Xformable(prim).GetOrderedXformOps()
+            assert op.GetPrecision() == UsdGeom.XformOp.PrecisionFloat
+            assert op.Get() == (0, 0, 0)
+
+
+def test_layout_layer_holds_transforms_alone(root):
+    stage = Usd.Stage.Open(str(root.parent / "layers/layout.usda"))
+    for prim in stage.TraverseAll():
+        assert not prim.IsDefined()
+        assert all(p.GetName().startswith("xformOp") for p in prim.GetAuthoredProperties())
+
+
+def test_every_path_in_the_room_is_relative(root):
+    layers, _, unresolved = UsdUtils.ComputeAllDependencies(str(root))
+    assert unresolved == []
+    assert len(layers) == 7 + 2 * 5
+    for path in root.parent.rglob("*.usda"):
+        assert "@/" not in path.read_text()
+        assert str(root.parent) not in path.read_text()
+
+
+def test_meshes_have_normals_uvs_and_materials(stage):
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    shown = [mesh for mesh in meshes if mesh.ComputePurpose() == "default"]
+    assert len(shown) == len(OBJECTS) + 1
+    for mesh in meshes:
+        assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
+        count = sum(mesh.GetFaceVertexCountsAttr().Get())
+        for name in ("normals", "st"):
+            primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar(name)
+            assert primvar.IsIndexed()
+            assert primvar.GetInterpolation() == "faceVarying"
+            assert len(primvar.GetIndices()) == count
+    for mesh in shown:
+        subsets = UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets()
+        faces = sorted(i for s in subsets for i in s.GetIndicesAttr().Get())
+        assert not subsets or faces == list(range(len(mesh.GetFaceVertexCountsAttr().Get())))
+        for prim in [s.GetPrim() for s in subsets] or [mesh.GetPrim()]:
+            material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
+            assert material
+            assert str(material.GetPath()).startswith("/Room/Looks/")
+            assert material.ComputeSurfaceSource()[0].GetIdAttr().Get() == "UsdPreviewSurface"
+
+
+def test_asset_opened_alone_has_looks_of_its_own(root):
+    stage = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    for group in ("wood", "linen", "blanket"):
+        subset = stage.GetPrimAtPath(f"/bed/geo/bed_mesh/{group}")
+        material = UsdShade.MaterialBindingAPI(subset).ComputeBoundMaterial()[0]
+        assert material.GetPath() == f"/bed/mtl/{group}"
+        assert list(material.GetPrim().GetAttribute("semantics:labels:material").Get()) == [group]
+
+
+def test_asset_is_what_studios_expect(root):
+    file = str(root.parent / "assets/bed/bed.usda")
+    bare = Usd.Stage.Open(file, Usd.Stage.LoadNone)
+    behind = [prim for prim in bare.TraverseAll() if prim.IsA(UsdGeom.Mesh) or prim.GetName() == "wood"]
+    assert behind == []  # geometry and materials are behind the payload
+    stage = Usd.Stage.Open(file)
+    bed = stage.GetPrimAtPath("/bed")
+    assert [str(prim.GetTypeName()) for prim in (bed.GetChild("geo"), bed.GetChild("mtl"))] == ["Scope", "Scope"]
+    assert bed.GetInherits().GetAllDirectInherits() == ["/_class_/bed"]
+    assert bed.GetVariantSet("LOD").GetVariantNames() == ["high", "proxy"]
+    palettes = bed.GetVariantSet("palette")
+    color = stage.GetAttributeAtPath("/bed/mtl/wood/surface.inputs:diffuseColor")
+    seen = set()
+    for name in palettes.GetVariantNames():
+        palettes.SetVariantSelection(name)
+        seen.add(tuple(color.Get()))
+    assert len(seen) >= 8
+    # the proxy: colliders are seen in place of the meshes, with a material
+    bed.GetVariantSet("LOD").SetVariantSelection("proxy")
+    shown = [
+        prim for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)
+        and UsdGeom.Imageable(prim).ComputeVisibility() != "invisible"
+        and UsdGeom.Imageable(prim).ComputePurpose() == "default"
+    ]  # fmt: skip
+    assert shown
+    assert all(prim.GetName().startswith("bed_collider") for prim in shown)
+    assert UsdShade.MaterialBindingAPI(shown[0]).ComputeBoundMaterial()[0]
+
+
+def test_nightstands_share_looks_and_styles_differ_from_the_room(stage):
+    def bound(path):
+        return UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()[0].GetPrim().GetName()
+
+    left = bound("/Room/Objects/nightstand_left/geo/nightstand_mesh/wood")
+    assert left == bound("/Room/Objects/nightstand_right/geo/nightstand_mesh/wood") == "set_nightstand_left_wood"
+    assert bound("/Room/Objects/wardrobe/geo/wardrobe_mesh/wood") == "room_wood"
+
+
+def test_semantics(stage):
+    labels = {}
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdSemantics.LabelsAPI, "category"):
+            labels[prim.GetName()] = {
+                n: UsdSemantics.LabelsAPI(prim, n).GetLabelsAttr().Get()[0] for n in ("category", "ade20k")
+            }
+    assert labels["nightstand_left"] == {"category": "nightstand", "ade20k": "chest of drawers"}
+    assert labels["Floor"] == {"category": "floor", "ade20k": "floor"}
+    assert set(labels) == set(OBJECTS) | {"Floor"}
+
+
+def test_physics(stage):
+    bodies = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    assert {prim.GetName() for prim in bodies} == set(OBJECTS) - {"pendant"}  # what hangs does not fall
+    for prim in bodies:
+        assert 0.2 <= UsdPhysics.MassAPI(prim).GetMassAttr().Get() <= 300
+        above = prim.GetParent()
+        while above:
+            assert not above.HasAPI(UsdPhysics.RigidBodyAPI)
+            above = above.GetParent()
+    colliders = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    approximation = {p.GetName(): UsdPhysics.MeshCollisionAPI(p).GetApproximationAttr().Get() for p in colliders}
+    assert approximation.pop("Floor_mesh") == "none"
+    assert set(approximation.values()) <= {"convexHull", *(() if find_spec("coacd") else ("convexDecomposition",))}
+    assert len(colliders) >= len(OBJECTS) + 1  # what is hollow has several
+    assert len([p for p in stage.Traverse() if p.IsA(UsdPhysics.Scene)]) == 1
+
+
+def test_every_body_has_a_mass_that_engines_take(stage):
+    for prim in stage.Traverse():
+        if prim.HasAPI(UsdPhysics.RigidBodyAPI):
+            mass = UsdPhysics.MassAPI(prim)
+            moments = sorted(mass.GetDiagonalInertiaAttr().Get())
+            assert 0 < moments[0] <= moments[2] <= (moments[0] + moments[1]) * 1.001, prim
+            contact = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")[0]
+            friction = UsdPhysics.MaterialAPI(contact)
+            assert friction.GetStaticFrictionAttr().Get() >= friction.GetDynamicFrictionAttr().Get() > 0, prim
+            assert friction.GetDensityAttr().Get() > 0
+
+
+def test_an_asset_is_complete_by_itself(root):
+    alone = Usd.Stage.Open(str(root.parent / "assets/bed/bed.usda"))
+    bed = alone.GetDefaultPrim()
+    assert bed.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert bed.GetAttribute("semantics:labels:category").Get() == ["double_bed"]
+    colliders = [p for p in alone.Traverse() if p.HasAPI(UsdPhysics.CollisionAPI)]
+    assert colliders
+    assert all(p.GetName().startswith("bed_collider") for p in colliders)
+    assert bed.GetInherits().GetAllDirectInherits() == [Sdf.Path("/_class_/bed")]
+
+
+def test_bindings_are_no_custom_properties(stage):
+    bindings = [prim.GetRelationship("material:binding") for prim in stage.Traverse()]
+    bindings = [binding for binding in bindings if binding]
+    assert len(bindings) > 10
+    assert not any(spec.custom for binding in bindings for spec in binding.GetPropertyStack())
+
+
+def test_lenses_are_told_in_tenths_of_a_metre(stage):
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective"))
+    assert camera.GetHorizontalApertureAttr().Get() == pytest.approx(0.36)
+    assert camera.GetFocalLengthAttr().Get() == pytest.approx(0.30)
+
+
+def test_colliders_end_where_the_meshes_do(room):
+    for name, geometry in room.geometry.items():
+        bounds = np.array([collider.mesh.bounds for collider in geometry.colliders])
+        box = np.stack([bounds[:, 0].min(0), bounds[:, 1].max(0)])
+        np.testing.assert_allclose(box, geometry.mesh.bounds, atol=2e-3, err_msg=name)
+
+
+def test_cameras_see_everything_and_light_is_there(stage, room):
+    for camera in ("perspective", "top"):
+        frustum = UsdGeom.Camera(stage.GetPrimAtPath(f"/Room/Cameras/{camera}")).GetCamera(0).frustum
+        to_view = frustum.ComputeViewMatrix() * frustum.ComputeProjectionMatrix()
+        for number, name in enumerate(room.names):
+            low, high = room.meshes[name].bounds
+            for corner in np.stack(np.meshgrid(*zip(low, high, strict=True)), -1).reshape(-1, 3):
+                seen = to_view.Transform(Gf.Vec3d(*(room.pose(number) @ [*corner, 1])[:3]))
+                assert max(abs(v) for v in seen) <= 1.0, (camera, name)
+    assert stage.GetPrimAtPath("/Room/Lights/sky").IsA(UsdLux.DomeLight)
+    assert stage.GetPrimAtPath("/Room/Lights/ceiling").IsA(UsdLux.RectLight)
+
+
+def test_camera_stands_where_no_tall_piece_hides_the_others():
+    low = [(0.6, 0.5, 0.6)] * 3
+    size = np.array([*low, (1.8, 2.3, 0.6)])
+    position = np.array([(-1.0, 0, -0.5), (0.0, 0, -0.5), (1.0, 0, -0.5), (0.6, 0, 1.0)])
+    furniture = Furniture(size, position, np.array([0, 0, 0, np.pi]))
+    assert furniture.hidden(np.array([0.6, 1.5, 4.0])) > 1.5  # from behind the wardrobe
+    assert furniture.hidden(np.array([0.0, 6.0, 0.0])) == 0
+    corners = np.concatenate([position - size / 2, position + size * (0.5, 1, 0.5)])
+    for turn in range(4):  # wherever the wardrobe stands, the camera stands elsewhere
+        cos, sin = np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2)
+        rotate = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+        turned = Furniture(size, position @ rotate.T, furniture.yaw + turn * np.pi / 2)
+        eye = perspective_view(corners @ rotate.T, turned)[:3, 3]
+        assert turned.hidden(eye) < 1.0
+        assert (rotate.T @ eye)[2] < 0
+
+
+def test_provenance_in_every_layer_and_in_the_manifest(root, room, stage):
+    for layer in stage.GetUsedLayers():
+        if not layer.anonymous:
+            data = layer.customLayerData
+            assert data["generator"].startswith("echousd ")
+            assert data["asset_license"] == "Apache-2.0"
+            assert data["asset_name"]
+    data = stage.GetRootLayer().customLayerData
+    assert (data["seed"], data["model"]) == (3, "standin")
+    manifest = json.loads((root.parent / "bedroom.json").read_text())
+    assert manifest["seed"] == 3
+    assert manifest["relations"] == {"kept": 4, "broken": 0, "unmeasured": 1}
+    assert [v["state"] for v in manifest["verdicts"]] == [v.state for v in room.verdicts]
+    assert manifest["meshes"]["bed"]["watertight"] is True
+
+
+def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
+    turned = echousd.generate(
+        small_graph(),
+        seed=3,
+        model=StandIn(),
+        repair=False,
+        shapes="boxes",
+        options=RoomOptions(up_axis="Z", walls=False, dress="none"),
+    )
+    stage = Usd.Stage.Open(str(turned.save(tmp_path / "bedroom", preview=False)))
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    box = (
+        UsdGeom.BBoxCache(0, ["default"])
+        .ComputeWorldBound(stage.GetPrimAtPath("/Room/Objects/wardrobe"))
+        .ComputeAlignedRange()
+    )
+    assert box.GetMax()[2] - box.GetMin()[2] == pytest.approx(2.2, abs=1e-3)
+    place = (
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Objects/lamp"))
+        .ComputeLocalToWorldTransform(0)
+        .ExtractTranslation()
+    )
+    np.testing.assert_allclose(place, (-1.25, 1.4, 0.5), atol=1e-4)
+    gravity = UsdPhysics.Scene(stage.GetPrimAtPath("/Room/PhysicsScene")).GetGravityDirectionAttr().Get()
+    assert gravity == Gf.Vec3f(0, 0, -1)
+    assert read_graph(stage) == room.graph
+
+
+def test_walls_stand_around_the_floor(tmp_path):
+    graph = small_graph(size=None, floor_polygon=((-2, -2), (2, -2), (2, 2), (0, 2), (0, 1), (-2, 1)), height=3.0)
+    room = echousd.generate(
+        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+    )
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    walls = [p for p in stage.GetPrimAtPath("/Room/Shell").GetChildren() if p.GetName().startswith("Wall_")]
+    assert len(walls) == 6
+    cache = UsdGeom.BBoxCache(0, ["default"])
+    for wall in walls:
+        box = cache.ComputeWorldBound(wall).ComputeAlignedRange()
+        assert box.GetMax()[1] == pytest.approx(3.0)
+        middle = (box.GetMin() + box.GetMax()) / 2
+        outside = abs(middle[0]) > 2 or middle[2] < -2 or middle[2] > 2 or (middle[0] < 0 and middle[2] > 1)
+        assert outside, wall.GetPath()
+
+
+def test_a_floor_that_nobody_stated_lies_under_all_furniture():
+    graph = small_graph(size=None)
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    corners = np.array(
+        [room.pose(i) @ [x, 0, z, 1] for i, n in enumerate(room.names) for x, z in room.meshes[n].bounds[:, [0, 2]]]
+    )
+    assert (room.floor.min(0) <= corners[:, [0, 2]].min(0)).all()
+    assert (room.floor.max(0) >= corners[:, [0, 2]].max(0)).all()

@@ -1,0 +1,104 @@
+"""Lights of a room: by day, in the evening and at night; the sun through a window, lamps where they hang."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Gf, Usd, UsdGeom, UsdLux
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echomodel.openings import Opening
+from echousd.graph import RoomSpec
+from echousd.options import RoomOptions
+
+WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
+    room = echousd.generate(
+        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+    )
+    return Usd.Stage.Open(str(room.save(tmp_path_factory.mktemp("lights") / "bedroom", preview=False)))
+
+
+def intensity(stage: Usd.Stage, name: str) -> float:
+    return UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/{name}")).GetIntensityAttr().Get()
+
+
+def test_day_evening_and_night(stage) -> None:
+    times = stage.GetPrimAtPath("/Room").GetVariantSets().GetVariantSet("light")
+    assert times.GetVariantNames() == ["day", "evening", "night"]
+    assert times.GetVariantSelection() == "day"
+    seen = {}
+    for name in ("day", "evening", "night"):
+        times.SetVariantSelection(name)
+        seen[name] = [intensity(stage, light) for light in ("sky", "sun", "lamp_pendant")]
+    times.SetVariantSelection("day")
+    assert seen["day"][0] > seen["evening"][0] > seen["night"][0] > 0
+    assert seen["day"][1] > seen["evening"][1] == seen["night"][1] == 0
+    assert seen["day"][2] < seen["evening"][2] == seen["night"][2]
+
+
+def test_the_sun_falls_in_through_the_window(stage) -> None:
+    matrix = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Lights/sun")).ComputeLocalToWorldTransform(0)
+    way = np.array(matrix.TransformDir(Gf.Vec3d(0, 0, -1)))
+    assert np.linalg.norm(way) == pytest.approx(1)
+    assert way[1] < -0.5
+    assert way[2] > 0.5
+
+
+def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path) -> None:
+    dome = UsdLux.DomeLight(stage.GetPrimAtPath("/Room/Lights/sky"))
+    assert dome.GetTextureFileAttr().Get().resolvedPath.endswith("textures/sky.jpg")
+    with Image.open(dome.GetTextureFileAttr().Get().resolvedPath) as picture:
+        up, down = (picture.getpixel((9, share * picture.height // 10)) for share in (1, 8))
+    assert up[2] > up[0] > 120
+    assert down[1] > down[2]
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
+    options = RoomOptions(walls=True, ceiling=True, dress="none")
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+    closed = Usd.Stage.Open(str(room.save(tmp_path / "closed", preview=False)))
+    assert intensity(closed, "sun") > 2 * intensity(stage, "sun")  # through the window alone
+    bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE).save(
+        tmp_path / "bare", preview=False
+    )
+    assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
+
+
+def test_lamps_shine_where_they_are(stage) -> None:
+    cache = UsdGeom.BBoxCache(0, ["default"])
+    for name, below in (("pendant", True), ("lamp", False)):
+        bulb = UsdGeom.Xformable(stage.GetPrimAtPath(f"/Room/Lights/lamp_{name}")).ComputeLocalToWorldTransform(0)
+        box = cache.ComputeWorldBound(stage.GetPrimAtPath(f"/Room/Objects/{name}")).ComputeAlignedRange()
+        place = bulb.ExtractTranslation()
+        assert box.GetMin()[0] < place[0] < box.GetMax()[0]
+        edge = box.GetMin()[1] if below else box.GetMax()[1]
+        assert 0.04 < (edge - place[1] if below else place[1] - edge) < 0.1
+    light = UsdLux.SphereLight(stage.GetPrimAtPath("/Room/Lights/lamp_pendant"))
+    stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "evening")
+    assert light.GetNormalizeAttr().Get()  # Blender takes a sphere's intensity for radiance times area in any case
+    candela = light.GetIntensityAttr().Get() * 30 / 4
+    stage.GetPrimAtPath("/Room").GetVariantSets().SetSelection("light", "day")
+    assert candela == pytest.approx(1500 / (4 * np.pi), rel=1e-3)  # 1,500 lumens all round
+
+
+def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
+    room = echousd.generate(small_graph(), model=StandIn(), repair=False, shapes="boxes", **BARE)
+    moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
+    stage = Usd.Stage.Open(str(replace(room, layouts=(room.boxes, moved)).save(tmp_path / "two", preview=False)))
+    layouts = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert layouts.GetVariantSelection() == "layout_0"
+    places = []
+    for name in ("layout_0", "layout_1"):
+        layouts.SetVariantSelection(name)
+        bulb = UsdGeom.Xformable(stage.GetPrimAtPath("/Room/Lights/lamp_pendant"))
+        places.append(np.array(bulb.ComputeLocalToWorldTransform(0).ExtractTranslation()))
+        assert intensity(stage, "lamp_pendant") > 0
+    assert places[1] - places[0] == pytest.approx(0.1, abs=1e-6)

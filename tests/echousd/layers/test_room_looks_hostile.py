@@ -1,0 +1,61 @@
+"""A record of a look that somebody wrote: it leads to no prim that it could break, and rooms still open."""
+
+from __future__ import annotations
+
+import pytest
+from pxr import Sdf, Vt
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echousd.layers.paintings import RECORD, read_look
+from echousd.make.reading import read_room
+from echousd.stage import StageError, open_stage
+
+PLACES = ("/", ".", "../x", "/Room", "/Room/a.b", "/Room/a{v=x}b", "/Room/a[/b].c", "a b", "")
+
+
+def layer_of(**change):
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    record = {"name": "oil", "objects": {"/Room/Objects/bed": "0"}, "meshes": Vt.StringArray(["/Room/Objects/bed/m"])}
+    layer.customLayerData = {RECORD: {**record, **change}}
+    return layer
+
+
+def test_records_name_prims_inside_a_room():
+    assert read_look(layer_of(), "looks/oil.usda").objects == {"/Room/Objects/bed": "0"}
+    for place in PLACES:
+        assert read_look(layer_of(meshes=Vt.StringArray([place])), "") is None
+        if place:
+            assert read_look(layer_of(objects={place: "0"}), "") is None
+    for name in ("a:b", "a" * 65, "", "1"):
+        assert read_look(layer_of(name=name), "") is None
+
+
+@pytest.fixture
+def root(tmp_path):
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    return made.save(tmp_path / "bedroom", preview=False)
+
+
+@pytest.mark.parametrize("place", ["/", "/Room", "/Room/Objects/bed.x"])
+def test_an_edit_leaves_a_room_that_opens(root, place):
+    (root.parent / "looks").mkdir()
+    layer_of(objects={place: "0", "/Room/Objects/bed": "1"}).Export(str(root.parent / "looks/oil.usda"))
+    layer = Sdf.Layer.OpenAsAnonymous(str(root))
+    layer.subLayerPaths = ["./looks/oil.usda", *layer.subLayerPaths]
+    root.write_text(layer.ExportToString())
+    echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False, **BARE).save(
+        root.parent, preview=False
+    )
+    assert open_stage(root).GetPrimAtPath("/Room/Objects/bed")
+
+
+@pytest.mark.parametrize(("kind", "value"), [("double", "1e30"), ("double3", "(nan, 0, 0)"), ("string", '"x"')])
+def test_a_place_that_is_none_is_told(root, kind, value):
+    layer, found = Sdf.Layer.OpenAsAnonymous(str(root)), Sdf.Layer.CreateAnonymous(".usda")
+    found.ImportFromString(f'#usda 1.0\nover "bed" {{\n {kind} xformOp:translate = {value}\n}}\n')
+    bed = Sdf.CreatePrimInLayer(layer, "/Room/Objects/bed")
+    Sdf.CopySpec(found, Sdf.Path("/bed"), layer, bed.path)
+    root.write_text(layer.ExportToString())
+    with pytest.raises(StageError, match=r"bedroom.usda: (cannot be read|</Room/Objects/bed>)"):
+        read_room(root)

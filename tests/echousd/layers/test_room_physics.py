@@ -1,0 +1,137 @@
+"""Masses, inertia and colliders of single pieces."""
+
+import numpy as np
+import pytest
+import trimesh
+from pxr import Usd, UsdGeom
+
+from echomodel.dressing import KINDS
+from echomodel.dressing import thing as solids_of
+from echomodel.vocabulary import vocabulary
+from echousd.layers.physics import write_asset_physics
+from echousd.shapes.ballast import ballasted
+from echousd.shapes.colliders import collider, colliders_of, standing_hull
+from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.joinery import part_of, within_budget
+from echousd.shapes.masses import hull_volume, mass_of, read_mass
+from echousd.shapes.meshing import box_mesh
+from echousd.shapes.sources.boxes import ORIGIN
+from echousd.shapes.sources.solid import solid_geometry
+
+SIZE = np.array([1.6, 2.2, 0.6])
+
+
+def tensor(mass: Mass) -> np.ndarray:
+    return mass.axes @ np.diag(mass.inertia) @ mass.axes.T
+
+
+def test_mass_of_a_box_is_that_of_the_textbook():
+    mass = mass_of(solid_geometry(box_mesh(SIZE), "wardrobe", ORIGIN), "wardrobe")
+    x, y, z = SIZE
+    assert mass.mass == pytest.approx(x * y * z * vocabulary().category("wardrobe").density, abs=0.01)
+    np.testing.assert_allclose(mass.centre, (0, y / 2, 0), atol=1e-6)
+    wanted = mass.mass / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    np.testing.assert_allclose(tensor(mass), np.diag(wanted), atol=1e-6 * wanted.max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_written_masses_are_read_back(seed):
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]  # half of these are reflections
+    told = Mass(7.25, rng.normal(size=3), np.sort(rng.random(3)) + 1.0, turn)
+    mesh = box_mesh(SIZE)
+    part = Part("mesh", mesh, {"wood": np.arange(len(mesh.faces))})
+    geometry = Geometry((part,), (Collider("collider", mesh, "convexHull"),), Origin("boxes"), mass=told)
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.Xform.Define(stage, "/chair")
+    write_asset_physics(stage, "chair", "chair", geometry, ["fabric"])
+    found = read_mass(stage.GetPrimAtPath("/chair"))
+    assert found.mass == pytest.approx(7.25)
+    np.testing.assert_allclose(found.centre, told.centre, atol=1e-4)
+    np.testing.assert_allclose(tensor(found), tensor(told), atol=1e-4)
+
+
+def test_a_prim_without_a_whole_mass_has_none():
+    stage = Usd.Stage.CreateInMemory()
+    assert read_mass(UsdGeom.Xform.Define(stage, "/chair").GetPrim()) is None
+
+
+@pytest.mark.parametrize("category", ["wardrobe", "chair"])
+def test_colliders_stand_on_planes_that_end_where_the_mesh_does(category):
+    mesh = trimesh.creation.icosphere(4, 0.5)
+    mesh.vertices *= (1.0, 2.0, 0.7)
+    light = collider(mesh, category).mesh
+    np.testing.assert_allclose(light.bounds, mesh.bounds, atol=1e-6)
+    for height in light.bounds[:, 1]:
+        assert (np.abs(light.vertices[:, 1] - height) < 1e-9).sum() >= 3
+
+
+@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("kind", ["cup", "candles", "pens"])
+def test_hulls_of_small_things_are_closed_as_they_are_written(kind, number):
+    size = (0.06, 0.12, 0.06)
+    solids = solids_of(kind, size, np.random.default_rng(number))
+    hull = standing_hull(part_of("mesh", within_budget(solids, size, KINDS[kind].faces)).mesh).mesh
+    _, corners = np.unique(hull.vertices.round(6), axis=0, return_inverse=True)
+    written = trimesh.Trimesh(hull.vertices.round(6), hull.faces, process=True)
+    assert len(written.vertices) == len(hull.vertices) == corners.max() + 1
+    assert written.is_watertight
+    assert written.is_winding_consistent
+    assert written.area_faces.min() > 1e-12
+
+
+def test_a_convex_piece_as_thin_as_a_table_top_keeps_its_thickness(monkeypatch):
+    top, legs = trimesh.creation.box((1.2, 0.01, 0.8)), trimesh.creation.box((0.1, 0.74, 0.1))
+    top.apply_translation((0, 0.745, 0))
+    legs.apply_translation((0, 0.37, 0))
+    monkeypatch.setattr("echousd.shapes.colliders.find_spec", lambda name: name)
+    monkeypatch.setattr("echousd.shapes.colliders.convex_pieces", lambda mesh: [top, legs])
+    plate, post = colliders_of(trimesh.util.concatenate([top, legs]), "dining_table")
+    np.testing.assert_allclose(plate.mesh.bounds[:, 1], (0.74, 0.75), atol=1e-4)
+    np.testing.assert_allclose(post.mesh.bounds[0, 1], 0.0, atol=1e-4)
+
+
+def test_what_would_topple_has_ballast_in_its_base():
+    foot, arm = trimesh.creation.box((0.3, 0.02, 0.3)), trimesh.creation.box((1.0, 0.02, 0.02))
+    foot.apply_translation((0, 0.01, 0))
+    arm.apply_translation((0.5, 1.8, 0))
+    solids = [foot.vertices, arm.vertices]
+    light = Mass(4.0, np.array([0.4, 1.2, 0.0]), np.array([0.1, 0.2, 0.3]), np.eye(3))
+    found = ballasted(light, solids)
+    assert found.centre[0] == pytest.approx(0.75 * 0.15)
+    assert found.mass * found.centre[0] == pytest.approx(4.0 * 0.4)  # what is added stands in the middle
+    added = found.mass - 4.0
+    level = np.diag([0.1, 0.2, 0.3]) + 4.0 * added / found.mass * sum(
+        float(r @ r) * np.eye(3) - np.outer(r, r) for r in [np.array([0.4, 1.2, 0.0])]
+    )
+    np.testing.assert_allclose(tensor(found), level, atol=1e-9)
+    assert ballasted(found, solids) is found
+    steady = Mass(4.0, np.array([0.05, 0.3, 0.0]), light.inertia, light.axes)
+    assert ballasted(steady, solids) is steady
+
+
+def test_what_is_hollow_collides_by_convex_pieces():
+    pytest.importorskip("coacd")
+    legs = [trimesh.creation.box((0.05, 0.7, 0.05)) for _ in range(4)]
+    for leg, (x, z) in zip(legs, ((-0.4, -0.3), (0.4, -0.3), (-0.4, 0.3), (0.4, 0.3)), strict=True):
+        leg.apply_translation((x, 0.35, z))
+    top = trimesh.creation.box((0.9, 0.05, 0.7))
+    top.apply_translation((0, 0.71, 0))
+    table = trimesh.boolean.union([top, *legs], engine="manifold")
+    found = colliders_of(table, "dining_table")
+    assert len(found) >= 5
+    assert {piece.approximation for piece in found} == {"convexHull"}
+    assert len({piece.name for piece in found}) == len(found)
+    assert all(piece.mesh.is_convex and piece.mesh.is_watertight for piece in found)
+    corners = np.concatenate([piece.mesh.vertices for piece in found])
+    np.testing.assert_allclose([corners.min(0), corners.max(0)], table.bounds, atol=1e-6)
+    assert sum(piece.mesh.volume for piece in found) == pytest.approx(table.volume, rel=0.3)  # its hull: ten times
+    again = colliders_of(table, "dining_table")
+    assert all((a.mesh.vertices == b.mesh.vertices).all() for a, b in zip(found, again, strict=True))
+    assert [piece.name for piece in colliders_of(top, "dining_table")] == ["collider"]
+
+
+def test_volume_of_a_hull():
+    points = np.random.default_rng(3).normal(size=(40, 3))
+    assert hull_volume(points) == pytest.approx(trimesh.convex.convex_hull(points).volume)
+    assert hull_volume(points * [1, 0, 1]) == 0.0

@@ -1,0 +1,198 @@
+"""Furniture is moved apart by its solids: no-fit polygons, tucked chairs, sills, and what must stay."""
+
+import numpy as np
+import pytest
+import shapely
+import torch
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from echomodel.boxes import Boxes
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.graph.openings import Opening
+from echousd.graph.sentences import stating
+from echousd.make.clearing import cleared
+from echousd.make.verdicts import relation_verdicts
+from echousd.shapes.geometry import Collider, Geometry, Origin, Part
+from echousd.shapes.nofit import depth, forbidden, forbidden_moves
+
+FLOOR = np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)])
+
+
+def board(size, at):
+    mesh = trimesh.creation.box(size)
+    mesh.apply_translation(np.add(at, (0, size[1] / 2, 0)))
+    return mesh
+
+
+def piece(*boards):
+    """Geometry whose parts and colliders are the same boxes."""
+    parts = tuple(Part(f"part_{n}", mesh, {"wood": np.arange(12)}) for n, mesh in enumerate(boards))
+    colliders = tuple(Collider(f"collider_{n}", mesh, "convexHull") for n, mesh in enumerate(boards))
+    return Geometry(parts, colliders, Origin("test"))
+
+
+def table_piece():
+    legs = [board((0.06, 0.7, 0.06), (x, 0, z)) for x in (-0.77, 0.77) for z in (-0.42, 0.42)]
+    return piece(board((1.6, 0.05, 0.9), (0, 0.7, 0)), *legs)
+
+
+def chair_piece():
+    return piece(board((0.45, 0.45, 0.45), (0, 0, 0)), board((0.45, 0.45, 0.05), (0, 0.45, -0.2)))
+
+
+def room(*things, relations=(), **spec):
+    """Graph, boxes and geometry of (name, category, geometry, position, yaw, locked)."""
+    nodes = tuple(Node(name, word, locked=locked) for name, word, _, _, _, locked in things)
+    size = [np.ptp(geometry.mesh.bounds, axis=0) for _, _, geometry, *_ in things]
+    boxes = Boxes(
+        torch.tensor(np.array(size), dtype=torch.float32),
+        torch.tensor([position for *_, position, _, _ in things], dtype=torch.float32),
+        torch.tensor([yaw for *_, yaw, _ in things], dtype=torch.float32),
+    )
+    graph = SceneGraph(RoomSpec("dining_room", floor_polygon=tuple(map(tuple, FLOOR)), **spec), nodes, tuple(relations))
+    return graph, boxes, {name: geometry for name, _, geometry, *_ in things}
+
+
+@pytest.mark.parametrize("start", [0.25, 0.35, 0.4])
+def test_a_chair_is_tucked_as_far_as_it_fits_its_back_a_millimetre_before_the_table(start):
+    chair = ("chair", "dining_chair", chair_piece(), (0.2, 0.0, start), np.pi, False)
+    graph, boxes, geometry = room(("table", "dining_table", table_piece(), (0, 0, 0), 0.0, True), chair)
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    x, y, z = found.boxes.position[1].tolist()
+    back = z + 0.2 - 0.025  # turned to the table, the back is on the far side
+    assert back >= 0.45
+    if start + 0.175 < 0.45:
+        assert back == pytest.approx(0.451, abs=2e-4)
+        assert (x, y) == pytest.approx((0.2, 0.0), abs=1e-4)
+    else:
+        assert not found.moved
+
+
+def test_what_is_locked_stays_and_what_cannot_go_is_named():
+    box = piece(board((1, 1, 1), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("first", "cabinet", box, (0, 0, 0), 0.0, True), ("second", "cabinet", box, (0.9, 0, 0), 0.0, True)
+    )
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.moved == {}
+    (hit,) = found.collisions
+    assert (hit.first, hit.second, round(hit.depth, 3)) == ("first", "second", 0.1)
+    free = graph.replaced(nodes=tuple(node.replaced(locked=node.name == "first") for node in graph.nodes))
+    found = cleared(free, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert found.boxes.position[0].tolist() == boxes.position[0].tolist()
+    assert found.boxes.position[1].tolist() == pytest.approx([1.001, 0, 0], abs=1e-4)
+
+
+def test_what_stands_on_a_piece_goes_with_it():
+    box, lamp = piece(board((0.5, 0.5, 0.4), (0, 0, 0))), piece(board((0.2, 0.4, 0.2), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("bed", "double_bed", piece(board((1.6, 0.6, 2.0), (0, 0, 0))), (0, 0, 0), 0.0, True),
+        ("nightstand", "nightstand", box, (1.0, 0, -0.5), 0.0, False),
+        ("lamp", "table_lamp", lamp, (1.0, 0.5, -0.5), 0.0, False),
+        relations=[Relation("lamp", "standing_on", "nightstand")],
+    )
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert found.moved["lamp"] == pytest.approx(found.moved["nightstand"])
+    assert found.boxes.position[2, 0] == pytest.approx(1.051, abs=1e-3)
+
+
+def test_a_lamp_stands_where_its_desk_is_as_high_as_its_box():
+    desk = piece(board((1.6, 0.05, 0.8), (0, 0.7, 0)), board((1.6, 1.2, 0.3), (0, 0, -0.25)))  # with a shelf behind
+    lamp = piece(board((0.2, 0.4, 0.2), (0, 0, 0)))
+    told = [Relation("lamp", "standing_on", "desk")]
+    for z, there in ((0.15, -0.198), (-0.22, -0.22)):
+        lamps = ("lamp", "table_lamp", lamp, (0.3, 1.2, z), 0.0, False)
+        graph, boxes, geometry = room(("desk", "desk", desk, (0, 0, 0), 0.0, False), lamps, relations=told)
+        found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+        assert found.boxes.position[1].tolist() == pytest.approx([0.3, 1.2, there], abs=2e-3)
+        assert verdicts_of(graph, found.boxes) == ["kept"]
+
+
+def test_what_is_close_by_goes_along_and_no_told_relation_is_broken():
+    block = piece(board((1.0, 1.0, 1.0), (0, 0, 0)))
+    small = piece(board((0.4, 0.5, 0.4), (0, 0, 0)))
+    close = [Relation("stand", "close_by", "bed")]
+    things = (
+        ("wardrobe", "wardrobe", block, (-0.9, 0, 0), 0.0, True),
+        ("bed", "single_bed", block, (0.0, 0, 0), 0.0, False),
+    )
+    stand = ("stand", "nightstand", small, (-1.13, 0, 0.75), 0.0, False)
+    # their corners are 0.43 m apart, 0.45 m are allowed: where the bed goes, the nightstand must follow
+    graph, boxes, geometry = room(*things, stand, relations=close)
+    assert verdicts_of(graph, boxes) == ["kept"]
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert verdicts_of(graph, found.boxes) == ["kept"]
+    # locked where it is, nobody may go: the two stay, and are named
+    fixed = graph.replaced(nodes=tuple(node.replaced(locked=node.name != "bed") for node in graph.nodes))
+    found = cleared(fixed, boxes, geometry, FLOOR, walls=False)
+    assert verdicts_of(fixed, found.boxes) == ["kept"]
+    assert {found.collisions[0].first, found.collisions[0].second} == {"wardrobe", "bed"}
+
+
+def test_what_stands_in_a_corner_still_does_when_it_is_moved_apart():
+    plant, shelf = piece(board((0.4, 1.0, 0.4), (0, 0, 0))), piece(board((0.8, 1.8, 0.3), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("fern", "plant", plant, (-1.75, 0, -1.75), 0.0, False),
+        ("bookshelf", "bookshelf", shelf, (-1.2, 0, -1.8), 0.0, False),
+    )
+    graph = stating(graph, "fern in corner")
+    found = cleared(graph, boxes, geometry, FLOOR, walls=False)
+    assert found.collisions == ()
+    assert verdicts_of(graph, found.boxes) == ["kept"]
+
+
+def verdicts_of(graph, boxes):
+    return [verdict.state for verdict in relation_verdicts(graph, boxes)]
+
+
+@pytest.mark.parametrize("walls", [False, True])
+def test_high_furniture_keeps_clear_of_a_window_sill(walls):
+    window = Opening("window", "window", 0, 1.0, 1.5, 1.2, 0.9)
+    wall = np.array([-2.0, -2.0])  # the first edge runs along x at z -2
+    tall = piece(board((0.8, 2.0, 0.4), (0, 0, 0)))
+    graph, boxes, geometry = room(
+        ("wardrobe", "wardrobe", tall, (float(wall[0]) + 1.7, 0, -1.79), 0.0, False), openings=(window,)
+    )
+    found = cleared(graph, boxes, geometry, FLOOR, walls=walls)
+    assert bool(found.moved) is walls
+    if walls:
+        assert found.boxes.position[0, 2] - 0.2 >= -2.0 + 0.04
+
+
+def solids(seed, count):
+    rng = np.random.default_rng(seed)
+    return [rng.uniform(-0.4, 0.4, (10, 3)) + rng.uniform(-0.3, 0.3, 3) for _ in range(count)]
+
+
+def meet(first, second):
+    """The slow, obvious twin: whether two hulls share a point, by linear programming."""
+    n, m = len(first), len(second)
+    equal = np.vstack([np.hstack([first.T, -second.T]), np.r_[np.ones(n), np.zeros(m)], np.r_[np.zeros(n), np.ones(m)]])
+    return linprog(np.zeros(n + m), A_eq=equal, b_eq=[0, 0, 0, 1, 1], bounds=(0, None)).status == 0
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
+def test_forbidden_moves_are_those_at_which_two_solids_meet(seed, x, z):
+    moving, fixed = solids(seed, 2)
+    polygon = forbidden(moving, fixed)
+    reach = 0.0 if polygon is None else depth(polygon, np.array([x, z]))
+    moved = np.add(moving, (x, 0, z))
+    if polygon is not None and 0 < polygon.boundary.distance(shapely.Point(x, z)) < 1e-6:
+        return
+    assert (reach > 0) == meet(moved, fixed)
+
+
+def test_forbidden_moves_of_several_solids_are_those_of_any():
+    moving, fixed = solids(3, 3), solids(4, 2)
+    every = forbidden_moves(moving, fixed, 2.0)
+    for x in np.linspace(-0.9, 0.9, 7):
+        assert (depth(every, np.array([x, 0.1])) > 0) == any(
+            meet(np.add(one, (x, 0, 0.1)), other) for one in moving for other in fixed
+        )

@@ -1,0 +1,250 @@
+import hashlib
+import json
+import warnings
+
+import numpy as np
+import pytest
+import torch
+from pxr import Sdf, Usd
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echomodel.protocols import GraphEdit
+from echousd.graph import Relation
+from echousd.make.edit import edit, touched
+from echousd.make.layouts import repeated
+from echousd.make.reading import read_room
+from echousd.options import RoomOptions
+
+
+@pytest.fixture
+def root(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
+    return room.save(tmp_path / "bedroom", preview=False)
+
+
+def hashes(folder):
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_room_reads_back(root):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), faces=600, **BARE)
+    saved = read_room(root)
+    assert saved.graph == room.graph
+    assert saved.assets == room.assets
+    for name in ("size", "position", "yaw"):
+        torch.testing.assert_close(getattr(saved.boxes, name), getattr(room.boxes, name), atol=2e-4, rtol=0)
+    (part,), (before,) = saved.geometry["bed"].parts, room.geometry["bed"].parts
+    assert list(part.slots) == ["blanket", "linen", "wood"]
+    for slot, faces in before.slots.items():
+        np.testing.assert_array_equal(part.slots[slot], faces)
+
+
+def test_edit_without_change_keeps_every_byte_of_the_assets_and_looks(root):
+    before = hashes(root.parent)
+    edit(root, small_graph(), model=StandIn()).save(root.parent, preview=False)
+    after = hashes(root.parent)
+    different = {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
+    assert different <= {"layers/layout.usda", "bedroom.usda", "bedroom.json", "layers/physics.usda"}
+
+
+def test_new_object_leaves_all_others_alone(root):
+    old = read_room(root)
+    before = hashes(root.parent)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    room = edit(root, graph, model=StandIn(), seed=9)
+    room.save(root.parent, preview=False)
+    after = hashes(root.parent)
+    assert {path: after[path] for path in before if path.startswith("assets/")} == {
+        path: value for path, value in before.items() if path.startswith("assets/")
+    }
+    assert "assets/chair/chair_geo.usdc" in after
+    torch.testing.assert_close(room.boxes.position[:6], old.boxes.position, atol=2e-3, rtol=0)
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    assert stage.GetCompositionErrors() == []
+    assert echousd.read_graph(stage) == graph.replaced(room=old.graph.room)
+
+
+def test_an_edit_leaves_small_things_alone(tmp_path):
+    options = RoomOptions(walls=True, dress="full")
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", options=options)
+    root = room.save(tmp_path / "bedroom", preview=False)
+
+    def things() -> dict[str, str]:
+        layer = Sdf.Layer.OpenAsAnonymous(str(root.parent / "layers/dressing.usda"))
+        return {prim.name: prim.GetAsText() for prim in layer.GetPrimAtPath("/Room/Dressing").nameChildren}
+
+    before, small = hashes(root.parent), things()
+    assert len(small) > 20
+    edit(root, small_graph(), model=StandIn()).save(root.parent, preview=False)
+    assert hashes(root.parent) == before
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edit(root, graph, model=StandIn(), seed=9).save(root.parent, preview=False)
+    after = hashes(root.parent)
+    kept = [path for path in before if path.startswith("assets/small_")]
+    assert kept
+    assert all(after.get(path) == before[path] for path in kept)
+    assert {name: text for name, text in things().items() if name in small} == small
+
+
+def test_all_layouts_of_a_room_are_kept(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(0.4), faces=600, layouts=3, **BARE)
+    root = room.save(tmp_path / "bedroom", preview=False)
+    saved = read_room(root)
+    assert len(saved.layouts) == 3
+    for ours, theirs in zip(saved.layouts, room.layouts, strict=True):
+        torch.testing.assert_close(ours.position, theirs.position, atol=2e-4, rtol=0)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edited = edit(root, graph, model=StandIn(0.4), seed=9)
+    edited.save(root.parent, preview=False)
+    assert len(edited.layouts) == 3
+    for before, after in zip(room.layouts, edited.layouts, strict=True):
+        torch.testing.assert_close(after.position[:6], before.position, atol=2e-3, rtol=0)
+        torch.testing.assert_close(after.size, edited.boxes.size)
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    assert variants.GetVariantNames() == ["layout_0", "layout_1", "layout_2"]
+    assert variants.GetVariantSelection() == "layout_0"
+    smaller = edit(root, graph.remove_node("chair"), model=StandIn(0.4))
+    assert len(smaller.layouts) == 3
+
+
+def test_model_is_told_what_was_edited(root):
+    model = StandIn()
+    graph = small_graph().unrelate("wardrobe", "taller_than", "bed").relabel_node("pendant", "table_lamp")
+    graph = graph.add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    edit(root, graph, model=model)
+    assert len(model.edits) == 2  # the layout branch and the shape branch
+    for told in model.edits:
+        assert [name for name, new in zip(graph.names, told.added.tolist(), strict=True) if new] == ["pendant", "chair"]
+        bed, wardrobe = graph.names.index("bed"), graph.names.index("wardrobe")
+        pairs = {(s, o) for s, _, o in told.before.tolist()}
+        assert (wardrobe, bed) in pairs  # as it was before
+        assert graph.names.index("chair") not in {end for pair in pairs for end in pair}
+
+
+def test_an_edit_draws_several_layouts_and_keeps_the_best(root, monkeypatch):
+    old, model = read_room(root), StandIn(0.4)
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    seen = []
+
+    def wishes(graph, found, proposed):
+        seen.append(found[0])
+        return (0, 0, 1 if len(seen) == 3 else 2)
+
+    monkeypatch.setattr("echousd.make.layouts._wishes", wishes)
+    room = edit(root, graph, model=model, seed=9, shapes="boxes")
+    assert len(seen) == 8  # none was perfect
+    assert room.boxes is seen[2]
+    sizes = [len(told.added) // len(graph.nodes) for told in model.edits if told is not None]
+    assert sizes[:3] == [1, 2, 5]
+    for boxes in seen:  # whatever is drawn, what the edit does not touch stays
+        torch.testing.assert_close(boxes.position[:6], old.boxes.position, atol=1e-6, rtol=0)
+    seen.clear()
+    edit(root, graph, model=model, seed=9, shapes="boxes", drafts=1)
+    assert not seen
+    with pytest.raises(ValueError, match="drafts is 65, allowed: 1 to 64"):
+        edit(root, graph, model=model, drafts=65)
+
+
+def test_an_edit_is_told_once_for_every_copy_of_the_graph():
+    change = GraphEdit(torch.tensor([[0, 1, 2], [2, 7, 1]]), torch.tensor([False, False, True]))
+    twice = repeated(change, 3, 2)
+    assert twice.before.tolist() == [[0, 1, 2], [2, 7, 1], [3, 1, 5], [5, 7, 4]]
+    assert twice.added.tolist() == [False, False, True, False, False, True]
+
+
+def test_owner_of_a_shared_asset_may_go(root):
+    graph = small_graph().unrelate("lamp", "standing_on", "nightstand_left")
+    graph = graph.remove_node("nightstand_left")
+    room = edit(root, graph, model=StandIn())
+    room.save(root.parent, preview=False)
+    assert room.assets["nightstand_right"] == "nightstand"
+    stage = Usd.Stage.Open(str(root))
+    stage.Reload()
+    assert stage.GetPrimAtPath("/Room/Objects/nightstand_right/geo/nightstand_mesh")
+    assert not stage.GetPrimAtPath("/Room/Objects/nightstand_left")
+    again = graph.add_node("nightstand", "wardrobe")
+    assert edit(root, again, model=StandIn()).assets["nightstand"] == "nightstand_2"
+
+
+def test_another_category_gets_another_shape(root):
+    before = hashes(root.parent)
+    edit(root, small_graph().relabel_node("wardrobe", "double_bed"), model=StandIn(), repair=False).save(
+        root.parent, preview=False
+    )
+    after = hashes(root.parent)
+    path = "assets/{0}/{0}_geo.usdc"
+    assert after[path.format("wardrobe")] != before[path.format("wardrobe")]
+    assert after[path.format("bed")] == before[path.format("bed")]
+
+
+def test_what_an_edit_touches():
+    graph = small_graph()
+    assert touched(graph, graph) == (set(), set())
+    assert touched(graph, graph.relate("nightstand_left", "left", "bed")) == (set(), {"nightstand_left", "lamp"})
+    assert touched(graph, graph.lock("lamp").relate("nightstand_left", "left", "bed"))[1] == {"nightstand_left"}
+    assert touched(graph, graph.remove_node("pendant")) == (set(), set())
+
+
+def test_only_rooms_of_ours_can_be_edited(tmp_path):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    with pytest.raises(ValueError, match=r"graph.usda: not a room made by `echousd generate`"):
+        read_room(tmp_path / "graph.usda")
+
+
+def test_command(root, echousd_command, monkeypatch):
+    from echomodel.echo import EchoModel
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+    words = ("--add", "chair:nightstand", "--relate", "chair close by wardrobe", "--remove", "pendant")
+    done = echousd_command("edit", root, *words)
+    assert done.code == 0, done.err
+    assert "+ object chair (nightstand)" in done.out
+    graph = echousd.read_graph(root)
+    assert Relation("chair", "close_by", "wardrobe") in graph.relations
+    assert "pendant" not in graph.names
+    done = echousd_command("edit", root)
+    assert done.code == 2
+    assert "nothing to change; use --add, --remove" in done.err
+    done = echousd_command("edit", root, "--remove", "sofa")
+    assert done.code == 2
+    assert "sofa" in done.err
+
+
+def test_weights_that_did_not_make_the_room_are_told(root, echousd_command, monkeypatch):
+    from echomodel.echo import EchoModel
+
+    newer = StandIn()
+    newer.hash = "newer"
+    graph = small_graph().add_node("chair", "nightstand")
+    with pytest.warns(UserWarning, match=r"bedroom.usda: made with weights standin, edited with weights newer; what"):
+        room = edit(root, graph, model=newer)
+    assert room.provenance.model == "newer"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        edit(root, graph, model=StandIn())
+
+    manifest = json.loads((root.parent / "bedroom.json").read_text())
+    (root.parent / "bedroom.json").write_text(json.dumps({**manifest, "preset": "released"}))
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+    before = hashes(root.parent)
+    done = echousd_command("edit", root, "--add", "chair:nightstand")
+    assert done.code == 2
+    assert "made with weights of the preset 'released' (hash standin), which do not ship; name their file" in done.err
+    assert hashes(root.parent) == before
+
+
+def test_new_meshes_keep_the_face_budget_of_the_room(root):
+    graph = small_graph().add_node("chair", "nightstand").relate("chair", "close_by", "wardrobe")
+    room = edit(root, graph, model=StandIn())
+    assert 300 < room.geometry["chair"].faces <= 600
+    assert edit(root, graph, model=StandIn(), faces=300).geometry["chair"].faces <= 300
+    saved = room.save(root.parent, preview=False).with_suffix(".json")
+    assert json.loads(saved.read_text())["faces"] == 600

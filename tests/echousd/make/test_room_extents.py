@@ -1,0 +1,66 @@
+"""Rooms from 6 to 80 square metres with the weights that ship: nothing is stacked, what has no place is said."""
+
+import numpy as np
+import pytest
+import torch
+from small_room import BARE
+
+import echousd
+from echomodel.boxes import Boxes
+from echomodel.openings import Opening
+from echomodel.rooms import generate_rooms
+from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.make.layouts import backlit, with_free_openings
+from echousd.make.verdicts import colliding
+from echousd.repair.living import living_faults
+
+
+def graph_of(room):
+    names = [f"{word}_{k}" for k, word in enumerate(room.categories)]
+    nodes = tuple(Node(name, word) for name, word in zip(names, room.categories, strict=True))
+    corners = tuple(map(tuple, room.floor_polygon.tolist()))
+    spec = RoomSpec(type=room.room_type, floor_polygon=corners, height=room.height, openings=room.openings)
+    return SceneGraph(nodes=nodes, relations=(), room=spec)
+
+
+def test_a_hall_of_twenty_and_more_is_furnished_without_a_collision():
+    halls = [hall for hall in generate_rooms(40, 11, halls=1.0) if 20 <= len(hall) <= 28]
+    graph = graph_of(min(halls, key=len))
+    room = echousd.generate(graph, shapes="boxes", seed=1, **BARE)
+    assert room.faults == ()
+    assert len(living_faults(room.graph, room.boxes)) <= 0.08 * len(graph.nodes)
+
+
+def test_in_six_square_metres_what_has_no_place_is_left_out_and_said(tmp_path):
+    words = ("double_bed", "wardrobe", "desk", "office_chair", "nightstand", "multi_seat_sofa", "dining_table")
+    nodes = tuple(Node(word, word) for word in words)
+    graph = SceneGraph(nodes=nodes, relations=(), room=RoomSpec(type="bedroom", size=(3.0, 2.0)))
+    with pytest.raises(ValueError, match="too small for its furniture"):
+        echousd.generate(graph, shapes="boxes", seed=2, **BARE)
+    (tmp_path / "flat.yaml").write_text(graph.to_yaml(), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"^flat\.yaml: the floor of 3\.00 x 2\.00 m .* is too small"):
+        echousd.generate(tmp_path / "flat.yaml", shapes="boxes", seed=2, **BARE)
+    room = echousd.generate(graph, shapes="boxes", seed=2, fit="drop", drafts=2, **BARE)
+    gone = set(words) - set(room.graph.names)
+    assert gone
+    assert {note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out")} == gone
+    assert "double_bed" in room.graph.names
+    assert colliding(room.graph, room.boxes) == ()
+    assert (np.abs(np.asarray(room.boxes.position)[:, 1]) < 1e-6).all()  # nothing is stacked
+
+
+def test_windows_that_nobody_stated_are_not_put_behind_the_television():
+    room = RoomSpec("living_room", size=(4.6, 4.4))
+    nodes = (Node("sofa", "multi_seat_sofa"), Node("stand", "tv_stand"))
+    graph = SceneGraph(room, nodes)
+    boxes = Boxes(
+        torch.tensor([(2.0, 0.85, 0.9), (1.8, 0.5, 0.4)]),
+        torch.tensor([(0.0, 0.0, -1.7), (0.0, 0.0, 1.97)]),
+        torch.tensor([0.0, np.pi]),
+    )
+    window = Opening("window", "window", 2, 1.4, 1.8, 1.3, sill=0.9)
+    stated = graph.replaced(room=room.replaced(openings=(window,)))
+    assert backlit(stated, boxes) == 1
+    moved = with_free_openings(stated, [boxes], seed=0)
+    assert any(opening.kind == "window" for opening in moved.room.openings)
+    assert backlit(moved, boxes) == 0

@@ -1,0 +1,223 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echomodel.boxes import Boxes
+from echousd.graph import Node, Relation, RoomSpec, SceneGraph
+from echousd.make.locking import with_locked_places
+from echousd.make.verdicts import relation_verdicts
+from echousd.shapes.styles import asset_names, equal_sizes, shared_assets, style_groups
+from echousd.tensors import graph_batch
+
+
+def chairs(*relations, styles=(None, None, None)):
+    nodes = tuple(Node(f"chair_{i}", "dining_chair", style=s) for i, s in enumerate(styles))
+    return SceneGraph(room=RoomSpec("dining_room"), nodes=nodes, relations=tuple(Relation(*r) for r in relations))
+
+
+def test_style_groups_join_relations_and_names():
+    graph = chairs(("chair_0", "same_style_as", "chair_1"), styles=(None, "ash", None))
+    assert style_groups(graph) == dict.fromkeys(graph.names, "ash")
+    graph = chairs(("chair_2", "same_style_as", "chair_1"), styles=("oak", None, None))
+    assert style_groups(graph) == {"chair_0": "oak", "chair_1": "set_chair_1", "chair_2": "set_chair_1"}
+
+
+def test_chairs_of_a_table_are_one_set_unless_two_styles_are_told():
+    assert style_groups(chairs()) == dict.fromkeys(("chair_0", "chair_1", "chair_2"), "set_chair_0")
+    assert set(style_groups(chairs(styles=(None, "ash", None))).values()) == {"ash"}
+    told = style_groups(chairs(styles=("oak", "ash", None)))
+    assert told == {"chair_0": "oak", "chair_1": "ash", "chair_2": "room"}
+    shelves = SceneGraph(RoomSpec("study"), (Node("a", "bookshelf"), Node("b", "bookshelf")))
+    assert set(style_groups(shelves).values()) == {"room"}
+
+
+def test_assets_are_shared_by_pieces_of_one_style_only():
+    names, kind = ["a", "b", "c"], ["stool"] * 3
+    size, style = np.ones((3, 3)), dict.fromkeys("abc", "ash")
+    assert shared_assets(names, kind, style, size) == {"a": "a", "b": "a", "c": "a"}
+    assert shared_assets(names, ["stool", "chair", "stool"], style, size) == {"a": "a", "b": "b", "c": "a"}
+    assert shared_assets(names, kind, dict.fromkeys("abc", "room"), size) == {"a": "a", "b": "b", "c": "c"}
+    assert shared_assets(names, kind, style, size * [[1], [1.01], [1]]) == {"a": "a", "b": "b", "c": "a"}
+
+
+def test_shared_assets_are_named_for_what_they_are():
+    owners = {"stool": "stool", "a": "a", "b": "a", "c": "c", "d": "c", "e": "e"}
+    names = asset_names(owners, dict.fromkeys(owners, "stool"))
+    assert names == {"stool": "stool", "a": "stool_2", "b": "stool_2", "c": "stool_3", "d": "stool_3", "e": "e"}
+
+
+def test_sizes_of_what_is_told_alike_become_equal():
+    size = np.array([[1.0, 1, 1], [1.1, 1, 1], [2.0, 1, 1]])
+    args, free = (["a", "b", "c"], ["stool"] * 3, dict.fromkeys("abc", "ash")), np.ones(3, bool)
+    np.testing.assert_allclose(equal_sizes(*args, size, free), [[1, 1, 1]] * 3)
+    # ... unless the graph tells that one is bigger, or its size is given
+    np.testing.assert_allclose(equal_sizes(*args, size, free, {(0, 2), (1, 2)}), [[1, 1, 1], [1, 1, 1], [2, 1, 1]])
+    np.testing.assert_allclose(equal_sizes(*args, size, np.array([True, True, False])), [[2, 1, 1]] * 3)
+    np.testing.assert_allclose(equal_sizes(*args, size, np.zeros(3, bool)), size)
+    np.testing.assert_allclose(equal_sizes(*args[:2], dict.fromkeys("abc", "room"), size, free), size)
+    tall = np.array([[1.0, 0.4, 1], [0.4, 2, 1]])
+    np.testing.assert_allclose(equal_sizes(["a", "b"], ["stool"] * 2, args[2], tall, free[:2]), [tall[0]] * 2)
+    long = np.array([[0.4, 0.8, 0.4], [0.42, 1.2, 0.4]])  # two pendants, of which one has to reach further down
+    np.testing.assert_allclose(equal_sizes(["a", "b"], ["pendant_lamp"] * 2, args[2], long, free[:2])[:, 1], 1.2)
+
+
+def test_lamps_in_a_row_and_twin_beds_are_of_one_style():
+    kinds = {"table": "table", **dict.fromkeys("abc", "pendant_lamp"), "l": "single_bed", "r": "single_bed"}
+    objects = "".join(f"{name}: {kind}, " for name, kind in kinds.items())
+    text = f"room: bedroom\nobjects: {{{objects}}}\nrelations: [a above table, b above table, c above l]"
+    found = style_groups(SceneGraph.from_yaml(text))
+    assert found == {"table": "room", "a": "set_a", "b": "set_a", "c": "room", "l": "set_l", "r": "set_l"}
+
+
+def test_lamps_in_a_row_do_not_join_two_told_styles():
+    objects = "chair: {category: chair, style: oak}, sofa: {category: multi_seat_sofa, style: white}"
+    objects += ", table: table, a: pendant_lamp, b: pendant_lamp"
+    told = "a above table, b above table, a same_style_as chair, b same_style_as sofa"
+    found = style_groups(SceneGraph.from_yaml(f"room: bedroom\nobjects: {{{objects}}}\nrelations: [{told}]"))
+    assert found == {"chair": "oak", "sofa": "white", "table": "room", "a": "oak", "b": "white"}
+
+
+def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
+    corners = ((1.0, 1.0), (5.0, 1.0), (5.0, 4.0), (3.0, 4.0), (3.0, 3.0), (1.0, 3.0))
+    nodes = (Node("stool", "stool"),)
+    SceneGraph(room=RoomSpec("bedroom", floor_polygon=corners), nodes=nodes).to_stage(tmp_path / "room.usda")
+    floor = graph_batch(SceneGraph.from_stage(tmp_path / "room.usda")).floor
+    np.testing.assert_allclose(floor[0], np.array(corners) - [3.0, 2.5], atol=1e-6)
+    sized = graph_batch(SceneGraph(room=RoomSpec("bedroom", size=(4.0, 3.0)), nodes=nodes)).floor
+    assert sized.tolist() == [[[-2, -1.5], [2, -1.5], [2, 1.5], [-2, 1.5]]]
+    assert graph_batch(SceneGraph(room=RoomSpec("bedroom"), nodes=nodes)).floor.isnan().all()
+
+
+def test_what_the_graph_fixes_comes_back():
+    graph = small_graph().update_node("wardrobe", size=(1.0, 2.0, 0.5), yaw=0.3)
+    graph = graph.update_node("bed", size=(1.4, 0.9, 2.0), position=(0.2, 0.0, 0.1), yaw=0.5)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
+    at = room.names.index("wardrobe")
+    np.testing.assert_allclose(room.boxes.size[at], (1.0, 2.0, 0.5))
+    assert float(room.boxes.yaw[at]) == pytest.approx(0.3)
+    assert room.boxes.position[0].tolist() == pytest.approx([0.2, 0.0, 0.1])
+
+
+def test_floor_away_from_the_origin_takes_the_furniture_along():
+    corners = ((8.0, 3.0), (12.0, 3.0), (12.0, 7.0), (8.0, 7.0))
+    room = echousd.generate(
+        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False, **BARE
+    )
+    np.testing.assert_allclose(room.boxes.position[0], (10.0, 0.0, 4.4), atol=1e-5)
+
+
+def test_repair_keeps_the_graph():
+    class Heap(StandIn):
+        def sample_layout(self, graph, **kwargs):
+            found = super().sample_layout(graph, **kwargs)
+            return Boxes(found.size, found.position * torch.tensor([0.3, 1.0, 0.3]), found.yaw)
+
+    graph = small_graph().relate("nightstand_left", "front", "bed")
+    heap = echousd.generate(graph, model=Heap(), shapes="boxes", repair=False, **BARE)
+    assert any(v.state == "broken" for v in heap.verdicts)
+    room = echousd.generate(graph, model=Heap(), shapes="boxes", **BARE)
+    assert [v.state for v in room.verdicts if v.state != "unmeasured"] == ["kept"] * 5
+    assert room.notes == ()
+    assert room.assets["nightstand_right"] == room.assets["nightstand_left"] == "nightstand"
+
+
+def test_verdicts_are_those_of_the_rules():
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    by = {(v.subject, v.predicate): v for v in room.verdicts}
+    assert by["lamp", "standing_on"].state == "kept"
+    assert by["nightstand_left", "same_style_as"].state == "unmeasured"
+    assert by["nightstand_left", "same_style_as"].margin is None
+    assert by["wardrobe", "taller_than"].margin > 0
+    flat = Boxes(room.boxes.size * torch.tensor([1, 0.1, 1]), room.boxes.position, room.boxes.yaw)
+    assert {v.predicate: v.state for v in relation_verdicts(room.graph, flat)}["standing_on"] == "broken"
+    assert len(graph_batch(room.graph).triplets) == 5
+
+
+def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
+    small_graph().to_stage(tmp_path / "graph.usda")
+    told = []
+    room = echousd.generate(
+        tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state), **BARE
+    )
+    assert room.graph.replaced(room=small_graph().room) == small_graph()
+    assert {opening.kind for opening in room.graph.room.openings} == {"door", "window"}
+    assert room.provenance.source == "graph.usda"
+    assert {stage for stage, *_ in told} == {"read", "load", "layout", "repair", "meshes"} == set(room.timings)
+    assert ("meshes", 6, 6) in told
+    assert told[-1] == ("repair", 1, 1)  # moved apart by their solids
+
+
+class NoShapes(StandIn):
+    branches = frozenset({"layout"})
+
+
+class Empty(StandIn):
+    def sample_shapes(self, graph, boxes, **kwargs):
+        return torch.ones(graph.num_nodes, 64, 64, 64)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        ({"shapes": "cubes"}, "shapes is 'cubes', allowed: parts, sdf, boxes"),
+        ({"layouts": 0}, "layouts is 0, allowed: 1 to 1000"),
+        ({"seed": -1}, "seed is -1, allowed: 0 to 9223372036854775807"),
+        ({"model": NoShapes()}, "no shape branch; use shapes 'boxes'"),
+        ({"model": Empty()}, "shape of 'bed': TSDF holds no surface"),
+        ({"model": "/nowhere.safetensors"}, "/nowhere.safetensors"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, text):
+    with pytest.raises(ValueError, match=text):
+        echousd.generate(small_graph(), **{"model": StandIn(), **arguments})
+
+
+def test_more_objects_than_a_room_may_hold_are_refused():
+    crowd = SceneGraph("living_room", tuple(Node(f"chair_{i}", "dining_chair") for i in range(201)))
+    with pytest.raises(ValueError, match="the graph: 201 objects, allowed in one room: 200"):
+        echousd.generate(crowd, model=StandIn(), shapes="boxes", **BARE)
+
+
+def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -> None:
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("bed", "double_bed"), Node("wardrobe", "wardrobe")))
+    first = echousd.generate(graph, seed=1, shapes="boxes", **BARE)
+    first.save(tmp_path / "room", preview=False)
+    locked = graph.lock("wardrobe").relate("bed", "left", "wardrobe")
+    again = echousd.generate(locked, seed=9, shapes="boxes", earlier=tmp_path / "room", **BARE)
+    for field in ("size", "position", "yaw"):
+        assert torch.allclose(getattr(again.boxes, field)[1], getattr(first.boxes, field)[1], atol=2e-3)
+    stage = tmp_path / "room" / "room.usda"
+    text = SceneGraph.from_stage(str(stage)).lock("wardrobe")
+    assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
+    homeless = echousd.generate(locked, seed=9, shapes="boxes", **BARE)
+    assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes
+    assert with_locked_places(locked.update_node("wardrobe", position=(0.5, 0.0, 0.5)))[1] == ()
+
+
+def test_what_cannot_fit_is_said_or_left_out() -> None:
+    nodes = tuple(Node(f"wardrobe_{i}", "wardrobe", size=(1.4, 2.0, 0.5)) for i in range(8))
+    nodes += (Node("bed", "double_bed", size=(1.8, 1.0, 2.1)),)
+    graph = SceneGraph(RoomSpec("bedroom", size=(2.6, 2.9)), nodes)
+    with pytest.raises(ValueError, match="too small for its furniture"):
+        echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", fit="drop", **BARE)
+    assert not room.faults
+    assert "bed" in room.names
+    gone = sorted(set(graph.names) - set(room.names))
+    assert gone
+    said = sorted(note.split(":")[1].split(",")[0].strip() for note in room.notes if note.startswith("left out"))
+    assert said == gone
+    with pytest.raises(ValueError, match="fit is 'squeeze', allowed: keep or drop"):
+        echousd.generate(graph, model=StandIn(), shapes="boxes", fit="squeeze", **BARE)
+
+
+def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
+    nodes = (Node("bed", "double_bed", size=(0.18, 0.9, 2.0)), Node("wardrobe", "wardrobe", size=(0.9, 2.0, 0.6)))
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), nodes, ())
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
+    assert room.boxes.size[0].tolist() == pytest.approx([0.18, 0.9, 2.0])
+    assert room.notes == ("bed is 0.18 m wide as stated; such furniture: 1.32 to 3.28 m",)

@@ -1,0 +1,235 @@
+"""Wishes about a finished room: where things stand, how they are turned, what is locked; and those of a layer."""
+
+import hashlib
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pxr import Sdf, Usd, UsdGeom
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echousd.graph import GraphError
+from echousd.make.reading import read_room
+from echousd.make.wishes import Wishes, wished
+
+
+@pytest.fixture(autouse=True)
+def model(monkeypatch):
+    from echomodel.echo import EchoModel
+
+    monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
+
+
+@pytest.fixture
+def root(tmp_path):
+    room = echousd.generate(small_graph(), seed=5, model=StandIn(), shapes="boxes", **BARE)
+    return room.save(tmp_path / "bedroom", preview=False)
+
+
+def box(root, name):
+    saved = read_room(root)
+    row = saved.graph.names.index(name)
+    return [np.asarray(v[row], float) for v in (saved.boxes.size, saved.boxes.position, saved.boxes.yaw)]
+
+
+def files(folder):
+    found = (p for p in folder.rglob("*") if p.is_file() and p.parent.name != ".redo")
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in found}
+
+
+def test_move_turn_lock_and_restyle_at_once(root, echousd_command):
+    before = files(root.parent)
+    words = ("--move", "wardrobe:1.2,1.0", "--turn", "wardrobe:180", "--lock", "bed", "--restyle", "bed:oak")
+    done = echousd_command("edit", root, "--shapes", "boxes", *words)
+    assert done.code in (0, 1), done.err  # the wish may cost a relation
+    _, position, yaw = box(root, "wardrobe")
+    np.testing.assert_allclose(position, (1.2, 0.0, 1.0), atol=1e-3)
+    assert abs(math.remainder(float(yaw) - math.pi, 2 * math.pi)) < 1e-3
+    graph = echousd.read_graph(root)
+    assert graph.node("bed").locked
+    assert graph.node("bed").style == "oak"
+    after = files(root.parent)
+    assert after["wardrobe_geo.usdc"] == before["wardrobe_geo.usdc"]
+
+
+def test_another_category_keeps_its_place(root, echousd_command):
+    _, position, yaw = box(root, "nightstand_right")
+    done = echousd_command("edit", root, "--shapes", "boxes", "--relabel", "nightstand_right:table_lamp")
+    assert done.code in (0, 1), done.err
+    _, after, turned = box(root, "nightstand_right")
+    np.testing.assert_allclose(after, position, atol=2e-3)
+    assert float(turned) == pytest.approx(float(yaw), abs=1e-3)
+
+
+def test_dry_run_says_what_would_happen_and_writes_nothing(root, echousd_command):
+    before = files(root.parent)
+    done = echousd_command("edit", root, "--add", "chair:stool", "--relate", "lamp left of bed", "--dry-run")
+    assert done.code == 0, done.err
+    assert "+ object chair (stool)" in done.out
+    assert "new      chair" in done.out
+    assert "moves    lamp" in done.out
+    assert files(root.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--move", "bed:here"), "move: found 'bed:here', allowed: name:x,z or name:x,y,z, metres"),
+        (("--resize", "bed:1,2"), "resize: found 'bed:1,2', allowed: name:x,y,z, metres"),
+        (("--turn", "bed:east"), "object 'bed': yaw: found 'east', allowed: radians, or degrees as in 90 deg"),
+        (("--lock", "sofa"), "no object 'sofa' in this graph"),
+    ],
+)
+def test_wishes_that_cannot_be_read(root, echousd_command, words, said):
+    done = echousd_command("edit", root, *words)
+    assert done.code == 2
+    assert said in done.err
+
+
+def test_unlocked_things_may_move_again(root):
+    saved = read_room(root)
+    locked = wished(saved, Wishes(lock=("bed",)))
+    assert locked.node("bed").position is not None
+    free = locked.update_node("bed", locked=False, position=None, yaw=None)
+    assert free == saved.graph
+
+
+def test_titles_in_any_script_name_what_changes(tmp_path):
+    graph = small_graph().update_node("bed", title="Große Liege").update_node("wardrobe", title="衣柜")
+    root = echousd.generate(graph, seed=5, model=StandIn(), shapes="boxes", **BARE).save(
+        tmp_path / "bedroom", preview=False
+    )
+    saved = read_room(root)
+    by_title = Wishes(
+        lock=("Große Liege",), move=("衣柜:1.2,1.0",), turn=("衣柜:180",), resize=("Große Liege:1.6,0.5,2.0",),
+        restyle=("Große Liege:oak",), add=("Größter Stuhl:stool",), relate=("Größter Stuhl close by 衣柜",),
+    )  # fmt: skip
+    by_name = Wishes(
+        lock=("bed",), move=("wardrobe:1.2,1.0",), turn=("wardrobe:180",), resize=("bed:1.6,0.5,2.0",),
+        restyle=("bed:oak",), add=("Groesster_Stuhl:stool",), relate=("Groesster_Stuhl close by wardrobe",),
+    )  # fmt: skip
+    changed = wished(saved, by_title)
+    assert changed.node("Groesster_Stuhl").title == "Größter Stuhl"
+    assert changed.update_node("Groesster_Stuhl", title=None) == wished(saved, by_name)
+    assert wished(saved, Wishes(remove=("衣柜",))) == saved.graph.remove_node("wardrobe")
+    assert wished(saved, Wishes(relabel=("衣柜:desk",))) == wished(saved, Wishes(relabel=("wardrobe:desk",)))
+    assert not wished(saved, Wishes(lock=("衣柜",), unlock=("衣柜",))).node("wardrobe").locked
+    for twice in (saved, replace(saved, graph=saved.graph.update_node("lamp", title="Große Liege"))):
+        with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
+            wished(twice, Wishes(add=("Große Liege:single_bed",)))
+    with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
+        wished(saved, Wishes(add=("Große Liege:single_bed",)))
+
+
+def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
+    path = root.with_name("mine.usda")
+    layer = Sdf.Layer.CreateNew(str(path))
+    layer.subLayerPaths = [f"./{root.name}"]
+    stage = Usd.Stage.Open(layer)
+    place = stage.GetPrimAtPath("/Room/Objects/wardrobe").GetAttribute("xformOp:translate")
+    place.Set((1.0, 0.0, 1.1))
+    layer.Save()
+    assert UsdGeom.GetStageUpAxis(stage) == "Y"
+    done = echousd_command("update", path, "--dry-run")
+    assert done.code == 0, done.err
+    assert "locked   wardrobe, where mine.usda puts it" in done.out
+    done = echousd_command("update", root.parent)  # the one layer there over its room
+    assert done.code in (0, 1), done.err
+    node = echousd.read_graph(root).node("wardrobe")
+    assert node.locked
+    np.testing.assert_allclose(node.position, (1.0, 0.0, 1.1), atol=1e-4)
+    np.testing.assert_allclose(box(root, "wardrobe")[1], (1.0, 0.0, 1.1), atol=1e-3)
+    done = echousd_command("update", path)
+    assert done.code == 2
+    assert "mine.usda: changes nothing about the room" in done.err
+    done = echousd_command("update", root)
+    assert done.code == 2
+    assert "the room's own root layer; name the stronger layer" in done.err
+    path.rename(root.parent.parent / path.name)
+    done = echousd_command("update", root.parent)
+    assert done.code == 2
+    assert "layers over bedroom.usda in this folder: none; name the one that changes it" in done.err
+
+
+def test_edits_are_taken_back_byte_for_byte(root, echousd_command):
+    states = [files(root.parent)]
+    assert echousd_command("edit", root, "--undo").err == f"error: {root}: no edit to take back\n"
+    for words in (("--add", "chair:nightstand"), ("--remove", "wardrobe", "--move", "chair:1.2,1.1")):
+        done = echousd_command("edit", root, "--shapes", "boxes", *words)
+        assert done.code in (0, 1), done.err
+        states.append(files(root.parent))
+    history = json.loads(root.with_suffix(".json").read_text())["history"]
+    assert [entry["number"] for entry in history] == [1, 2]
+    assert "+ object chair (nightstand)" in history[0]["steps"]
+    done = echousd_command("edit", root, "--undo")
+    assert done.code == 0, done.err
+    assert "undone   - object wardrobe (wardrobe)" in done.out
+    assert told(root.parent) == without_pictures(states[1])
+    read_room(root)
+    assert echousd_command("edit", root, "--undo").code == 0
+    assert told(root.parent) == without_pictures(states[0])
+    assert not (root.parent / "history").exists()
+    for state in states[1:]:
+        done = echousd_command("edit", root, "--redo")
+        assert done.code == 0, done.err
+        assert told(root.parent) == without_pictures(state)
+        read_room(root)
+    assert "redone   - object wardrobe (wardrobe)" in done.out
+    assert not (root.parent / ".redo").exists()
+    nothing = f"error: {root}: no edit that was taken back can be made again\n"
+    assert echousd_command("edit", root, "--redo").err == nothing
+    assert echousd_command("edit", root, "--undo").code == 0
+    assert told(root.parent) == without_pictures(states[1])
+    assert echousd_command("edit", root, "--shapes", "boxes", "--lock", "bed").code in (0, 1)
+    assert echousd_command("edit", root, "--redo").err == nothing  # another edit was made in its place
+    assert not (root.parent / ".redo").exists()
+
+
+def test_a_damaged_archive_of_what_was_taken_back_changes_nothing(root, echousd_command):
+    assert echousd_command("edit", root, "--shapes", "boxes", "--add", "chair:nightstand").code in (0, 1)
+    assert echousd_command("edit", root, "--undo").code == 0
+    before, (archive,) = files(root.parent), (root.parent / ".redo").iterdir()
+    whole = archive.read_bytes()
+    for damaged in (whole[:200], whole[:-26], whole[-60:]):
+        archive.write_bytes(damaged)
+        done = echousd_command("edit", root, "--redo")
+        assert done.code == 2
+        assert "1.zip: is damaged" in done.err
+    archive.write_bytes(whole)
+    (archive.with_name("0.zip")).write_bytes(b"nothing")  # another one, which is not needed
+    assert echousd_command("edit", root, "--redo").code == 0
+    assert echousd_command("edit", root, "--undo").code == 0
+    before = files(root.parent)
+    archive.unlink()
+    assert "0.zip: is damaged" in echousd_command("edit", root, "--redo").err
+    archive.with_name("0.zip").unlink(missing_ok=True)
+    assert echousd_command("edit", root, "--redo").code == 2
+    assert files(root.parent) == before
+    done = echousd_command("edit", root, "--redo", "--lock", "bed")
+    assert "--redo makes it again and does nothing else" in done.err
+
+
+def without_pictures(found):
+    return {name: value for name, value in found.items() if not name.endswith(".png") or "bedroom" not in name}
+
+
+def told(folder):
+    return without_pictures(files(folder))
+
+
+def test_an_edit_is_not_taken_back_over_somebody_elses_work(root, echousd_command):
+    assert echousd_command("edit", root, "--shapes", "boxes", "--add", "chair:nightstand").code in (0, 1)
+    layer = Sdf.Layer.FindOrOpen(str(root.parent / "layers" / "materials.usda"))
+    layer.comment = "mine"
+    layer.Save()
+    before = files(root.parent)
+    done = echousd_command("edit", root, "--undo")
+    assert done.code == 2
+    assert "materials.usda: was changed since" in done.err
+    assert files(root.parent) == before
+    done = echousd_command("edit", root, "--undo", "--lock", "bed")
+    assert done.code == 2
+    assert "--undo takes the last edit back and does nothing else" in done.err

@@ -1,0 +1,139 @@
+"""Patterns, their images, and the harmonies of a room."""
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from pxr import Usd, UsdShade
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echomodel.furniture.solids import Block
+from echousd.checks.validity import find_faults
+from echousd.exporting import export
+from echousd.options import RoomOptions
+from echousd.shapes.finishes import baking
+from echousd.shapes.finishes.harmonies import HARMONIES, linear
+from echousd.shapes.finishes.patterns import PATTERNS, SIZE, relief
+from echousd.shapes.finishes.slots import SLOTS
+from echousd.shapes.geometry import Origin
+from echousd.shapes.joinery import assembled
+from echousd.shapes.looks import look
+from echousd.shapes.surface import surface
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_patterns_tile_and_keep_their_colour(name):
+    tone = relief(name).tone
+    assert np.isfinite(tone).all()
+    assert 0.85 < tone.mean() < 1.15
+    inside = np.abs(np.diff(tone, axis=1)).reshape(len(tone), len(tone[0]) - 1, -1).mean((0, 2)).max()
+    seam = np.abs(tone[:, 0] - tone[:, -1]).mean()
+    assert seam < 1.5 * inside + 0.02, "a seam between two tiles"
+
+
+def test_images_hold_the_colour_that_was_asked_for():
+    color = linear("b98f5f")
+    content = baking.color_image("wood", color, "oak")
+    assert content == baking.color_image.__wrapped__("wood", color, "oak")
+    pixels = (np.asarray(Image.open(io.BytesIO(content))) / 255) ** 2.2
+    assert pixels.shape == (SIZE, SIZE, 3)
+    assert pixels.mean((0, 1)) == pytest.approx(color, abs=0.03)
+    normal = np.asarray(Image.open(io.BytesIO(baking.normal_image("woven", 0.22)))) / 127.5 - 1
+    assert np.linalg.norm(normal, axis=-1) == pytest.approx(1, abs=0.2)
+    assert normal[..., 2].min() > 0
+    assert baking.normal_image("leaf", 0.3) is None
+
+
+def test_every_slot_has_a_look_in_every_harmony():
+    assert len(HARMONIES) >= 8
+    for harmony in HARMONIES:
+        for slot in SLOTS:
+            assert all(0 <= c <= 1 for c in look(harmony, slot).color)
+        assert look(harmony, "wood", 0) != look(harmony, "wood", 1)
+        assert look(harmony, "fabric", 0) != look(harmony, "fabric", 1)
+
+
+def test_fibres_run_along_the_longer_side_of_a_board():
+    boards = [
+        Block(centre=np.array([0, 0.5, 0.0]), half=np.array([0.02, 0.5, 0.02])),
+        Block(centre=np.array([0.5, 0.02, 0.0]), half=np.array([0.48, 0.02, 0.05])),
+    ]
+    made = assembled(boards, np.array([1.0, 1.0, 0.1]), faces=500, origin=Origin("parts"))
+    form = surface(made.parts[0].mesh, made.parts[0].slots)
+    corners, st = form.points[form.faces], form.st[form.st_index].reshape(-1, 3, 2)
+    extent, spread = np.ptp(corners, axis=1), np.ptp(st, axis=1) * SLOTS["wood"].metres
+    long = extent.max(1) > 0.8
+    assert long.any()
+    assert spread[long, 0] == pytest.approx(extent[long].max(1), abs=0.02)
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = replace(room, options=RoomOptions(dress="full", walls=True))
+    return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
+
+
+def test_palettes_are_variants_that_change_colours_alone(root):
+    stage = Usd.Stage.Open(str(root))
+    variants = stage.GetPrimAtPath("/Room").GetVariantSet("palette")
+    assert set(variants.GetVariantNames()) == set(HARMONIES)
+    chosen, shown = variants.GetVariantSelection(), []
+    for name in sorted(HARMONIES):
+        variants.SetVariantSelection(name)
+        image = UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/floor/image"))
+        shown.append(tuple(image.GetInput("scale").Get()))
+        if name == chosen:
+            assert shown[-1] == (1, 1, 1, 1)
+    assert len(set(shown)) >= 8
+    assert stage.GetCompositionErrors() == []
+
+
+def test_images_are_there_and_small(root):
+    images = [path for path in (root.parent / "textures").iterdir() if path.suffix == ".jpg"]
+    assert images
+    assert sum(path.stat().st_size for path in images) < 3e6
+    stage = Usd.Stage.Open(str(root))
+    for prim in stage.Traverse():
+        shader = UsdShade.Shader(prim)
+        if shader and shader.GetInput("file"):
+            assert shader.GetInput("file").Get().resolvedPath, prim
+
+
+def test_materialx_stands_beside_preview_surfaces(root, tmp_path):
+    plain = Usd.Stage.Open(str(root))
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = replace(room, options=RoomOptions(dress="full", walls=True, materialx=True))
+    made = room.save(tmp_path / "bedroom", preview=False)
+    assert json.loads(made.with_suffix(".json").read_text())["materialx"] is True
+    stage = Usd.Stage.Open(str(made))
+    assert stage.GetCompositionErrors() == []
+    tints = {name: _tint_of(stage, name) for name in sorted(HARMONIES)}
+    assert len(set(tints.values())) >= 8
+    for prim in stage.GetPrimAtPath("/Room/Looks").GetChildren():
+        material = UsdShade.Material(prim)
+        assert not UsdShade.Material(plain.GetPrimAtPath(prim.GetPath())).GetSurfaceOutput("mtlx")
+        assert material.ComputeSurfaceSource("mtlx")[0].GetShaderId() == "ND_UsdPreviewSurface_surfaceshader"
+        assert material.ComputeSurfaceSource()[0].GetShaderId() == "UsdPreviewSurface"
+        for child in prim.GetChildren():
+            shader = UsdShade.Shader(child)
+            if shader.GetShaderId().startswith("ND_image") and shader.GetInput("file").Get():
+                assert shader.GetInput("file").Get().resolvedPath, child
+            if shader.GetShaderId() == "ND_multiply_color3":
+                scale = UsdShade.Shader(prim.GetChild("image")).GetInput("scale").Get()
+                factor = shader.GetInput("in2").Get()
+                assert tuple(factor) == pytest.approx(tuple(scale)[:3] if scale else (1, 1, 1))
+    assert find_faults(stage) == ((), ())
+    flat = Usd.Stage.Open(str(export(made, tmp_path / "flat.usdc", pictures=False)))
+    floor = UsdShade.Material(flat.GetPrimAtPath("/Room/Looks/floor"))
+    assert not floor.GetSurfaceOutput("mtlx")
+    assert {child.GetName() for child in floor.GetPrim().GetChildren()} == {"surface", "st"}
+
+
+def _tint_of(stage, harmony):
+    stage.GetPrimAtPath("/Room").GetVariantSet("palette").SetVariantSelection(harmony)
+    return tuple(UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/floor/mtlx_tint")).GetInput("in2").Get())

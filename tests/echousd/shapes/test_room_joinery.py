@@ -1,0 +1,146 @@
+"""Geometry from solids: closed and in its box, within the budget, with colliders, weight and bodies that move."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from echomodel.furniture import solids
+from echomodel.furniture.description import WIDTH, piece_of
+from echousd.shapes.geometry import FRAME, Origin
+from echousd.shapes.joinery import assembled, within_budget
+
+SIZE = np.array([0.9, 1.0, 0.45])
+BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "parts_cost.py"
+
+
+def piece(category: str, size: np.ndarray = SIZE, seed: int = 0, faces: int = 5000):
+    parts = solids(category, *piece_of(np.random.default_rng(seed).uniform(-1, 1, WIDTH)), size)
+    return assembled(parts, size, faces=faces, origin=Origin("parts"))
+
+
+@pytest.mark.parametrize("category", ["dresser", "plant", "multi_seat_sofa", "bookshelf", "tv", "pendant_lamp"])
+def test_a_piece_is_closed_fills_its_box_and_keeps_the_budget(category):
+    for faces in (5000, 800, 100):
+        made = piece(category, faces=faces)
+        assert all(part.mesh.is_watertight for part in made.parts)  # each solid: boards that touch share no vertices
+        assert 0 < made.faces <= faces
+        np.testing.assert_allclose(made.mesh.extents, SIZE, atol=1e-6)
+        assert sorted(np.concatenate(list(made.parts[0].slots.values()))) == list(range(len(made.parts[0].mesh.faces)))
+
+
+def test_more_faces_are_finer_and_the_second_level_is_coarser():
+    parts = solids("armchair", *piece_of(np.zeros(WIDTH)), SIZE)
+    counts = [sum(len(p.faces) for p in within_budget(parts, SIZE, faces)) for faces in (400, 1500, 9000)]
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+    made = piece("armchair")
+    assert sum(len(part.mesh.faces) for part in made.coarse) < made.faces
+    assert [part.name for part in made.coarse] == [part.name for part in made.parts]
+    assert all(set(one.slots) == set(two.slots) for one, two in zip(made.coarse, made.parts, strict=True))
+
+
+def test_colliders_are_convex_and_hold_the_geometry():
+    for category in ("dining_table", "bookshelf", "office_chair"):
+        made = piece(category)
+        for collider in made.colliders:
+            assert collider.approximation == "convexHull"
+            hull = collider.mesh.convex_hull
+            assert abs(hull.volume - collider.mesh.volume) <= 1e-6 + 1e-3 * hull.volume
+        low = np.min([c.mesh.bounds[0] for c in made.colliders], axis=0)
+        high = np.max([c.mesh.bounds[1] for c in made.colliders], axis=0)
+        np.testing.assert_allclose(high - low, SIZE, atol=0.03)
+    table = piece("dining_table", np.array([1.6, 0.75, 0.9]))
+    assert len(table.colliders) > 2  # a chair fits below
+
+
+def test_drawers_are_bodies_of_a_dresser():
+    made = next(m for m in (piece("dresser", seed=seed) for seed in range(5)) if m.joints)
+    bodies = {part.body for part in made.parts}
+    assert bodies == {FRAME} | {joint.body for joint in made.joints} == set(made.masses)
+    assert {collider.body for collider in made.colliders} == bodies
+    assert made.mass is not None
+    assert sum(mass.mass for mass in made.masses.values()) == pytest.approx(made.mass.mass, rel=1e-6)
+    assert 5 < made.mass.mass < 150
+    assert (made.mass.inertia > 0).all()
+    assert (np.abs(made.mass.centre[[0, 2]]) < SIZE[[0, 2]] / 2).all()
+
+
+def test_what_needs_more_boxes_than_the_budget_leaves_the_smallest_out():
+    made = piece("bookshelf", np.array([2.0, 2.2, 0.35]), faces=100)
+    assert made.faces <= 100
+    np.testing.assert_allclose(made.mesh.extents, [2.0, 2.2, 0.35], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "size", [(0.01, 0.01, 0.01), (40.0, 2.2, 0.6), (5.0, 0.01, 5.0), (0.3, 10.0, 0.3), (1.0, 1.0, 0.001)]
+)
+@pytest.mark.parametrize("category", ["wardrobe", "bookshelf", "floor_lamp", "plant", "kids_bed", "office_chair"])
+def test_boxes_of_any_size_are_filled(category, size):
+    made = piece(category, np.array(size))
+    assert 0 < made.faces <= 5000
+    assert made.watertight
+    np.testing.assert_allclose(made.mesh.extents, size, atol=1e-6)
+    assert all(np.isfinite(collider.mesh.vertices).all() for collider in made.colliders)
+
+
+def test_sizes_that_are_none_are_refused():
+    for size in ((0.0, 1.0, 1.0), (float("nan"), 1.0, 1.0), (-1.0, 1.0, 1.0)):
+        with pytest.raises(ValueError, match=r"size of chair is \[.*\], need three positive numbers in metres"):
+            piece("chair", np.array(size))
+
+
+def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    import echousd
+    from echousd.checks.mesh_rules import extents
+    from echousd.checks.reading import Reading
+    from echousd.graph import Node, RoomSpec, SceneGraph
+
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("chest", "dresser", size=(0.9, 1.0, 0.45)),), ())
+    room = echousd.generate(graph, seed=1)
+    assert room.provenance.shapes == "parts"
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    chest = stage.GetPrimAtPath("/Room/Objects/chest")
+    assert chest.HasAPI(UsdPhysics.RigidBodyAPI)
+    assert not [prim for prim in Usd.PrimRange(chest) if prim.IsA(UsdPhysics.Joint)]
+
+    def faces() -> int:
+        meshes = (UsdGeom.Mesh(prim) for prim in Usd.PrimRange(chest) if prim.IsA(UsdGeom.Mesh))
+        return sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in meshes)
+
+    fine = faces()
+    chest.GetVariantSet("LOD").SetVariantSelection("low")
+    assert faces() < fine
+    chest.GetVariantSet("articulation").SetVariantSelection("articulated")
+    assert not chest.HasAPI(UsdPhysics.RigidBodyAPI)
+    joints = [UsdPhysics.Joint(prim) for prim in Usd.PrimRange(chest) if prim.IsA(UsdPhysics.Joint)]
+    assert len(joints) >= 2
+    for joint in joints:
+        ends = [rel.GetTargets()[0] for rel in (joint.GetBody0Rel(), joint.GetBody1Rel())]
+        assert all(stage.GetPrimAtPath(end).HasAPI(UsdPhysics.RigidBodyAPI) for end in ends)
+        assert str(ends[0]).endswith("_frame")
+        slide = UsdPhysics.PrismaticJoint(joint)
+        assert 0 == slide.GetLowerLimitAttr().Get() < slide.GetUpperLimitAttr().Get() < 0.45
+    drawer = UsdGeom.Xformable(stage.GetPrimAtPath(joints[0].GetBody1Rel().GetTargets()[0]))
+    drawer.AddTranslateOp().Set((0.0, 0.0, 0.4))
+    for state in ("articulated", "static"):  # pulled out, it is as good
+        chest.GetVariantSet("articulation").SetVariantSelection(state)
+        assert [str(found.path) for found in extents(Reading(stage))] == []
+
+
+def test_the_benchmark_weighs_what_a_room_writes(tmp_path):
+    import echousd
+    from echousd.graph import Node, RoomSpec, SceneGraph
+
+    graph = SceneGraph(RoomSpec("bedroom", size=(4.0, 4.0)), (Node("one", "dresser", size=(0.9, 1.0, 0.45)),), ())
+    room = echousd.generate(graph, seed=1)
+    spec = importlib.util.spec_from_file_location("parts_cost", BENCHMARK)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    (name,) = room.asset_users
+    weighed = module.on_disk(room.geometry["one"], "dresser")
+    files = room.save(tmp_path / "room", preview=False).parent.glob(f"assets/{name}/*")
+    assert weighed == pytest.approx(sum(path.stat().st_size for path in files), rel=0.05)

@@ -1,0 +1,152 @@
+"""The shell: walls with holes where the openings are, solid and watertight, parts that a host can tell apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+from pxr import Usd, UsdGeom, UsdPhysics, UsdValidation
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.openings import Opening, hinge_point, inward_normal, rectangle, swing_area
+from echousd.checks import check
+from echousd.checks.mesh_rules import extents
+from echousd.checks.reading import Reading
+from echousd.graph import RoomSpec
+from echousd.options import RoomOptions
+from echousd.shapes.walls import WALL, ceiling, outline, walls
+
+NOTCHED = np.array([(0, 0), (1, 0), (1, 1), (4, 1), (4, 3), (0, 3)], float)
+DOOR = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge="right")
+WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)
+PASSAGE = Opening("way", "passage", 2, 2.0, 1.0, 2.1)
+
+
+def pieces(parts) -> dict:
+    return {piece.name: piece.mesh for part in parts for piece in part.pieces} | (
+        pieces([one for part in parts for one in part.inner]) if parts else {}
+    )
+
+
+@pytest.mark.parametrize("polygon", [rectangle(4.0, 3.0), rectangle(4.0, 3.0)[::-1].copy(), NOTCHED])
+def test_walls_fill_the_ring_around_the_floor_but_for_the_openings(polygon) -> None:
+    openings = (DOOR, WINDOW, PASSAGE) if len(polygon) == 4 else (DOOR,)
+    made = pieces(walls(polygon, 2.6, openings))
+    assert all(mesh.is_watertight and mesh.volume > 0 for mesh in made.values())
+    solid = sum(made[f"Wall_{edge + 1}_mesh"].volume for edge in range(len(polygon)))
+    ring = shapely.Polygon(outline(polygon)).area - shapely.Polygon(polygon).area
+    assert solid == pytest.approx(ring * 2.7 - WALL * sum(o.width * o.height for o in openings), rel=1e-6)
+
+
+def test_parts_of_openings_stand_in_their_holes() -> None:
+    made = pieces(walls(rectangle(4.0, 3.0), 2.6, (DOOR, WINDOW, PASSAGE)))
+    leaf, glass = made["Wall_3_door_leaf"].bounds, made["Wall_1_window_glass"].bounds
+    np.testing.assert_allclose(leaf[:, 0], [2.0 - 1.3, 2.0 - 0.4], atol=0.04)  # wall 2 runs from +x to -x
+    assert leaf[0, 2] > 1.49
+    assert leaf[1, 2] < 1.5 + WALL
+    np.testing.assert_allclose(glass[:, 1], [0.9, 2.2], atol=0.03)
+    assert -1.5 - WALL < glass[0, 2] < glass[1, 2] < -1.5
+    assert "Wall_3_way_frame" in made
+    assert "Wall_3_way_leaf" not in made
+    skirting = made["Wall_3_skirting"]
+    middle_of_door = np.array([[2.0 - 0.85, 0.04, 1.495]])
+    assert not skirting.contains(middle_of_door)[0]
+    assert skirting.contains([[1.9, 0.04, 1.495]])[0]
+
+
+def test_the_handle_is_away_from_the_hinges() -> None:
+    for hinge, side in (("left", 1), ("right", -1)):  # facing -z from inside, -x is on the left
+        door = Opening("door", "door", 0, 1.0, 0.9, 2.0, hinge=hinge)
+        handle = pieces(walls(rectangle(4.0, 3.0), 2.6, (door,)))["Wall_1_door_handle"].bounds.mean(0)
+        assert side * (handle[0] - (-2.0 + 1.45)) > 0.15
+
+
+def test_ceiling_lies_on_the_walls() -> None:
+    slab = ceiling(NOTCHED, 2.6).pieces[0].mesh
+    assert slab.bounds[0, 1] == pytest.approx(2.6)
+    assert slab.volume == pytest.approx(shapely.Polygon(NOTCHED).area * 0.1)
+
+
+def test_prims_of_the_shell(tmp_path) -> None:
+    spec = RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW))
+    graph = small_graph().replaced(room=spec)
+    options = RoomOptions(walls=True, ceiling=True, dress="none")
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    shell = stage.GetPrimAtPath("/Room/Shell")
+    pieces = [prim for prim in shell.GetChildren() if prim.IsA(UsdGeom.Xformable)]
+    names = [prim.GetName() for prim in pieces]
+    assert names == ["Floor", "Wall_1", "Wall_2", "Wall_3", "Wall_4", "Ceiling"]
+    label = "semantics:labels:category"
+    door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")
+    assert Usd.ModelAPI(door).GetKind() == "subcomponent"
+    assert list(door.GetAttribute(label).Get()) == ["door"]
+    assert list(stage.GetPrimAtPath("/Room/Shell/Wall_1/Wall_1_window").GetAttribute(label).Get()) == ["window"]
+    assert all(Usd.ModelAPI(prim).GetKind() == "component" for prim in pieces)
+    collides = {p.GetName() for p in Usd.PrimRange(shell) if p.HasAPI(UsdPhysics.CollisionAPI)}
+    assert {"Floor_mesh", "Wall_1_mesh", "Wall_3_door_leaf", "Wall_1_window_glass", "Ceiling_mesh"} <= collides
+    assert "Wall_1_skirting" not in collides
+    for prim in Usd.PrimRange(shell):
+        assert prim.GetTypeName() != "Mesh" or UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(), prim.GetPath()
+
+
+@pytest.mark.parametrize("swing", ["in", "out"])
+@pytest.mark.parametrize("hinge", ["left", "right"])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_leaf_opens_about_its_hinge_to_the_side_that_it_should(swing, hinge, turn) -> None:
+    plan = rectangle(4.0, 3.0)[::turn].copy()
+    door = Opening("door", "door", 2, 0.4, 0.9, 2.0, hinge=hinge, swing=swing)
+    wall = walls(plan, 2.6, (door,))[2]
+    (leaf,) = wall.inner[0].inner
+    mesh = next(piece.mesh for piece in leaf.pieces if piece.name.endswith("leaf")).copy()
+    jamb, closed = hinge_point(plan, door)
+    assert np.linalg.norm(np.array(leaf.joint.anchor)[[0, 2]] - jamb) < 0.04 + (WALL if swing == "out" else 0)
+    axis = np.array(leaf.joint.axis)
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(leaf.joint.reach, axis, leaf.joint.anchor))
+    off = (mesh.vertices[:, [0, 2]] - jamb) @ inward_normal(plan, 2)  # metres into the room
+    along = (mesh.vertices[:, [0, 2]] - jamb) @ closed
+    assert np.abs(along).max() < 0.09  # open, it stands beside its jamb
+    if swing == "in":
+        assert off.max() > 0.8
+        assert shapely.Polygon(swing_area(plan, door)).buffer(0.05).covers(shapely.MultiPoint(mesh.vertices[:, [0, 2]]))
+    else:
+        assert off.min() < -0.8 - WALL
+
+
+def test_doors_articulate(tmp_path) -> None:
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
+    for up in ("Y", "Z"):
+        options = RoomOptions(up_axis=up, walls=True, dress="none")
+        room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+        stage = Usd.Stage.Open(str(room.save(tmp_path / up, preview=False)))
+        door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")
+        leaf = stage.GetPrimAtPath(f"{door.GetPath()}/Wall_3_door_hinge")
+        assert not leaf.HasAPI(UsdPhysics.RigidBodyAPI)
+        cache = UsdGeom.BBoxCache(0, ["default"])
+        still = cache.ComputeWorldBound(leaf).ComputeAlignedRange()
+        door.GetVariantSets().SetSelection("articulation", "articulated")
+        assert leaf.HasAPI(UsdPhysics.RigidBodyAPI)
+        assert 5 < UsdPhysics.MassAPI(leaf).GetMassAttr().Get() < 40
+        joint = UsdPhysics.RevoluteJoint(stage.GetPrimAtPath(f"{leaf.GetPath()}_joint"))
+        assert joint.GetBody1Rel().GetTargets() == [leaf.GetPath()]
+        assert (joint.GetLowerLimitAttr().Get(), joint.GetUpperLimitAttr().Get()) == (0, pytest.approx(90))
+        poses = [
+            np.array(UsdGeom.Xformable(stage.GetPrimAtPath(body.GetTargets()[0])).ComputeLocalToWorldTransform(0)).T
+            @ [*place.Get(), 1]
+            for body, place in (
+                (joint.GetBody0Rel(), joint.GetLocalPos0Attr()), (joint.GetBody1Rel(), joint.GetLocalPos1Attr()),
+            )
+        ]  # fmt: skip
+        np.testing.assert_allclose(*poses, atol=1e-5)
+        assert cache.ComputeWorldBound(leaf).ComputeAlignedRange() == still  # the choice moves nothing
+        if up == "Z":
+            continue
+        validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
+        assert [e.GetMessage() for e in UsdValidation.ValidationContext(validators).Validate(stage)] == []
+        assert check(tmp_path / up / f"{up}.usda").ok
+        for state in ("articulated", "static"):  # opened, it is as good
+            door.GetVariantSets().SetSelection("articulation", state)
+            leaf.GetAttribute("xformOp:rotateY").Set(90.0)
+            assert [one.message for one in extents(Reading(stage))] == []

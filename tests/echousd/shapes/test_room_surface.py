@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+import trimesh
+
+from echomodel.furniture.solids import Tube
+from echomodel.vocabulary import vocabulary
+from echousd.shapes.finishes.slots import metres_of
+from echousd.shapes.looks import BANDS, PALETTES, cut, look, material_groups, palette_for
+from echousd.shapes.meshing import box_mesh
+from echousd.shapes.surface import creased_normals, surface, unshared
+from echousd.stage.taxonomy import ade20k
+
+
+def slow_creased_normals(mesh, crease):
+    out = []
+    for f, face in enumerate(mesh.faces):
+        for vertex in face:
+            total = np.zeros(3)
+            for g in np.flatnonzero((mesh.faces == vertex).any(1)):
+                if mesh.face_normals[f] @ mesh.face_normals[g] >= np.cos(crease):
+                    total += mesh.face_normals[g] * mesh.area_faces[g]
+            out.append(total / np.linalg.norm(total))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("mesh", [trimesh.creation.box(), trimesh.creation.cylinder(1, 2, sections=16)])
+def test_creased_normals_equal_the_slow_way(mesh):
+    normals, index = creased_normals(mesh, np.radians(40))
+    np.testing.assert_allclose(normals[index], slow_creased_normals(mesh, np.radians(40)), atol=2e-4)
+
+
+def test_box_keeps_hard_edges_and_ball_is_smooth():
+    normals, _ = creased_normals(trimesh.creation.box())
+    assert len(normals) == 6
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    normals, index = creased_normals(ball)
+    assert len(normals) <= len(ball.vertices)
+    np.testing.assert_allclose(normals[index], ball.vertices[ball.faces.ravel()], atol=0.03)
+
+
+@pytest.mark.parametrize("atlas", [False, True])
+def test_texture_coordinates_for_every_corner(atlas):
+    if atlas:
+        pytest.importorskip("xatlas")
+    form = surface(box_mesh((1, 2, 3)), {"wood": np.arange(12)}, atlas=atlas)
+    assert len(form.st_index) == 36
+    assert form.st_index.max() == len(form.st) - 1
+    corners = form.st[form.st_index].reshape(-1, 3, 2)
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    assert (areas > 0).all()
+    if atlas:
+        assert form.st.min() >= 0
+        assert form.st.max() <= 1
+    else:  # one picture of wood covers so many metres
+        wanted = trimesh.creation.box((1, 2, 3)).area_faces / metres_of("wood") ** 2
+        np.testing.assert_allclose(areas, wanted, rtol=1e-4)
+
+
+def test_box_projection_is_upright_and_not_mirrored():
+    form = surface(box_mesh((1, 2, 3)), {"wood": np.arange(12)})
+    points = form.points[form.faces]
+    corners = form.st[form.st_index].reshape(-1, 3, 2)
+    for triangle, st in zip(points, corners, strict=True):
+        normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+        turn = np.cross(st[1] - st[0], st[2] - st[0])
+        assert turn > 0, f"mirrored on the side {normal}"
+
+
+def test_cut_keeps_a_mesh_closed_and_leaves_no_triangle_across():
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    halves = cut(ball, 1, 0.31)
+    assert halves.is_watertight
+    assert halves.volume == pytest.approx(ball.volume, rel=2e-3)
+    side = np.sign(np.round(halves.vertices[halves.faces][..., 1] - 0.31, 9))
+    assert ((side.min(1) >= 0) | (side.max(1) <= 0)).all()
+
+
+@pytest.mark.parametrize("category", [entry.name for entry in vocabulary().categories])
+def test_every_category_has_looks_for_all_its_faces(category):
+    mesh, groups = material_groups(box_mesh((1.6, 1.1, 2.0)), category)
+    faces = np.sort(np.concatenate(list(groups.values())))
+    assert (faces == np.arange(len(mesh.faces))).all()
+    assert mesh.is_watertight
+    for group in groups:
+        assert all(0 <= c <= 1 for palette in PALETTES for c in look(palette, group).color)
+    assert vocabulary().category(category).look in BANDS
+    assert ade20k(category)
+
+
+def test_bed_has_linen_above_wood_and_a_headboard():
+    mesh, groups = material_groups(box_mesh((1.8, 1.0, 2.0)), "double_bed")
+    assert set(groups) == {"wood", "linen", "blanket"}
+    centre = mesh.triangles_center
+    assert centre[groups["linen"], 1].min() > 0.2
+    assert centre[groups["blanket"], 2].min() > centre[groups["linen"], 2].max() - 1e-6
+    back = centre[:, 2] < -0.95
+    assert set(np.flatnonzero(back)) <= set(groups["wood"])
+
+
+def test_palettes_are_steady():
+    assert palette_for("room 7") == palette_for("room 7")
+    assert len({palette_for(f"style {i}") for i in range(60)}) == len(PALETTES)
+
+
+def test_boards_that_meet_share_no_point_and_stay_closed():
+    boards = [trimesh.creation.box((1, 1, 1)) for _ in range(3)]
+    boards[1].apply_translation((1, 0, 0))
+    boards[2].apply_translation((0, 0, 1))
+    mesh = trimesh.util.concatenate(boards)
+    form = surface(mesh, {"wood": np.arange(len(mesh.faces))})
+    assert len(np.unique(form.points, axis=0)) == len(form.points) == 24
+    np.testing.assert_allclose(form.points, mesh.vertices, atol=2e-5)
+    assert (form.extent[0] >= mesh.bounds[0] - 1e-7).all()
+    assert (form.extent[1] <= mesh.bounds[1] + 1e-7).all()
+    assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight
+    alone = boards[0].vertices.astype(np.float32)
+    assert unshared(alone, boards[0].faces) is alone
+
+
+def test_the_ends_of_a_cord_around_a_cushion_share_no_point_and_stay_closed():
+    turn = np.linspace(0, 2 * np.pi, 13)
+    cord = Tube(points=(np.stack([np.cos(turn), 0 * turn, np.sin(turn)], 1) + 0.3)[[*range(12), 0]], radius=0.01)
+    mesh = trimesh.Trimesh(*cord.local_mesh(), process=False)
+    assert len(np.unique(mesh.vertices.astype(np.float32), axis=0)) < len(mesh.vertices)
+    form = surface(mesh, {"fabric": np.arange(len(mesh.faces))})
+    assert len(np.unique(form.points, axis=0)) == len(form.points)
+    np.testing.assert_allclose(form.points, mesh.vertices, atol=1e-5)
+    assert trimesh.Trimesh(form.points, form.faces, process=False).is_watertight

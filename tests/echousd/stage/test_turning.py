@@ -1,0 +1,126 @@
+"""Rooms with +Z up hold what those with +Y up hold, turned at its source: no prim stands for the turn."""
+
+import numpy as np
+import pytest
+from gltf_tree import read_gltf
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics
+from small_room import StandIn, small_graph
+
+import echousd
+from echomodel.openings import Opening
+from echousd.checks import check
+from echousd.exporting import export
+from echousd.graph import RoomSpec
+from echousd.make.reading import read_room
+from echousd.options import RoomOptions
+from echousd.stage.turning import turn_up
+
+TURN = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # Y up -> Z up
+DOOR = Opening("door", "door", 3, 0.4, 0.9, 2.0, hinge="right")
+WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)
+
+
+@pytest.fixture(scope="module")
+def roots(tmp_path_factory):
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
+    found = {}
+    for up in ("Y", "Z"):
+        options = RoomOptions(up_axis=up, walls=True, dress="some")
+        room = echousd.generate(graph, seed=3, model=StandIn(), repair=False, shapes="boxes", options=options)
+        found[up] = room.save(tmp_path_factory.mktemp(up) / "bedroom", preview=False)
+    return found
+
+
+def world(prim):
+    return np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
+
+
+def articulated(root):
+    stage = Usd.Stage.Open(str(root))
+    for prim in stage.Traverse():
+        sets = prim.GetVariantSets()
+        if "articulation" in sets.GetNames():
+            sets.SetSelection("articulation", "articulated")
+    return stage
+
+
+def test_every_prim_is_where_it_was_turned(roots):
+    y_up, z_up = (articulated(roots[up]) for up in ("Y", "Z"))
+    assert UsdGeom.GetStageUpAxis(z_up) == "Z"
+    layers = [layer for layer in z_up.GetUsedLayers() if not layer.anonymous]
+    assert {layer.pseudoRoot.GetInfo("upAxis") for layer in layers} == {"Z"}
+    assert not UsdGeom.Xformable(z_up.GetPrimAtPath("/Room")).GetOrderedXformOps()
+    kinds = set()
+    for prim in y_up.Traverse():
+        there = z_up.GetPrimAtPath(prim.GetPath())
+        assert there.GetTypeName() == prim.GetTypeName(), prim
+        if prim.IsA(UsdGeom.Mesh):
+            for name in ("points", "primvars:normals"):
+                values = [np.array(p.GetAttribute(name).Get()) for p in (prim, there)]
+                np.testing.assert_allclose(values[1], values[0] @ TURN.T, atol=1e-6)
+            extents = [np.array(UsdGeom.Mesh(p).GetExtentAttr().Get()) for p in (prim, there)]
+            np.testing.assert_allclose(extents[1], np.sort(extents[0] @ TURN.T, 0), atol=1e-6)
+        if prim.IsA(UsdGeom.Xformable):
+            before, after = world(prim), world(there)
+            np.testing.assert_allclose(after[:3, 3], TURN @ before[:3, 3], atol=1e-5)
+            aimed = prim.IsA(UsdGeom.Camera) or (prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdLux.SphereLight))
+            own = np.eye(3) if aimed else TURN
+            np.testing.assert_allclose(after[:3, :3] @ own, TURN @ before[:3, :3], atol=1e-5)
+            kinds.add(str(prim.GetTypeName()))
+        if prim.HasAPI(UsdPhysics.MassAPI):
+            masses = [UsdPhysics.MassAPI(p) for p in (prim, there)]
+            tensors = []
+            for mass in masses:
+                turn = np.array(Gf.Matrix3d(Gf.Rotation(Gf.Quatd(mass.GetPrincipalAxesAttr().Get())))).T
+                tensors.append(turn @ np.diag(mass.GetDiagonalInertiaAttr().Get()) @ turn.T)
+            np.testing.assert_allclose(tensors[1], TURN @ tensors[0] @ TURN.T, atol=1e-4)
+        if prim.IsA(UsdPhysics.Joint):
+            joints = [UsdPhysics.RevoluteJoint(p) for p in (prim, there)]
+            places = [np.array(joint.GetLocalPos0Attr().Get()) for joint in joints]
+            np.testing.assert_allclose(places[1], TURN @ places[0], atol=1e-6)
+            axes = [np.array(Gf.Rotation(Gf.Quatd(j.GetLocalRot0Attr().Get())).TransformDir((1, 0, 0))) for j in joints]
+            np.testing.assert_allclose(axes[1], TURN @ axes[0], atol=1e-6)
+            kinds.add("joint")
+    assert {"Mesh", "Xform", "Camera", "DomeLight", "RectLight", "DistantLight", "SphereLight", "joint"} <= kinds
+
+
+def test_it_passes_check_and_is_read_and_edited_like_the_other(roots, tmp_path):
+    assert not check(roots["Z"]).errors
+    y_up, z_up = (read_room(roots[up]) for up in ("Y", "Z"))
+    np.testing.assert_allclose(z_up.boxes.position, y_up.boxes.position, atol=1e-5)
+    np.testing.assert_allclose(z_up.boxes.yaw, y_up.boxes.yaw, atol=1e-5)
+    for name, geometry in y_up.geometry.items():
+        np.testing.assert_allclose(z_up.geometry[name].mesh.bounds, geometry.mesh.bounds, atol=1e-6)
+        if geometry.mass is not None:
+            np.testing.assert_allclose(z_up.geometry[name].mass.centre, geometry.mass.centre, atol=1e-6)
+    for up, root in roots.items():
+        graph = read_room(root).graph.relate("wardrobe", "bigger_than", "lamp").add_node("stool", "nightstand")
+        made = echousd.edit(root, graph, model=StandIn(), shapes="boxes")
+        made.save(tmp_path / up / "bedroom", preview=False)
+    y_up, z_up = (read_room(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", "Z"))
+    np.testing.assert_allclose(z_up.boxes.position, y_up.boxes.position, atol=1e-5)
+    wanted, found = (articulated(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", "Z"))
+    assert [p.GetPath() for p in wanted.Traverse()] == [p.GetPath() for p in found.Traverse()]
+
+
+def test_a_glb_is_the_same(roots, tmp_path):
+    y_up, z_up = (read_gltf(export(root, tmp_path / f"{up}.glb")) for up, root in roots.items())
+    assert [node["name"] for node in y_up.tree["nodes"]] == [node["name"] for node in z_up.tree["nodes"]]
+    for one, two in zip(y_up.by_id().values(), z_up.by_id().values(), strict=True):
+        corners = [gltf.triangles(number).reshape(-1, 3) for gltf, number in ((y_up, one), (z_up, two))]
+        np.testing.assert_allclose(*([at.min(0), at.max(0)] for at in corners if len(at)), atol=1e-4)
+
+
+def test_a_layer_is_turned_once_and_foreign_transforms_are_refused():
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    UsdGeom.Xform.Define(stage, "/a").AddTranslateOp().Set(Gf.Vec3d(1, 2, 3))
+    once = turn_up(layer).ExportToString()
+    assert "(1, -3, 2)" in once
+    assert turn_up(layer).ExportToString() == once
+    other = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(other)
+    UsdGeom.Xform.Define(stage, "/a").AddRotateXYZOp().Set(Gf.Vec3f(1, 2, 3))
+    with pytest.raises(ValueError, match="</a>: xformOp:rotateXYZ cannot be turned, allowed: rotateY, rotateZ"):
+        turn_up(other)
