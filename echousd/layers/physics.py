@@ -9,18 +9,11 @@ from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 from echomodel.dressing import SMALL
 from echomodel.vocabulary import vocabulary
 from echousd.graph.nodes import OBSTACLE
-<<<<<<< HEAD:echousd/layers/physics.py
 from echousd.shapes.geometry import Geometry, Mass
 from echousd.shapes.joints import STATIC
 from echousd.shapes.masses import hull_volume, mass_of, write_mass
-from echousd.stage.paths import MTL, SHELL, piece_path
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
-=======
-from echousd.shapes.geometry import Geometry, Mass
-from echousd.shapes.joints import ARTICULATED, ARTICULATION, STATIC
-from echousd.shapes.masses import hull_volume, mass_of, write_mass
 from echousd.stage.paths import MTL, SHELL, piece_path
->>>>>>> 9e16427 (Four trades of a room are four packages: make, shapes, layers, folder; drawing has its own):echousd/layers/physics.py
 
 GRAVITY = 9.81  # m/s²
 SCENE = "/Room/PhysicsScene"

@@ -5,18 +5,11 @@ from __future__ import annotations
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
-<<<<<<< HEAD:echousd/shapes/joints.py
 from echomodel.furniture.solids import Joint
 from echousd.shapes.geometry import FRAME, Geometry, Mass
 from echousd.shapes.masses import write_mass
-from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
 from echousd.stage.layouts import ARTICULATED, ARTICULATION
-=======
-from echomodel.furniture.solids import Joint
-from echousd.shapes.geometry import FRAME, Geometry, Mass
-from echousd.shapes.masses import write_mass
 from echousd.stage.paths import GEO, piece_name, piece_of, piece_path
->>>>>>> 9e16427 (Four trades of a room are four packages: make, shapes, layers, folder; drawing has its own):echousd/shapes/joints.py
 
 STATIC = "static"
 Point = tuple[float, float, float]

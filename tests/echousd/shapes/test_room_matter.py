@@ -4,17 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
-<<<<<<< HEAD:tests/echousd/room/test_room_matter.py
 from echomodel.furniture import sample_size, solids
 from echomodel.furniture.assembly import MATERIALS, Piece, pieces_of
 from echomodel.furniture.description import WIDTH, piece_of
 from echomodel.furniture.solids import Solid
-=======
-from echomodel.furniture import sample_size, solids
-from echomodel.furniture.assembly import Piece, pieces_of
-from echomodel.furniture.description import WIDTH, piece_of
-from echomodel.furniture.solids import Solid
->>>>>>> 9e16427 (Four trades of a room are four packages: make, shapes, layers, folder; drawing has its own):tests/echousd/shapes/test_room_matter.py
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import MATTER, PARTS, weighed
 
