@@ -38,7 +38,7 @@ def parted() -> Iterator[dict[str, float]]:
     """CPU seconds by `PARTS` of what runs inside the block, each without the parts that run within it."""
     from echomodel.compact import layouts as sampling
     from echousd.make import layouts
-    from echousd.repair import living
+    from echousd.repair import living, search
 
     repair = import_module("echousd.repair.repair")  # the package has a function of that name
 
@@ -59,7 +59,7 @@ def parted() -> Iterator[dict[str, float]]:
         return call
 
     places = (
-        (sampling, "drafted", "drafts"), (sampling, "_denoised", "denoising"), (repair, "arrange", "arranging"),
+        (sampling, "drafted", "drafts"), (sampling, "_denoised", "denoising"), (search.Search, "run", "arranging"),
         (repair, "solve", "solving"), (living, "living_faults", "judging"), (layouts, "layout_outcome", "judging"),
     )  # fmt: skip
     kept = [(module, name, getattr(module, name)) for module, name, _ in places]

@@ -19,14 +19,16 @@ from echomodel.objective.sizes import (
     smaller_sizes,
     usual_sizes,
 )
+from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
-from echousd.repair.arrange import BAD, arrange, setting_of
 from echousd.repair.overhead import lamps_along
 from echousd.repair.placements import stated_placements
 from echousd.repair.problem import Posed, pose, stacked
 from echousd.repair.relations import relation_margins
 from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
+from echousd.repair.search import Arranged, Search
+from echousd.repair.setting import setting_of
 from echousd.repair.solver import RepairConfig, solve, violation
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from echousd.graph import Relation, RoomSpec, SceneGraph
 
 UNMET = 0.01  # metres or ratio of hard constraints that are missed in all
+FULL = 0.3  # share of a floor that is covered from which on smaller furniture is tried
+BAD = 1.5  # cost of a room in which something is broken
 WORTH = 1.0  # that smaller furniture must save of what an arrangement costs
 UPRIGHT = np.array([False, True, False])  # the side that taller and shorter are about
 SMALLEST = 0.02  # metres: no side of a sampled box is shorter
@@ -241,12 +245,16 @@ def repair_boxes(
             return replace(to, size=fitting_loads(to.problem.categories, laid, to.problem.carrier, free))
 
         at = suited(at, at.size)
-        chosen = arrange(setting_of(at, turned, openings=openings, outline=floor_polygon))
-        if chosen.paid.max(initial=0.0) > BAD:  # too full, perhaps
+
+        def searched(of: Posed) -> Arranged:
+            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon)).run()
+
+        chosen = searched(at)
+        if chosen.cost > BAD and fullness(at) > FULL:
             less = suited(at, smaller_sizes(at.problem.categories, at.size, free))
             if not np.array_equal(less.size, at.size):
-                other = arrange(setting_of(less, turned, openings=openings, outline=floor_polygon))
-                if other.total < chosen.total - WORTH:
+                other = searched(less)
+                if other.cost < chosen.cost - WORTH:
                     at, chosen = less, other
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
@@ -286,3 +294,12 @@ def repair_boxes(
         resized=np.abs(size_end / np.maximum(size, SMALLEST) - 1.0).max(1, initial=0.0),
         seconds=time.perf_counter() - started,
     )
+
+
+def fullness(at: Posed) -> float:
+    """Share of the floor that furniture covers."""
+    assert at.problem.floor is not None
+    standing = at.problem.carrier == ON_FLOOR
+    x, z = at.problem.floor.polygon.T
+    area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
+    return float((at.size[standing, 0] * at.size[standing, 2]).sum()) / area

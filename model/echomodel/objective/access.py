@@ -21,7 +21,7 @@ CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 
 def front_free(plan: Plan) -> Found:
     """Doors, drawers, shelves and sofas can be reached from the front."""
-    depth = plan.numbers([kind.access for kind in plan.kinds]) * NEEDED
+    depth = plan.column(lambda kind: kind.access) * NEEDED
     opens = (depth > 0) & plan.standing & ~plan.of("seat")  # an armchair is walked round
     i, j = plan.pairs(opens, plan.standing & ~plan.movable)
     other = (plan.anchor[j] != i) & (plan.anchor[i] != j)
@@ -91,14 +91,12 @@ def window_free(plan: Plan) -> Found:
 
 def _before_openings(plan: Plan, *, window: bool) -> Found:
     rows: list[tuple[Tensor, Tensor, int]] = []
-    for scene, openings in enumerate(plan.openings):
-        corners = plan.floor[scene]
-        polygon = corners[torch.isfinite(corners).all(1)].detach().cpu().numpy()
+    asked = (plan.standing if window else plan.standing | _hangs_low(plan)) & plan.moved
+    for scenes, polygon, openings in plan.rooms:
+        who = (torch.isin(plan.scene, scenes) & asked).nonzero()[:, 0]
         for number, opening in enumerate(openings):
-            if (opening.kind == "window") != window or opening.edge >= len(polygon):
-                continue
-            who = ((plan.scene == scene) & (plan.standing | (~window & _hangs_low(plan)))).nonzero()[:, 0]
-            rows.append((who, _clearance(plan, who, polygon, opening), number))
+            if (opening.kind == "window") == window and opening.edge < len(polygon):
+                rows.append((who, _clearance(plan, who, polygon, opening), number))
     if not rows:
         return nobody(plan.size)
     who = torch.cat([row[0] for row in rows])

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import signed_distance
 from echomodel.objective.found import Found, found, joined, nobody, worst
-from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
-from echomodel.objective.zones import _gaps
+from echomodel.objective.plan import FAR, Plan
+from echomodel.objective.zones import floor_gaps, floor_points, in_rooms
 from echomodel.plans import filled_area
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
@@ -39,28 +37,18 @@ def served_limit(area: float, width: Tensor, depth: Tensor) -> float:
 
 def floor_served(plan: Plan) -> Found:
     """Furniture serves the whole floor: no more of it lies far from everything than so much furniture must leave."""
-    rows: list[tuple[Tensor, Tensor, Tensor]] = []
-    for scene in range(len(plan.floor)):
-        corners = plan.floor[scene][torch.isfinite(plan.floor[scene]).all(1)]
-        there = ((plan.scene == scene) & plan.standing & (plan.size[:, 1].detach() > CLEAR_HEIGHT)).nonzero()[:, 0]
-        if len(corners) < 3 or len(there) < 2:
+    out = nobody(plan.size)
+    for scenes, area, points, _ in floor_points(plan, CELL):
+        there = in_rooms(plan, scenes)
+        if there.shape[1] < 2:
             continue
-        polygon = corners.detach().cpu().numpy()
-        x, z = polygon.T
-        area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
-        size = plan.size[there].detach()
-        low, high = polygon.min(0), polygon.max(0)
-        xs, zs = (np.arange(a + CELL / 2, b, CELL) for a, b in zip(low, high, strict=True))
-        points = plan.numbers(np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2).tolist())
-        points = points[signed_distance(points[None], corners[None])[0] > 0]
-        gap, nearest = _gaps(plan, there, points).min(1)
-        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clamp(0.0, 1.0).mean()
+        size = plan.size[there[0]].detach()
+        gap, nearest = floor_gaps(plan, there, points)
+        share = ((gap - SERVED + SOFT) / (2 * SOFT)).clamp(0.0, 1.0).mean(1)
         margin = served_limit(area, size[:, 0], size[:, 2]) - share
-        rows.append((there[nearest[int(gap.detach().argmax())]], margin, 100.0 * share))
-    if not rows:
-        return nobody(plan.size)
-    who, margin, measure = (torch.stack(list(column)) for column in zip(*rows, strict=True))
-    return found(who, margin, measure=measure)
+        farthest = nearest.gather(1, gap.detach().argmax(1, keepdim=True))[:, 0]
+        out = joined(out, found(farthest, margin, measure=100.0 * share))
+    return out
 
 
 def elbow_room(plan: Plan) -> Found:

@@ -30,20 +30,19 @@ EDGE = 0.06  # the same for lamps and plants, which are narrow
 
 def groups_apart(plan: Plan) -> Found:
     """Pieces of different groups leave a gap: a table does not touch a sofa, nor a chair the next bed."""
-    roles = {role for pair in APART for role in pair}
+    roles = sorted({role for pair in APART for role in pair})
     massive = plan.of(*roles) & plan.standing
     i, j = plan.pairs(massive, massive)
-    wanted = torch.zeros(len(plan), len(plan), dtype=plan.size.dtype)
-    for (one, another), metres in APART.items():
-        both = plan.of(one)[:, None] & plan.of(another)[None]
-        wanted[both | both.T] = metres
+    table = plan.numbers([[APART.get((a, b), APART.get((b, a), 0.0)) for b in roles] for a in roles])
+    number = plan.column(lambda kind: roles.index(kind.role) if kind.role in roles else 0).long()
+    wanted = table[number[i], number[j]]
     other = ~plan.kin(i, j)
     smaller = plan.size[i].detach().prod(1) < plan.size[j].detach().prod(1)
     ordered = smaller | ((plan.size[i].detach().prod(1) == plan.size[j].detach().prod(1)) & (i > j))
-    keep = other & ordered & (wanted[i, j] > 0) & ~_side_by_side(plan, i, j)
-    i, j = i[keep], j[keep]
+    keep = other & ordered & (wanted > 0) & ~_side_by_side(plan, i, j)
+    i, j, wanted = i[keep], j[keep], wanted[keep]
     gap = plan.apart(i, j)
-    least, about = worst(i, gap - wanted[i, j], j, len(plan), FAR)
+    least, about = worst(i, gap - wanted, j, len(plan), FAR)
     who = i.unique()
     return found(who, least[who], other=about[who], measure=_gap_to(plan, who, about[who]))
 

@@ -28,7 +28,7 @@ def apart(plan: Plan) -> Found:
 
 def on_floor(plan: Plan) -> Found:
     """Every piece lies within the walls."""
-    who = known(plan.floor)[plan.scene].nonzero()[:, 0]
+    who = (known(plan.floor)[plan.scene] & plan.moved).nonzero()[:, 0]
     if not len(who):
         return nobody(plan.size)
     floor = plan.floor[plan.scene[who]]

@@ -103,8 +103,12 @@ class Plan:
         """(N,) bool, boxes whose row answers a question with yes."""
         return self._mask([bool(asked(kind)) for kind in self.kinds])
 
+    def column(self, asked: Callable[[Category], Any]) -> Tensor:
+        """(N, ...) float, what the rows of the boxes answer."""
+        return self.numbers([asked(kind) for kind in self.kinds])
+
     def numbers(self, values: Sequence[Any]) -> Tensor:
-        """N numbers as a tensor like the boxes."""
+        """Numbers as a tensor like the boxes."""
         return torch.tensor(values, dtype=self.size.dtype, device=self.size.device)
 
     @cached_property
@@ -153,6 +157,26 @@ class Plan:
         return torch.from_numpy(out)
 
     @cached_property
+    def rooms(self) -> list[tuple[Tensor, np.ndarray, tuple[Opening, ...]]]:
+        """Numbers (s,) of the rooms that share a floor and its openings, its corners (k, 2), and these; known ones."""
+        out = []
+        for number, openings in enumerate(self.openings):
+            corners = self.floor[number][torch.isfinite(self.floor[number]).all(1)].detach().cpu().numpy()
+            if len(corners) > 2:
+                out.append((torch.tensor([number]), corners, openings))
+        return out
+
+    @property
+    def first(self) -> Plan:
+        """The plan whose floors are these, and whose words are said of all copies of it."""
+        return self
+
+    @property
+    def moved(self) -> Tensor:
+        """(N,) bool, boxes that do not stand alike in all rooms."""
+        return torch.ones(len(self), dtype=torch.bool)
+
+    @cached_property
     def ceiling(self) -> Tensor:
         """(N,) float, height of the ceiling over each box, metres; NaN = unknown."""
         if self.height is None:
@@ -187,8 +211,13 @@ class Plan:
     def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
         """(P,) and (P,): how far i's centre lies to j's +x side and before j's centre, metres."""
         dx, dz = self.position[i, 0] - self.position[j, 0], self.position[i, 2] - self.position[j, 2]
-        cos, sin = self.yaw[j].cos(), self.yaw[j].sin()
+        cos, sin = self.turn[0][j], self.turn[1][j]
         return cos * dx - sin * dz, sin * dx + cos * dz
+
+    @cached_property
+    def turn(self) -> tuple[Tensor, Tensor]:
+        """(N,) and (N,) float, cosine and sine of the headings."""
+        return self.yaw.cos(), self.yaw.sin()
 
     def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
         """(P,) and (P,): half extents of i along j's width and along j's front, metres."""
@@ -299,15 +328,14 @@ class Plan:
         length = length * known(self.floor)[:, None]
         return start, along, normal, length
 
-    @cached_property
-    def back_gap(self) -> Tensor:
-        """(N,): distance between each back and the wall behind it, metres; `FAR` where there is none."""
-        start, along, normal, length = (of[self.scene] for of in self.walls)
-        front = torch.stack([self.yaw.sin(), self.yaw.cos()], -1)[:, None]
-        side = torch.stack([self.yaw.cos(), -self.yaw.sin()], -1)[:, None]
-        offset = self.position[:, None, [0, 2]] - start
-        reach = (normal * side).sum(-1).abs() * self.size[:, None, 0] / 2
-        reach = reach + (normal * front).sum(-1).abs() * self.size[:, None, 2] / 2
+    def back_gaps(self, who: Tensor) -> Tensor:
+        """(P,): metres between the backs of some boxes and the wall behind them; `FAR` where there is none."""
+        start, along, normal, length = (of[self.scene[who]] for of in self.walls)
+        cos, sin = self.turn[0][who], self.turn[1][who]
+        front, side = torch.stack([sin, cos], -1)[:, None], torch.stack([cos, -sin], -1)[:, None]
+        offset = self.position[who][:, None, [0, 2]] - start
+        reach = (normal * side).sum(-1).abs() * self.size[who, None, 0] / 2
+        reach = reach + (normal * front).sum(-1).abs() * self.size[who, None, 2] / 2
         gap = (offset * normal).sum(-1) - reach
         at = (offset * along).sum(-1)
         behind = (length > 0) & ((normal * front).sum(-1) > FACING) & (at > -0.1) & (at < length + 0.1) & (gap > -1.0)

@@ -9,7 +9,6 @@ from torch import Tensor
 
 from echomodel.objective.found import Found, found, nobody, worst
 from echomodel.objective.plan import FAR, Plan, facing_angle
-from echomodel.vocabulary import vocabulary
 
 # From a viewer's front to the screen: 98 of 100 real sofas and 95 of 100 real beds are turned less.
 ASIDE = {"sofa": math.radians(25.0), "bed": math.radians(30.0), "seat": math.radians(45.0)}
@@ -78,30 +77,26 @@ def _viewers(plan: Plan) -> Watched:
         good = better(plan, i, j)
         keep = good | ~torch.isin(i, i[good])
         i, j = i[keep], j[keep]
-    words = [plan.kinds[k].role for k in j.tolist()]
-    aside = plan.numbers([ASIDE.get(word, ASIDE["seat"]) for word in words])
-    span = plan.numbers([WATCHED_FROM.get(word, WATCHED_FROM["seat"]) for word in words]).reshape(-1, 2)
+    aside = plan.column(lambda kind: ASIDE.get(kind.role, ASIDE["seat"]))[j]
+    span = plan.column(lambda kind: WATCHED_FROM.get(kind.role, WATCHED_FROM["seat"])).reshape(-1, 2)[j]
     seen, own = facing_angle(*plan.local(i, j)), facing_angle(*plan.local(j, i))
     far = (plan.position[i] - plan.position[j])[:, [0, 2]].square().sum(1).clamp_min(1e-12).sqrt()
     margin = torch.stack([aside - seen, TURNED - own, far - span[:, 0], span[:, 1] - far], -1)
     measure = torch.stack([torch.rad2deg(seen), torch.rad2deg(own), far, far], -1)
     clear, about = _clear(plan, i, j)
     total = torch.minimum(margin.amin(1), clear).detach()
-    best: dict[int, int] = {}
-    for row, screen in enumerate(i.tolist()):
-        if screen not in best or total[row] > total[best[screen]]:
-            best[screen] = row
-    rows = torch.tensor(sorted(best.values()), dtype=torch.int64)
+    most = total.new_full((len(plan),), -torch.inf).scatter_reduce(0, i, total, "amax")
+    rows = (total == most[i]).nonzero()[:, 0]
+    first = torch.full((len(plan),), len(i)).scatter_reduce(0, i[rows], rows, "amin")
+    rows = rows[first[i[rows]] == rows]
     return i[rows], j[rows], margin[rows], measure[rows], clear[rows], about[rows]
 
 
 def _told(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
     """(P,) bool: the graph says that j watches i."""
-    asked = torch.tensor([vocabulary().predicate_id(word) for word in TOLD])
-    rows = plan.triplets[torch.isin(plan.triplets[:, 1], asked)]
-    said = torch.zeros(len(plan), len(plan), dtype=torch.bool)
-    said[rows[:, 0], rows[:, 2]] = said[rows[:, 2], rows[:, 0]] = True
-    return said[i, j]
+    ends = [plan.told(word) for word in TOLD]
+    said = torch.cat([one * len(plan) + other for a, b in ends for one, other in ((a, b), (b, a))])
+    return torch.isin(i * len(plan) + j, said)
 
 
 def _lying_or_sitting_back(plan: Plan, i: Tensor, j: Tensor) -> Tensor:

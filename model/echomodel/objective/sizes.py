@@ -165,7 +165,7 @@ def hung_lamps(
 
 def scale(plan: Plan) -> Found:
     """A piece has the size of its kind; boards and seats may be turned by a quarter."""
-    known = [number for number, kind in enumerate(plan.kinds) if kind.name]
+    known = [number for number in plan.moved.nonzero()[:, 0].tolist() if plan.kinds[number].name]
     who = torch.tensor(known, dtype=torch.int64)
     ranges = [size_range(plan.kinds[number].name) for number in known]
     low = plan.numbers([r[0] for r in ranges]).reshape(-1, 3)

@@ -18,9 +18,9 @@ DEEP = 6.0  # metres of the room along its axis from which on it does; or someth
 
 def parallel(plan: Plan) -> Found:
     """Storage, beds, sofas, tables and desks stand parallel to a wall; side tables go with their seat."""
-    who = (plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company", "beside")).nonzero()[
-        :, 0
-    ]
+    who = (
+        plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company", "beside") & plan.moved
+    ).nonzero()[:, 0]
     _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
     wall = torch.atan2(-along[..., 1], along[..., 0])
     off = _from_quarter(plan.yaw[who, None] - wall)
@@ -39,9 +39,11 @@ def at_wall(plan: Plan) -> Found:
     wall = plan.which(lambda kind: kind.wall)
     beside = (plan.stands("head") & (plan.anchor >= 0)) | plan.stands("with")
     there = (plan.walls[3] > 0).any(1)[plan.scene]
-    who = (wall & plan.standing & ~beside & there).nonzero()[:, 0]
-    gap = plan.back_gap[who]
-    free = plan.of("sofa")[who] & (gap >= PASSAGE) & (_deep(plan, who) | _backed(plan, who, gap.detach()))
+    who = (wall & plan.standing & ~beside & there & (plan.moved | plan.of("sofa"))).nonzero()[:, 0]
+    gap = plan.back_gaps(who)
+    free = plan.of("sofa")[who] & (gap >= PASSAGE)
+    if bool(free.any()):
+        free = free & (_deep(plan, who) | _backed(plan, who, gap.detach()))
     return found(who, torch.where(free, gap - PASSAGE, TOUCHING - gap), measure=gap, words=(gap < FAR).long())
 
 

@@ -91,7 +91,11 @@ class PairGeometry:
             half_s, half_o = self.footprint_s[0], self.footprint_o[0]
             reach = (half_s + half_o) - self.offset[:, [0, 2]].abs()
             return torch.minimum(reach, 2 * torch.minimum(half_s, half_o)).clamp_min(0).prod(-1)
-        return rectangle_overlap(self.footprint_s[1], self.footprint_o[0], self.yaw_o)
+        corners, half, yaw = self.footprint_s[1], self.footprint_o[0], self.yaw_o
+        away, reach = self.offset[:, [0, 2]].norm(dim=1), self.footprint_s[0].norm(dim=1) + half.norm(dim=1)
+        near = (away < reach + 0.01).nonzero()[:, 0]  # others are apart whatever their heading
+        none = torch.zeros_like(yaw)
+        return none.index_copy(0, near, rectangle_overlap(corners[near], half[near], yaw[near]))
 
     @cached_property
     def corner_distance(self) -> Tensor:

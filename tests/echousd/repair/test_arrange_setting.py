@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import numpy as np
 import pytest
 
 from echousd.repair import repair_boxes
-from echousd.repair.arrange.attending import slots_at
-from echousd.repair.arrange.groups import _groups
-from echousd.repair.arrange.places import places
-from echousd.repair.arrange.setting import Setting, State, setting_of
 from echousd.repair.geometry import axes, depth_inside
 from echousd.repair.problem import pose
+from echousd.repair.proposals import proposals, slots_at
+from echousd.repair.search import Search, State
+from echousd.repair.setting import Setting, setting_of
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 
@@ -34,7 +31,8 @@ def test_a_lamp_on_the_sideboard_of_a_table_does_not_slide_with_the_table() -> N
     found = setting(words, size, [(0, 0, 0), (0.3, 0, 0.6), (0, 0, -1.78), (0.3, 0.9, -1.78)], [0, np.pi, 0, 0])
     assert found.stances[2] == "near"
     assert found.carrier[3] == 2
-    assert [members.tolist() for members in _groups(found)] == [[0, 1]]
+    state = State(found.draft, found.heading, np.zeros(4))
+    assert Search(found).group(0, np.ones(4, bool), state) == [0, 1]
 
 
 @pytest.mark.parametrize("width", [1.6, 1.8])
@@ -63,20 +61,21 @@ def test_the_coffee_table_of_a_corner_sofa_keeps_the_distance_that_was_drawn() -
 @pytest.mark.parametrize("size", [(0.8, 1.0, 0.3), (0.3, 1.0, 0.8), (0.5, 1.0, 0.5)])
 def test_plants_have_no_pose_that_leaves_the_floor(size: tuple[float, float, float]) -> None:
     found = setting(["plant"], [size], [(0.4, 0.0, 0.3)], [0.0])
-    state = State(found.draft.copy(), found.heading.copy(), np.zeros(1, bool), {})
-    poses = places(found, state, 0)
-    side = axes(poses.yaw) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
+    rows = proposals(found, found.draft, found.heading, np.ones(1, bool), 0)
+    search = Search(found)
+    state = State(found.draft, found.heading, np.zeros(1))
+    kept = rows[search._promising(state, np.ones(1, bool), 0, [0], rows, rows[:, 3])]
+    side = axes(kept[:, 2]) * np.array([[size[0] / 2], [size[2] / 2]])  # (K, 2, 2)
     signs = np.array([(-1, -1), (-1, 1), (1, 1), (1, -1)])
-    corners = poses.position[:, None, [0, 2]] + signs @ side
-    assert len(poses) > 20
+    corners = kept[:, None, :2] + signs @ side
+    assert len(kept) > 20
     assert depth_inside(found.floor, corners.reshape(-1, 2)).min() > -1e-6
 
 
 @pytest.mark.parametrize(("rigid", "times"), [(True, 1), (False, 2)])
 def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch, rigid: bool, times: int) -> None:
-    module, calls = import_module("echousd.repair.repair"), []
-    arrange = module.arrange
-    monkeypatch.setattr(module, "arrange", lambda found: calls.append(found) or arrange(found))
+    run, calls = Search.run, []
+    monkeypatch.setattr(Search, "run", lambda search: calls.append(search) or run(search))
     size = np.array([(2.0, 1.0, 2.2), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6)])
     small = FLOOR * (0.46, 0.6)
     repair_boxes(

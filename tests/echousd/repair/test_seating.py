@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from echousd.repair import repair_boxes
-from echousd.repair.arrange.seating import plans
 
 FLOOR = np.array([(-2.5, -2.5), (2.5, -2.5), (2.5, 2.5), (-2.5, 2.5)])
 CLOSE, FACING = 5, 16
@@ -22,14 +21,6 @@ def laid(kinds, *, seed=0, told=()):
     away = (done.position[1:] - done.position[0])[:, [0, 2]]
     c, s = np.cos(done.yaw[0]), np.sin(done.yaw[0])
     return np.stack([c * away[:, 0] - s * away[:, 1], s * away[:, 0] + c * away[:, 1]], -1), done
-
-
-def test_plans_fill_sides_before_ends_and_leave_benches_alone():
-    assert plans(4, 0, 2, 1)[0].chairs == (2, 2, 0, 0)
-    assert plans(6, 0, 2, 1)[0].chairs == (2, 2, 1, 1)
-    assert {plan.chairs for plan in plans(2, 1, 2, 1)[:2]} == {(0, 2, 0, 0), (2, 0, 0, 0)}
-    assert all(plan.chairs[plan.benches[0]] == 0 for plan in plans(3, 1, 2, 1))
-    assert plans(9, 0, 2, 1) == []
 
 
 @pytest.mark.parametrize("seed", range(3))

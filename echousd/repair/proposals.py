@@ -1,0 +1,365 @@
+"""Poses that a person would try for a piece: at what it attends, along the walls, over what it lights, in the open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from echomodel.objective.company import PLACE
+from echomodel.objective.sight import WATCHED_FROM
+from echomodel.objective.support import ON_CEILING
+from echomodel.objective.walls import PASSAGE
+from echomodel.vocabulary import vocabulary
+from echousd.repair.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
+from echousd.repair.geometry import Floor, depth_inside
+from echousd.repair.setting import Setting
+from echousd.repair.slots import INNER, STANDS
+
+HALF_PI = math.pi / 2
+STEP = 0.2  # metres between two places at a wall
+GRID = 0.35  # metres between two places in the open
+SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
+AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
+Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
+
+
+def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int) -> np.ndarray:
+    """(K, 4) float: x, z, yaw of all poses to try for box i, and how much of a metre other poses are preferred.
+
+    Arguments:
+        position: (n, 3) float, yaw: (n,) float, where the others stand. there: (n,) bool, which of them do.
+    """
+    kind, anchor = setting.kinds[i], int(setting.anchor[i])
+    rows: list[Row] = []
+    if anchor >= 0 and there[anchor]:
+        rows += [out_of(position[anchor], float(yaw[anchor]), slot) for slot in slots_at(setting, i, anchor)]
+    loose = LOOSE * bool(rows)
+    if kind.support == "ceiling":
+        rows += _overhead(setting, position, yaw, there, i)
+    elif setting.carrier[i] >= 0:
+        pass
+    elif kind.support == "wall":
+        rows += along_walls(setting, i, 0.0)
+    else:
+        at_wall = kind.wall or (kind.role == "board" and kind.access > 0)
+        walls = along_walls(setting, i, loose)
+        rows += walls
+        if kind.role in ("decor", "light", "storage"):
+            rows += _corners(setting, i, loose)
+        if kind.stands == "company":
+            rows += _nooks(setting, i, loose)
+        if kind.role == "sofa":
+            rows += _in_view(setting, i, walls)
+        if not at_wall and kind.role not in ("decor", "light", "storage"):
+            rows += _in_the_open(setting, i, loose)
+        rows += _as_stated(setting, position, yaw, i)
+        beside = twins(setting, position, yaw, i)
+        rows = [*beside, *((*row[:3], row[3] + APART_TWINS * bool(beside)) for row in rows)]
+    drawn, more = setting.draft[i, [0, 2]].tolist(), loose + out_of_habit(setting, i)
+    carrier = int(setting.carrier[i])
+    turns = (_squared(setting, i), float(setting.heading[i])) if carrier < 0 else (float(yaw[carrier]),)
+    rows += [(*drawn, turn, more) for turn in turns]
+    out = np.array(rows, float)
+    if setting.turned[i]:
+        like = np.abs(np.sin((out[:, 2] - setting.heading[i]) / 2)) < 0.05
+        out = out[like] if like.any() else out
+        out[:, 2] = setting.heading[i]
+    return out
+
+
+LOOSE = 0.5  # by which poses at what a piece attends are preferred to others, and those at walls of what belongs there
+APART_TWINS = 2.0  # the same of beds that share a nightstand
+HUNG, AT = 0.1, 0.4  # metres between where a lamp or a piece was drawn and a place for such a one
+GAP = 0.15  # metres between a back and the wall behind it that it stands at
+EDGE = 0.5  # metres between the middle of a plant or lamp and a wall that it stands at
+
+
+def out_of_habit(setting: Setting, i: int) -> float:
+    """By how much other poses of a box are preferred to where it was drawn: nothing where such a piece may stand so."""
+    kind, anchor, here = setting.kinds[i], int(setting.anchor[i]), setting.draft[i, [0, 2]]
+    every = np.ones(len(setting.size), bool)
+    rows = twins(setting, setting.draft, setting.heading, i)
+    if kind.support == "ceiling":
+        rows = _overhead(setting, setting.draft, setting.heading, every, i)
+    elif anchor >= 0 and setting.carrier[i] < 0 and not rows:
+        frame = setting.draft[anchor], float(setting.heading[anchor])
+        rows = [out_of(*frame, slot) for slot in slots_at(setting, i, anchor)]
+    if rows and anchor < 0 and kind.support == "floor":
+        return APART_TWINS * (min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows) > AT)
+    if rows:
+        near = min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows if row[3] < LOOSE)
+        return LOOSE * (near > (HUNG if kind.support == "ceiling" else AT))
+    inside = float(depth_inside(setting.floor, here[None])[0])
+    at_wall = kind.wall or (kind.role == "board" and kind.access > 0)
+    small = kind.role in ("decor", "light") and setting.standing(i)
+    return LOOSE * (inside > float(setting.size[i, 2]) / 2 + GAP if at_wall else small and inside > EDGE)
+
+
+def slots_at(setting: Setting, i: int, anchor: int) -> list[tuple[float, float, float, float]]:
+    """Where box i may stand in the frame of its anchor; empty where its row does not say."""
+    stands = _stance(setting, i, anchor)
+    if stands not in STANDS:
+        return []
+    seats = np.array([kind.role == "seat" for kind in setting.kinds]) & (setting.anchor == anchor)
+    count = int(np.maximum(np.round(setting.size[seats, 0] / PLACE), 1.0).sum())
+    near = _apart(setting, i, anchor, stands)
+    found = STANDS[stands](setting.size[i], setting.size[anchor], setting.kinds[anchor], count, *near)
+    if stands == "head":  # all with the same gap to the wall
+        level = float(setting.behind[_mates(setting, stands, anchor)[0]] - setting.behind[anchor])
+        found = [(lateral, forward + level, turn, more) for lateral, forward, turn, more in found]
+    return found
+
+
+def _apart(setting: Setting, i: int, anchor: int, stands: str) -> tuple[float, float]:
+    """Metres between box i and its anchor and those it stands before its middle, as `distances.kept_apart`."""
+    if stands not in APART:
+        return 0.0, 0.0
+    drawn = seen_from(setting.size, setting.draft, setting.heading, anchor)[_mates(setting, stands, anchor)]
+    if stands == "before" and setting.kinds[anchor].name in vocabulary().cornered:
+        drawn = drawn + np.array([0.0, 0.0, 0.0, INNER])
+    kept, ahead = kept_apart(stands, drawn, setting.kinds[anchor].name, setting.size[anchor])
+    return max(kept, -MOST_UNDER * float(setting.size[i, 2])), ahead
+
+
+def _mates(setting: Setting, stands: str, anchor: int) -> list[int]:
+    """All who stand so to a box."""
+    return [j for j in np.flatnonzero(setting.anchor == anchor).tolist() if _stance(setting, j, anchor) == stands]
+
+
+def _stance(setting: Setting, i: int, anchor: int) -> str:
+    """How box i stands to what it attends: the name of its slots, or of the row's own word where it has none."""
+    kind, to = setting.kinds[i], setting.kinds[anchor]
+    if setting.carrier[i] == anchor:
+        return "on_top"
+    if kind.support != "floor":
+        return ""
+    if kind.stands in ("at", "foot") and to.role == "board":
+        return "at_front" if to.access else "around"
+    return setting.stances[i]
+
+
+def seatings(setting: Setting, i: int, seats: Sequence[int]) -> list[list[tuple[float, float, float, float]]]:
+    """Ways in which boxes of one kind may stand around box i, each a slot for every one of them, the best first."""
+    seats = [k for k in seats if _stance(setting, k, i) == "around"]
+    if len(seats) < 2:
+        return []
+    largest = max(seats, key=lambda k: float(setting.size[k, 0]))
+    found = sorted(slots_at(setting, largest, i), key=lambda slot: slot[3])
+    size = setting.size[largest]
+    out: list[list[tuple[float, float, float, float]]] = []
+    for start in range(len(found)):  # those that go with each slot, without running into each other
+        chosen: list[tuple[float, float, float, float]] = []
+        for slot in (found[start], *found):
+            if len(chosen) < len(seats) and all(_clear(slot, other, size) for other in chosen):
+                chosen.append(slot)
+        if len(chosen) == len(seats) and not any({*chosen} == {*other} for other in out):
+            out.append(chosen)
+    return out
+
+
+def _clear(one: tuple[float, ...], other: tuple[float, ...], size: np.ndarray) -> bool:
+    """Whether pieces of one size at two slots stand clear of each other."""
+    halves = []
+    for slot in (one, other):
+        cos, sin = abs(math.cos(slot[2])), abs(math.sin(slot[2]))
+        halves.append((cos * size[0] + sin * size[2], sin * size[0] + cos * size[2]))
+    width, depth = ((halves[0][axis] + halves[1][axis]) / 2 for axis in (0, 1))
+    return abs(one[0] - other[0]) > width - 0.01 or abs(one[1] - other[1]) > depth - 0.01
+
+
+def ahead(floor: Floor, at: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """(K,) float: metres from points (K, 2) along unit vectors (K, 2) to the wall."""
+    edge, normal = floor.edge, floor.normal
+    towards = -(front @ normal.T)
+    reach = np.einsum("kwd,wd->kw", at[:, None] - floor.polygon, normal) / np.where(towards > 1e-3, towards, np.nan)
+    length = np.linalg.norm(edge, axis=1)
+    along = np.einsum("kwd,wd->kw", at[:, None] + reach[..., None] * front[:, None] - floor.polygon, edge) / length
+    hit = (reach > 0) & (along > -1e-3) & (along < length + 1e-3)
+    out: np.ndarray = np.where(hit, reach, np.inf).min(1)
+    return np.where(np.isfinite(out), out, 0.0)
+
+
+def out_of(position: np.ndarray, yaw: float, slot: tuple[float, float, float, float]) -> Row:
+    """Where a slot of something at a position (3,) lies in the room."""
+    lateral, forward, turn, more = slot
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, z = position[0] + c * lateral + s * forward, position[2] - s * lateral + c * forward
+    return float(x), float(z), yaw + turn, more
+
+
+def aside(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> np.ndarray:
+    """(K, 4) float: a little aside of where the box stands, and turned there; rows as `proposals`."""
+    here, turn = position[i], float(yaw[i])
+    rows: list[Row] = []
+    if setting.carrier[i] >= 0:
+        turn = float(yaw[setting.carrier[i]])
+    elif setting.kinds[i].support == "floor" and not setting.turned[i]:
+        rows += [(float(here[0]), float(here[2]), turn + quarter * HALF_PI, 0.1) for quarter in (1, 2, 3)]
+    ways = [sign * way for way in SLIDES for sign in (-1, 1)]
+    slots = [(way, 0.0) for way in ways] + [(0.0, way) for way in ways if not setting.kinds[i].wall]
+    return np.array(rows + [out_of(here, turn, (*slot, 0.0, 0.05 + 0.1 * abs(sum(slot)))) for slot in slots])
+
+
+def _as_stated(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
+    """Where the graph says that the box stands in the room: at walls, in corners, between two others, beside a twin."""
+    rows: list[Row] = []
+    for one in setting.problem.stated:
+        if one.subject == i and not one.others:
+            rows += along_walls(setting, i, 0.0) + _corners(setting, i, 0.0)
+            rows += _nooks(setting, i, 0.0) if setting.kinds[i].front else []
+        elif one.subject == i:
+            rows += _in_the_open(setting, i, 0.2) + _midway(position, yaw, one.others)
+    return rows
+
+
+def twins(setting: Setting, position: np.ndarray, yaw: np.ndarray, i: int) -> list[Row]:
+    """For a bed that is told to share a nightstand: beside the other one, with room for it between."""
+    rows: list[Row] = []
+    for one in setting.problem.stated:
+        if i in one.others and len(one.others) == 2 and setting.stances[one.subject] == "head":
+            other = next(k for k in one.others if k != i)
+            apart = (setting.size[i, 0] + setting.size[other, 0]) / 2 + setting.size[one.subject, 0] + 0.1
+            back = (setting.size[i, 2] - setting.size[other, 2]) / 2
+            slots = [(side * apart, back, 0.0, 0.0) for side in (-1.0, 1.0)]
+            rows += [out_of(position[other], float(yaw[other]), slot) for slot in slots]
+    return rows
+
+
+def _midway(position: np.ndarray, yaw: np.ndarray, others: Sequence[int]) -> list[Row]:
+    """On the line between the centres of two others and a little beside it, turned as either of them."""
+    at, turn = position[list(others)][:, [0, 2]], yaw[list(others)]
+    way = at[1] - at[0]
+    aside = np.array([-way[1], way[0]]) / max(float(np.linalg.norm(way)), 1e-9)
+    return [
+        (*(at[0] + share * way + lateral * aside).tolist(), float(heading), 0.05 + 0.2 * abs(lateral))
+        for share in (0.3, 0.4, 0.5, 0.6, 0.7)
+        for lateral in (0.0, -0.3, 0.3, -0.6, 0.6)
+        for heading in turn
+    ]
+
+
+def _squared(setting: Setting, i: int) -> float:
+    """The heading parallel to the walls that is nearest to the drawn one."""
+    return float(HALF_PI * np.round((setting.heading[i] - setting.grain) / HALF_PI) + setting.grain)
+
+
+def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
+    """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
+    width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
+    gap = 0.0 if setting.kinds[i].support == "wall" else float(setting.behind[i])
+    rows = []
+    for start, along, length, yaw in setting.walls:
+        free = length - width
+        if free < -0.005:
+            continue
+        low, high = min(0.01, max(free, 0) / 2), max(free - 0.01, max(free, 0) / 2)
+        drawn = float((setting.draft[i, [0, 2]] - start) @ along) - width / 2
+        offsets = np.unique(np.clip([low, high, free / 2, drawn, *np.arange(low, high, STEP)], low, high).round(3))
+        normal = np.array([math.sin(yaw), math.cos(yaw)])
+        for offset in offsets.tolist():
+            x, z = start + along * (offset + width / 2) + normal * (depth / 2 + gap)
+            rows.append((float(x), float(z), yaw, more))
+    return rows
+
+
+def _corners(setting: Setting, i: int, more: float) -> list[Row]:
+    """In the corners of the room: plants and lamps like them."""
+    half = float(max(setting.size[i, 0], setting.size[i, 2])) / 2
+    other = spread_at_walls(f"{setting.kinds[i].name} aside", setting.size[i])
+    rows = []
+    for k, corner in enumerate(setting.floor.polygon):
+        one, two = setting.floor.normal[k], setting.floor.normal[k - 1]
+        x, z = corner + one * (half + setting.behind[i]) + two * (half + other)
+        rows.append((float(x), float(z), setting.walls[k][3], more))
+    return rows
+
+
+def _in_view(setting: Setting, i: int, at_walls: Sequence[Row]) -> list[Row]:
+    """In the room before a screen at the far wall, where a sofa at its own wall would be too far from it."""
+    if not any(stance == "opposite" and a == i for stance, a in zip(setting.stances, setting.anchor, strict=True)):
+        return []
+    rows, far = [], WATCHED_FROM["sofa"][1]
+    for x, z, yaw, more in at_walls:
+        front = np.array([math.sin(yaw), math.cos(yaw)])
+        steps = np.array([x, z]) + np.arange(0.0, 15.0, 0.1)[:, None] * front
+        inside = depth_inside(setting.floor, steps) > 0
+        ahead = 0.1 * float(len(steps) if inside.all() else inside.argmin())
+        if ahead > max(far, AMID * far + PASSAGE):
+            dx, dz = ((ahead - AMID * far) * front).tolist()
+            rows.append((x + dx, z + dz, yaw, more))
+    return rows
+
+
+def _nooks(setting: Setting, i: int, more: float) -> list[Row]:
+    """In the corners, looking across the room."""
+    width, depth = setting.size[i, [0, 2]].tolist()
+    away = 0.5 * (width + depth) * math.sqrt(0.5) + 0.1  # half the diagonal of the turned footprint's hull
+    rows = []
+    for k, corner in enumerate(setting.floor.polygon):
+        inward = setting.floor.normal[k] + setting.floor.normal[k - 1]
+        x, z = corner + inward * away
+        rows.append((float(x), float(z), math.atan2(inward[0], inward[1]), more))
+    return rows
+
+
+def _in_the_open(setting: Setting, i: int, more: float) -> list[Row]:
+    """On a grid over the floor and at the draft, parallel to the walls."""
+    low, high = setting.floor.polygon.min(0), setting.floor.polygon.max(0)
+    xs, zs = (np.arange(a + 0.3, b - 0.2, GRID) for a, b in zip(low, high, strict=True))
+    points = np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2)
+    points = points[depth_inside(setting.floor, points) > 0.25 * float(setting.size[i, [0, 2]].min())]
+    quarters = range(4 if setting.kinds[i].role in ("seat", "sofa") else 2)
+    turns = [_squared(setting, i) + quarter * HALF_PI for quarter in quarters]
+    return [(x, z, yaw, more) for x, z in points.tolist() for yaw in turns]
+
+
+def _overhead(
+    setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np.ndarray, i: int
+) -> list[Row]:  # fmt: skip
+    """Over the middle of tables, beds and sofas' tables, and over the middle of the room."""
+    above = vocabulary().predicate_id("above")
+    told = [b for a, word, b in setting.problem.triplets.tolist() if a == i and word == above]
+    low = setting.kinds[i].look == "pendant_lamp"  # it would meet heads
+    rows: list[Row] = []
+    for j, kind in enumerate(setting.kinds):
+        lit = kind.role == "bed" or (kind.role == "board" and not kind.access)
+        if not there[j] or not (j in told or (lit and setting.standing(j))):
+            continue
+        (x, _, z), heading = position[j].tolist(), float(yaw[j])
+        long = heading if setting.size[j, 0] >= setting.size[j, 2] else heading - HALF_PI
+        more = 0.3 * _lamps_over(setting, position, there, i, j) + 0.2 * (kind.stands == "beside") + LOOSE * (not low)
+        more = 0.0 if j in told else more
+        for away in _row_over(setting, i, j):  # along its long side
+            rows.append((x + math.cos(long) * away, z - math.sin(long) * away, heading, more))
+    middle = (setting.floor.polygon.min(0) + setting.floor.polygon.max(0)) / 2
+    rows.append((float(middle[0]), float(middle[1]), setting.grain, LOOSE / 2 * low))
+    return rows
+
+
+def _row_over(setting: Setting, i: int, j: int) -> list[float]:
+    """Where lamps hang over box j, metres from its middle: as many in a row as are told to."""
+    above = vocabulary().predicate_id("above")
+    lamps = {k for k, predicate, other in setting.problem.triplets.tolist() if predicate == above and other == j}
+    if i not in lamps or len(lamps) < 2:
+        return [over_bed(setting.size, setting.draft, setting.heading, i, j) if setting.kinds[j].role == "bed" else 0.0]
+    length = float(setting.size[j, [0, 2]].max())
+    return [((k + 0.5) / len(lamps) - 0.5) * length for k in range(len(lamps))]
+
+
+def _lamps_over(setting: Setting, position: np.ndarray, there: np.ndarray, i: int, j: int) -> int:
+    """How many other lamps hang over box j."""
+    lamps = there & np.array([kind.support == "ceiling" for kind in setting.kinds])
+    lamps[i] = False
+    return int((np.hypot(*(position[lamps] - position[j])[:, [0, 2]].T) < 0.5).sum())
+
+
+def height_of(setting: Setting, position: np.ndarray, i: int) -> float:
+    """Height of the bottom of a box, metres, where its carrier stands so."""
+    carrier = int(setting.carrier[i])
+    if carrier >= 0:
+        return float(position[carrier, 1] + setting.size[carrier, 1])
+    if carrier == ON_CEILING and setting.problem.height is not None:
+        return setting.problem.height - float(setting.size[i, 1])
+    return 0.0 if setting.standing(i) else float(setting.draft[i, 1])

@@ -1,0 +1,540 @@
+"""Search: pieces and groups are moved to the poses that the objective finds cheapest, all candidates judged at once.
+
+First every piece, anchors before those who attend them; then what the terms that are still missed are about: single
+pieces, groups, exchanges of places; then such pieces are taken out and put in anew, the worst first. The same for equal
+settings on any machine: costs are compared to a ten-thousandth, of equal ones the first counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from scipy.optimize import linear_sum_assignment
+
+from echomodel.objective import TERMS, Plan, Term, unreached
+from echomodel.objective.copies import copies_of
+from echomodel.objective.found import Found
+from echousd.repair.overlaps import beyond, depths
+from echousd.repair.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
+from echousd.repair.relations import margins_at
+from echousd.repair.setting import Setting
+
+JUDGED = 48  # poses that are judged at once
+SWEEPS = 3  # times that what misses something is looked at after the first time
+ANEW = 3  # times that pieces are taken out and put in again
+BUDGET = 6000  # poses that are judged in all; each is a whole room
+GAIN = 1e-3  # by which a move must be better
+GRAIN = 1e4  # costs are compared to so many parts of one
+PULL, FARTHEST, TURN = 0.08, 4.0, 0.1  # for a metre from the draft, up to so many, and for looking the other way
+ATTENDING = 0.25  # share of that for pieces that attend another
+WHOLE = ("floor_used", "floor_served", "each_served")  # terms that ask for all pieces of a room
+FIRST = {"bed": 0.0, "sofa": 1.0, "board": 3.0, "storage": 4.0, "seat": 6.0, "screen": 7.0, "decor": 8.5, "light": 8.0}
+HIT, DEEP, MISSED = 1.0, 4.0, 3.0  # before anything is judged: for running into something, per metre, and relations
+WALKS = 6  # states of those judged at once that are walked through, where something cannot be walked to
+ASKEW = np.radians(20.0)  # what is turned less against the walls is meant to be parallel to them
+ALIKE, REGRET = 0.8, 2.0  # metres within which a pose is the one that is regretted, and for that
+LIT = 0.35  # metres between the middles of a lamp and of what it hangs over
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where the boxes stand: position (n, 3), yaw (n,), and how much better another such pose would be liked (n,)."""
+
+    position: np.ndarray
+    yaw: np.ndarray
+    taste: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Arranged:
+    """What was found: position (n, 3) float, metres, yaw (n,) float, radians; what it costs; poses judged."""
+
+    position: np.ndarray
+    yaw: np.ndarray
+    cost: float
+    judged: int
+
+
+class Search:
+    """One search in a setting."""
+
+    def __init__(self, setting: Setting, terms: tuple[Term, ...] = TERMS, budget: int = BUDGET) -> None:
+        self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
+        said = {int(number) for number in setting.problem.triplets[:, 1]}
+        words = {row.name for row in _predicates() if row.id in said}
+        self.terms = tuple(t for t in terms if t.kind != "relations" or t.name in words or t.name == "placed")
+        self.rooms: dict[bytes, Plan] = {}
+        steps = np.array([any(row.step) for row in _predicates()], bool)
+        self.sided = steps[setting.problem.triplets[:, 1]]
+        self.urgent: list[int] = []
+        self.regrets: dict[int, tuple[float, float, float]] = {}
+        n = len(setting.size)
+        self.children: list[list[int]] = [[] for _ in range(n)]
+        self.screens: list[list[int]] = [[] for _ in range(n)]
+        for k in range(n):
+            parent = int(setting.carrier[k]) if setting.carrier[k] >= 0 else int(setting.anchor[k])
+            if parent >= 0 and not setting.fixed[k] and setting.stances[k] != "near":
+                (self.screens if setting.stances[k] == "opposite" else self.children)[parent].append(k)
+
+    # -- what it costs -----------------------------------------------------------------------------------------------
+
+    def costs(self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """(K,) float: what rooms of boxes `there` (n,) bool cost: position (K, n, 3), yaw (K, n), moved (n,) bool."""
+        room, whole = self._room(there), bool(there.all())
+        self.judged += len(yaw)
+        with torch.inference_mode():
+            copies = copies_of(
+                room, torch.from_numpy(position[:, there]), torch.from_numpy(yaw[:, there]),
+                torch.from_numpy(moved[there]),
+            )  # fmt: skip
+            total = torch.zeros(len(yaw), dtype=torch.float64)
+            for term in self.terms:
+                if whole or term.name not in WHOLE:
+                    seen = term.find(copies)
+                    if len(seen.who):
+                        total.index_add_(0, copies.scene[seen.who], price(term, seen, copies))
+        return total.numpy()
+
+    def _room(self, there: np.ndarray) -> Plan:
+        key = there.tobytes()
+        if key not in self.rooms:
+            self.rooms[key] = self.setting.plan if there.all() else part_of(self.setting.plan, there)
+        return self.rooms[key]
+
+    def faults(self, state: State) -> tuple[float, list[int]]:
+        """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
+        setting = self.setting
+        every = np.ones(len(setting.size), bool)
+        worst: dict[int, float] = {}
+        total = 0.0
+        with torch.inference_mode():
+            room = copies_of(
+                self._room(every), torch.from_numpy(state.position[None]), torch.from_numpy(state.yaw[None]),
+                torch.from_numpy(every),
+            )  # fmt: skip
+            for term in self.terms:
+                seen = term.find(room)
+                if not len(seen.who):
+                    continue
+                paid = price(term, seen, room)
+                total += float(paid.sum())
+                for row in (paid > 0.5).nonzero()[:, 0].tolist():
+                    for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
+                        if box < len(every):
+                            worst[box] = worst.get(box, 0.0) + float(paid[row])
+        lost = self._unreached(state.position, state.yaw)
+        self.walked = bool(lost)
+        for box in lost:
+            worst[box] = worst.get(box, 0.0) + PRICE["living"][0]
+            total += PRICE["living"][0]
+        return total, sorted(worst, key=lambda box: (-round(worst[box], 4), box))
+
+    # -- moves -------------------------------------------------------------------------------------------------------
+
+    def group(self, i: int, there: np.ndarray, state: State) -> list[int]:
+        """A box, whoever attends or stands on it, and the lamps that hang over it."""
+        out, at = [i], 0
+        while at < len(out):
+            for k in self.children[out[at]]:
+                if there[k] and k not in out:
+                    out.append(k)
+            at += 1
+        for k in np.flatnonzero(self.setting.hanging & there).tolist():
+            away = (state.position[k] - state.position[i])[[0, 2]]
+            if k not in out and np.hypot(*away) < LIT:
+                out.append(k)
+        return out
+
+    def moved(self, state: State, there: np.ndarray, i: int) -> State:
+        """The state with box i, and its group with it, at the best of its poses."""
+        setting = self.setting
+        if setting.fixed[i]:
+            return state
+        group = self.group(i, there, state)
+        rows = proposals(setting, state.position, state.yaw, there, i)
+        near = aside(setting, state.position, state.yaw, i)
+        taste = np.concatenate([self._taste(i, rows), state.taste[i] + 0.3 * near[:, 3]])
+        rows = np.concatenate([rows, near])
+        keep = self._promising(state, there, i, group, rows, taste)
+        rows, taste = rows[keep], taste[keep]
+        states = [(state.position[None], state.yaw[None]), self._carried(state, i, group, rows)]
+        tastes = [state.taste[i : i + 1], taste]
+        if len(group) > 1 and self._sided(i, group):  # its other side may be where the graph wants it
+            states.append(self._carried(state, i, group, rows, mirrored=True))
+            tastes.append(taste)
+        screens = [k for k in self.screens[i] if there[k]]
+        if screens:  # it takes them along to the wall ahead
+            states.append(self._carried(state, i, group, rows, screens))
+            tastes.append(taste)
+        changed = np.zeros(len(state.yaw), bool)
+        for stand, beds in self._beside_twin(state, there, i):
+            states.append(beds)
+            tastes.append(np.zeros(len(beds[1])))
+            changed[stand] = True
+        position, yaw = (np.concatenate(part) for part in zip(*states, strict=True))
+        every = np.concatenate(tastes)
+        changed[[*group, *(m for k in screens for m in self.group(k, there, state))]] = True
+        best = self._best(there, position, yaw, changed, every)
+        if best == 0:
+            return state
+        own = state.taste.copy()
+        own[i] = every[best]
+        return State(position[best], yaw[best], own)
+
+    def _beside_twin(self, state: State, there: np.ndarray, i: int) -> list[tuple[int, tuple[np.ndarray, np.ndarray]]]:
+        """For a bed that shares a nightstand: that one, and the states with it between both, side by side."""
+        setting, out = self.setting, []
+        rows = np.array(twins(setting, state.position, state.yaw, i)).reshape(-1, 4)
+        for one in setting.problem.stated if len(rows) else ():
+            stand = one.subject
+            if i in one.others and there[[stand, *one.others]].all() and not setting.fixed[stand]:
+                other = next(k for k in one.others if k != i)
+                position, yaw = self._carried(state, i, [k for k in self.group(i, there, state) if k != stand], rows)
+                level = (setting.size[stand, 2] - setting.size[[i, other], 2].mean()) / 2
+                front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+                middle = (rows[:, :2] + state.position[other, [0, 2]]) / 2
+                position[:, stand, 0], position[:, stand, 2] = (middle + level * front).T
+                yaw[:, stand] = rows[:, 2]
+                out.append((stand, (position, yaw)))
+        return out
+
+    def _sided(self, i: int, group: list[int]) -> bool:
+        """Whether the graph says on which side of anything those who go with box i are."""
+        ends = self.setting.problem.triplets[self.sided]
+        return bool(np.isin(ends[:, [0, 2]], [k for k in group if k != i]).any())
+
+    def _best(
+        self, there: np.ndarray, position: np.ndarray, yaw: np.ndarray, moved: np.ndarray, taste: np.ndarray
+    ) -> int:
+        """Number of the cheapest of K states, the first one where none is better by enough."""
+        cost = np.round((self.costs(there, position, yaw, moved) + taste) * GRAIN)
+        if self.walked and there.all():  # a walk takes as long as many poses
+            for k in {0, *np.argsort(cost, kind="stable")[:WALKS].tolist()}:
+                cost[k] -= GRAIN * 10.0
+                cost[k] += GRAIN * PRICE["living"][0] * self._lost(position[k], yaw[k])
+        best = int(cost.argmin())
+        return best if cost[best] < cost[0] - GAIN * GRAIN else 0
+
+    def _lost(self, position: np.ndarray, yaw: np.ndarray) -> int:
+        """How many pieces cannot be walked to."""
+        return len(self._unreached(position, yaw))
+
+    def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
+        plan = replace(self.setting.plan, position=torch.from_numpy(position), yaw=torch.from_numpy(yaw))
+        vars(plan).update(anchor=self.setting.plan.anchor)
+        return [fault.object for fault in unreached(plan)]
+
+    def reseated(self, state: State, there: np.ndarray, i: int) -> State:
+        """The state with those who stand around box i at one of the ways in which as many sit there."""
+        setting = self.setting
+        seats = [k for k in self.children[i] if there[k] and not setting.turned[k]]
+        ways = seatings(setting, i, seats)
+        if not ways:
+            return state
+        position, yaw = np.repeat(state.position[None], len(ways) + 1, 0), np.repeat(state.yaw[None], len(ways) + 1, 0)
+        for number, slots in enumerate(ways, 1):
+            rows = np.array([out_of(state.position[i], float(state.yaw[i]), slot) for slot in slots])
+            way = np.hypot(*(state.position[seats][:, None, [0, 2]] - rows[None, :, :2]).transpose(2, 0, 1))
+            one, other = linear_sum_assignment(np.round(way, 6))
+            chosen = np.array(seats)[one]
+            position[number, chosen, 0], position[number, chosen, 2] = rows[other, 0], rows[other, 1]
+            yaw[number, chosen] = rows[other, 2]
+        changed = np.zeros(len(state.yaw), bool)
+        changed[seats] = True
+        taste = np.array([state.taste[seats].sum(), *(0.001 * number for number in range(len(ways)))])
+        best = self._best(there, position, yaw, changed, taste)
+        own = state.taste.copy()
+        own[seats] = 0.0
+        return State(position[best], yaw[best], own) if best else state
+
+    def _taste(self, i: int, rows: np.ndarray) -> np.ndarray:
+        """(K,) float: how much others are liked better than these poses of a box."""
+        setting = self.setting
+        off = np.minimum(np.hypot(rows[:, 0] - setting.draft[i, 0], rows[:, 1] - setting.draft[i, 2]), FARTHEST)
+        turned = 0.5 * (1 - np.cos(rows[:, 2] - setting.heading[i]))
+        share = ATTENDING if setting.anchor[i] >= 0 or setting.hanging[i] else 1.0
+        if i in self.regrets:
+            x, z, yaw = self.regrets[i]
+            near = (np.hypot(rows[:, 0] - x, rows[:, 1] - z) < ALIKE) & (np.cos(rows[:, 2] - yaw) > 0.9)
+            off = off + near * REGRET / PULL
+        taste: np.ndarray = share * (PULL * off + TURN * turned) + 0.3 * rows[:, 3]
+        return taste
+
+    def _carried(
+        self,
+        state: State,
+        i: int,
+        group: list[int],
+        rows: np.ndarray,
+        screens: Sequence[int] = (),
+        *,
+        mirrored: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(K, n, 3) and (K, n): the boxes with one at each of K poses, and its group with it as one.
+
+        Arguments:
+            screens: what it looks at, which goes to the wall ahead of it, with what stands on that.
+            mirrored: what stands to its left goes to its right.
+        """
+        setting = self.setting
+        position, yaw = np.repeat(state.position[None], len(rows), 0), np.repeat(state.yaw[None], len(rows), 0)
+        self._carry(position, yaw, state, i, group, rows, mirrored=mirrored)
+        position[:, i, 1] = height_of(setting, state.position, i)
+        for k in screens:
+            front = np.stack([np.sin(rows[:, 2]), np.cos(rows[:, 2])], 1)
+            free = ahead(setting.floor, rows[:, :2], front) - setting.size[k, 2] / 2 - setting.behind[k]
+            at = np.concatenate([rows[:, :2] + free[:, None] * front, rows[:, 2:3] + np.pi], 1)
+            loads = [k, *(m for m in self.children[k] if setting.carrier[m] == k)]
+            self._carry(position, yaw, state, k, loads, at)
+        return position, yaw
+
+    def _carry(
+        self,
+        position: np.ndarray,
+        yaw: np.ndarray,
+        state: State,
+        i: int,
+        group: list[int],
+        rows: np.ndarray,
+        *,
+        mirrored: bool = False,
+    ) -> None:
+        """Put box i at K poses in K states, and a group with it."""
+        turn = rows[:, 2] - state.yaw[i]
+        cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        away, turned = (state.position[group] - state.position[i])[:, [0, 2]], state.yaw[group]
+        if mirrored:
+            side = np.array([np.cos(state.yaw[i]), -np.sin(state.yaw[i])])
+            away = away - 2 * (away @ side)[:, None] * side
+            turned = 2 * state.yaw[i] - turned
+        position[:, group, 0] = rows[:, :1] + cos * away[:, 0] + sin * away[:, 1]
+        position[:, group, 2] = rows[:, 1:2] - sin * away[:, 0] + cos * away[:, 1]
+        free = ~self.setting.turned[group]
+        yaw[:, np.array(group)[free]] = turned[free] + turn[:, None]
+
+    def _promising(
+        self, state: State, there: np.ndarray, i: int, group: list[int], rows: np.ndarray, taste: np.ndarray
+    ) -> np.ndarray:
+        """(k,) int: the poses that run into the least, leave the floor least and break the fewest relations."""
+        setting = self.setting
+        position, yaw = self._carried(state, i, group, rows)
+        others = np.flatnonzero(there & ~np.isin(np.arange(len(there)), group))
+        cost = np.zeros(len(rows))
+        for k in group:
+            deep = depths(setting.size[k], position[:, k], yaw[:, k], setting.size[others], state.position[others],
+                          state.yaw[others])  # fmt: skip
+            deep = np.maximum(deep - setting.shared[k, others], 0.0)
+            out = np.maximum(beyond(setting.floor, setting.size[k], position[:, k], yaw[:, k]), 0.0)
+            cost += (HIT * (deep > 0.01) + DEEP * deep).sum(1) + HIT * (out > 0.01) + DEEP * out
+        told = setting.told(i)
+        told = told[there[told[:, [0, 2]]].all(1) & ~np.isin(np.where(told[:, 0] == i, told[:, 2], told[:, 0]), group)]
+        if len(told):
+            margin = margins_at(
+                i, (position[:, i], yaw[:, i]), told, setting.size, state.position, state.yaw,
+                rules=setting.problem.rules, centre=setting.problem.centre, fronts=setting.problem.fronts,
+            )  # fmt: skip
+            cost += MISSED * (np.maximum(-margin, 0.0) + (margin < 0)).sum(1)
+        order = np.argsort(np.round((cost + taste) * GRAIN), kind="stable")
+        if len(order) <= JUDGED:
+            return order
+        free = order[JUDGED // 2 :]  # some of all the others that are free, too
+        free = free[cost[free] < HIT]
+        some = free[np.linspace(0, len(free) - 1, JUDGED // 2).round().astype(int)] if len(free) else free
+        chosen = np.concatenate([order[: JUDGED // 2], some])
+        return chosen[np.sort(np.unique(chosen, return_index=True)[1])]
+
+    def exchanged(self, state: State, boxes: list[int]) -> State:
+        """The state after two pieces, with their groups, changed places if that is better."""
+        setting, every = self.setting, np.ones(len(state.yaw), bool)
+        free = [i for i in range(len(every)) if setting.standing(i) and not setting.fixed[i]]
+        pairs = [
+            (i, k)
+            for n, i in enumerate(b for b in boxes if b in free)
+            for k in free
+            if k not in boxes[: n + 1] and setting.kinds[k].role == setting.kinds[i].role
+        ]
+        states = [state]
+        for i, k in pairs[: JUDGED - 1]:
+            position, yaw = state.position.copy(), state.yaw.copy()
+            for one, other in ((i, k), (k, i)):
+                row = np.array([[*state.position[other, [0, 2]], state.yaw[other]]])
+                group = self.group(one, every, state)
+                if other in group:
+                    break
+                at, turn = self._carried(state, one, group, row)
+                position[group], yaw[group] = at[0, group], turn[0, group]
+            states.append(State(position, yaw, state.taste))
+        if len(states) < 2:
+            return state
+        cost = self.costs(every, np.stack([s.position for s in states]), np.stack([s.yaw for s in states]), every)
+        best = int(np.round(cost * GRAIN).argmin())
+        return states[best] if cost[best] < cost[0] - GAIN else state
+
+    # -- the whole ---------------------------------------------------------------------------------------------------
+
+    def order(self, boxes: list[int]) -> list[int]:
+        """Anchors first, the large before the small, what stands on others and what hangs last."""
+        setting = self.setting
+
+        def rank(i: int) -> tuple[float, int]:
+            kind, steps, at = setting.kinds[i], 0, i
+            while setting.anchor[at] >= 0 and steps < 4:
+                steps, at = steps + 1, int(setting.anchor[at])
+            area = float(setting.size[i, 0] * setting.size[i, 2])
+            first = 0.3 if setting.stances[i] == "opposite" else FIRST.get(kind.role, 6.0)
+            late = 20.0 if setting.carrier[i] >= 0 else 15.0 if kind.support == "ceiling" else 0.0
+            late -= 5.0 * (i in self.urgent)
+            return late + first + 0.5 * steps - 0.3 * min(area, 3.0), i
+
+        return sorted(boxes, key=rank)
+
+    def swept(self, state: State, boxes: list[int]) -> State:
+        """The state after all of some boxes were moved to better places."""
+        every = np.ones(len(state.yaw), bool)
+        for i in self.order(boxes):
+            if self.judged < self.budget:
+                state = self.reseated(self.moved(state, every, i), every, i)
+        return state
+
+    def rebuilt(self, state: State, out: list[int]) -> State:
+        """The state with some boxes taken out and put in again, one after the other.
+
+        With each come those who attend it, at the first of their slots, so that room is found for them, too.
+        """
+        there = np.ones(len(state.yaw), bool)
+        there[out] = False
+        there |= self.setting.fixed
+        for i in self.order([k for k in out if not there[k]]):
+            there[i] = True
+            state = self._expecting(state, there, i)
+            state = self.reseated(self.moved(state, there, i), there, i)
+        return state
+
+    def _expecting(self, state: State, there: np.ndarray, i: int) -> State:
+        """The state with those who attend box i, and are not there, at their slots; they are there then."""
+        setting = self.setting
+        position, yaw = state.position.copy(), state.yaw.copy()
+        for k in [*self.children[i], *self.screens[i]]:
+            if there[k]:
+                continue
+            slots = sorted(slots_at(setting, k, i), key=lambda slot: slot[3])
+            if not slots and k not in self.screens[i]:
+                continue
+            rows = np.array([out_of(position[i], float(yaw[i]), slot) for slot in slots]).reshape(-1, 4)
+            if len(rows):
+                at = np.stack([rows[:, 0], np.full(len(rows), height_of(setting, position, k)), rows[:, 1]], 1)
+                others = [m for m in np.flatnonzero(there).tolist() if setting.anchor[m] == i or m == i]
+                deep = depths(setting.size[k], at, rows[:, 2], setting.size[others], position[others], yaw[others])
+                hit = np.maximum(deep - setting.shared[k, others], 0.0).max(1, initial=0.0)
+                best = int(np.round(hit * 100).argmin())
+                position[k], yaw[k] = at[best], rows[best, 2]
+            there[k] = True
+        return State(position, yaw, state.taste)
+
+    def squared(self, state: State) -> State:
+        """The state with all that stands nearly parallel to the walls parallel to them."""
+        setting, every = self.setting, np.ones(len(state.yaw), bool)
+        for i in self.order([k for k in range(len(every)) if setting.standing(k)]):
+            off = np.remainder(state.yaw[i] - setting.grain + np.pi / 4, np.pi / 2) - np.pi / 4
+            if abs(off) < ASKEW and not (setting.fixed[i] or setting.turned[i]):
+                row = np.array([[*state.position[i, [0, 2]], state.yaw[i] - off]])
+                position, yaw = self._carried(state, i, self.group(i, every, state), row)
+                state = State(position[0], yaw[0], state.taste)
+        yaw = state.yaw.copy()
+        for k in self.order(list(np.flatnonzero(setting.carrier >= 0))):
+            if setting.kinds[k].front and not (setting.fixed[k] or setting.turned[k]):
+                yaw[k] = yaw[setting.carrier[k]]
+        return State(state.position, yaw, state.taste)
+
+    def involved(self, boxes: list[int]) -> list[int]:
+        """Boxes, whom they attend, and who attends these."""
+        out = list(boxes)
+        for i in boxes:
+            anchor = int(self.setting.anchor[i])
+            out += [anchor] if anchor >= 0 else []
+            out += self.children[anchor if anchor >= 0 else i]
+        return [i for n, i in enumerate(out) if i not in out[:n]]
+
+    def run(self) -> Arranged:
+        """The best state that the budget finds."""
+        setting = self.setting
+        n = len(setting.size)
+        habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
+        state = State(setting.draft.copy(), setting.heading.copy(), np.array(habits))
+        state = self.squared(state)
+        _, wrong = self.faults(state)
+        at = np.array([stance == "at" for stance in setting.stances], bool)
+        mates = np.array([((setting.anchor == a) & at).sum() for a in setting.anchor])
+        seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
+        state = self.swept(state, [i for i in range(n) if not seated[i]])
+        total, wrong = self.faults(state)
+        for _ in range(SWEEPS):
+            if not wrong or self.judged >= self.budget:
+                break
+            after = self.exchanged(self.swept(state, self.involved(wrong)), wrong)
+            cost, still = self.faults(after)
+            if cost >= total - GAIN:
+                break
+            state, total, wrong = after, cost, still
+        for number in range(ANEW):
+            if not wrong or self.judged >= self.budget:
+                break
+            out = self.involved(wrong) if number < ANEW - 1 else list(range(n))
+            if number:  # the worst first, and elsewhere
+                self.urgent = wrong
+                self.regrets = {i: (*state.position[i, [0, 2]], float(state.yaw[i])) for i in wrong[:1]}
+            built = self.rebuilt(state, out)
+            self.urgent, self.regrets = [], {}
+            after = self.swept(built, out)
+            cost, still = self.faults(after)
+            if cost < total - GAIN:
+                state, total, wrong = after, cost, still
+        return Arranged(state.position, state.yaw, total, self.judged)
+
+
+def price(term: Term, seen: Found, room: Plan) -> torch.Tensor:
+    """(P,) float: what the rows of a term cost."""
+    blamed = ~room.given[seen.who] | (term.kind in ("relations", "physics"))
+    missed = (term.slack - seen.margin).clamp(0.0, 2.0)
+    broken, each = PRICE[term.kind]
+    return (broken * (seen.margin < 0) + each * term.weight * missed) * blamed
+
+
+# What a broken term costs, and a unit that is missed of it, by its kind.
+PRICE = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
+
+
+def part_of(room: Plan, there: np.ndarray) -> Plan:
+    """The plan of some boxes of a room, who attend and stand on each other as in the whole."""
+    keep = torch.from_numpy(np.flatnonzero(there))
+    number = torch.full((len(there) + 3,), -1)
+    number[keep] = torch.arange(len(keep))
+
+    def mapped(of: torch.Tensor) -> torch.Tensor:
+        return torch.where(of < 0, of, number[of.clamp_min(0)])[keep]
+
+    rows = room.triplets[torch.from_numpy(there)[room.triplets[:, [0, 2]]].all(1)]
+    rows = torch.stack([number[rows[:, 0]], rows[:, 1], number[rows[:, 2]]], 1)
+    stated = tuple(
+        replace(one, subject=int(number[one.subject]), others=tuple(int(number[k]) for k in one.others))
+        for one in room.stated
+        if there[[one.subject, *one.others]].all()
+    )
+    out = Plan(
+        tuple(room.kinds[k] for k in keep.tolist()), room.size[keep], room.position[keep], room.yaw[keep],
+        room.scene[keep], room.floor, room.openings, rows, room.given[keep], room.height, room.rules, stated,
+    )  # fmt: skip
+    vars(out).update(
+        anchor=mapped(room.anchor), carrier=mapped(room.carrier), joins=mapped(room.joins),
+        stance=tuple(room.stance[k] for k in keep.tolist()),
+    )  # fmt: skip
+    return out
+
+
+def _predicates():  # type: ignore[no-untyped-def]
+    from echomodel.vocabulary import vocabulary
+
+    return vocabulary().predicates

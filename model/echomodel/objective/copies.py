@@ -1,0 +1,197 @@
+"""Copies of one room that differ in the poses of its boxes alone: what is said of its words is said once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from echomodel.objective.plan import Plan
+from echomodel.openings import Opening
+from echomodel.vocabulary import Category
+
+
+@dataclass(frozen=True, eq=False)
+class Copies(Plan):
+    """K copies of a room of N boxes, K * N boxes in all; whom each attends and stands on is as in the first.
+
+    Arguments:
+        template: the room. apart: (N,) bool, boxes that do not stand alike in all copies.
+        others: as `Plan`, of all boxes.
+    """
+
+    template: Plan = field(kw_only=True)
+    apart_in: Tensor = field(kw_only=True)
+
+    @property
+    def count(self) -> int:
+        """How many copies there are."""
+        return len(self.openings)
+
+    @property
+    def first(self) -> Plan:
+        """The room itself."""
+        return self.template
+
+    @cached_property
+    def moved(self) -> Tensor:
+        """(K * N,) bool, boxes that do not stand alike in all copies."""
+        return self.apart_in.repeat(self.count)
+
+    @cached_property
+    def _shift(self) -> Tensor:
+        return torch.arange(self.count)[:, None] * len(self.template)
+
+    def _tiled(self, number: Tensor) -> Tensor:
+        """(K * P,) numbers of boxes of the room (P,), negative ones as they are, in every copy."""
+        return torch.where(number[None] < 0, number[None], number[None] + self._shift).reshape(-1)
+
+    def _mask(self, values: Any) -> Tensor:
+        raise NotImplementedError("masks of copies are those of their room")
+
+    def of(self, *roles: str) -> Tensor:
+        """As `Plan.of`."""
+        return self._repeated(("of", *roles), lambda: self.template.of(*roles))
+
+    def stands(self, *stances: str) -> Tensor:
+        """As `Plan.stands`."""
+        return self._repeated(("stands", *stances), lambda: self.template.stands(*stances))
+
+    def _repeated(self, asked: tuple[str, ...], mask: Callable[[], Tensor]) -> Tensor:
+        if asked not in self._masks:
+            self._masks[asked] = mask().repeat(self.count)
+        return self._masks[asked]
+
+    def which(self, asked: Callable[[Category], object]) -> Tensor:
+        """As `Plan.which`."""
+        return self.template.which(asked).repeat(self.count)
+
+    def column(self, asked: Callable[[Category], Any]) -> Tensor:
+        """As `Plan.column`."""
+        one = self.template.column(asked)
+        return one.repeat(self.count, *[1] * (one.ndim - 1))
+
+    @cached_property
+    def joins(self) -> Tensor:
+        """As `Plan.joins`."""
+        return self._tiled(self.template.joins)
+
+    @cached_property
+    def stance(self) -> tuple[str, ...]:
+        """As `Plan.stance`."""
+        return self.template.stance * self.count
+
+    @cached_property
+    def standing(self) -> Tensor:
+        """As `Plan.standing`."""
+        return self.template.standing.repeat(self.count)
+
+    @cached_property
+    def carrier(self) -> Tensor:
+        """As `Plan.carrier`, of the room."""
+        return self._tiled(self.template.carrier)
+
+    @cached_property
+    def anchor(self) -> Tensor:
+        """As `Plan.anchor`, of the room."""
+        return self._tiled(self.template.anchor)
+
+    @cached_property
+    def group(self) -> Tensor:
+        """As `Plan.group`, of the room."""
+        return self._tiled(self.template.group)
+
+    @cached_property
+    def couples(self) -> tuple[Tensor, Tensor, Tensor]:
+        """As `Plan.couples`; without pairs that stand alike in all copies."""
+        i, j, allowed = self.template.couples
+        differ = self.apart_in[i] | self.apart_in[j]
+        i, j, allowed = i[differ], j[differ], allowed[differ]
+        return self._tiled(i), self._tiled(j), allowed.repeat(self.count)
+
+    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
+        """As `Plan.told`."""
+        one, other = self.template.told(predicate)
+        return self._tiled(one), self._tiled(other)
+
+    def everywhere(self, number: int) -> Tensor:
+        """As `Plan.everywhere`."""
+        return number + self._shift[:, 0]
+
+    @cached_property
+    def rooms(self) -> list[tuple[Tensor, np.ndarray, tuple[Opening, ...]]]:
+        """As `Plan.rooms`."""
+        return [(torch.arange(self.count), corners, openings) for _, corners, openings in self.template.rooms]
+
+    @cached_property
+    def walls(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """As `Plan.walls`."""
+        start, along, normal, length = (of.expand(self.count, *of.shape[1:]) for of in self.template.walls)
+        return start, along, normal, length
+
+    def pairs(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.pairs`."""
+        n = len(self.template)
+        together = first.reshape(-1, n, 1) & second.reshape(-1, 1, n) & ~torch.eye(n, dtype=torch.bool)
+        room, i, j = together.nonzero(as_tuple=True)
+        return room * n + i, room * n + j
+
+    @cached_property
+    def _dense(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
+        """(K * N * N,) each: lateral, forward, half width and half depth of the first in the second's frame, apart."""
+        n = len(self.template)
+        x, z = (self.position[:, axis].reshape(-1, n) for axis in (0, 2))
+        cos, sin = (turn.reshape(-1, n) for turn in self.turn)
+        dx, dz = x[:, :, None] - x[:, None], z[:, :, None] - z[:, None]
+        lateral = cos[:, None] * dx - sin[:, None] * dz
+        forward = sin[:, None] * dx + cos[:, None] * dz
+        along = (cos[:, :, None] * cos[:, None] + sin[:, :, None] * sin[:, None]).abs()
+        across = (sin[:, :, None] * cos[:, None] - cos[:, :, None] * sin[:, None]).abs()
+        width, depth = self.template.size[:, None, 0] / 2, self.template.size[:, None, 2] / 2
+        half_width, half_depth = along * width + across * depth, across * width + along * depth
+        gap = torch.maximum(lateral.abs() - half_width - width.T, forward.abs() - half_depth - depth.T)
+        gap = torch.maximum(gap, gap.transpose(1, 2))
+        return tuple(of.reshape(-1) for of in (lateral, forward, half_width, half_depth, gap))  # type: ignore[return-value]
+
+    def _at(self, i: Tensor, j: Tensor) -> Tensor:
+        n = len(self.template)
+        return i * n + j % n
+
+    def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.local`."""
+        at = self._at(i, j)
+        return self._dense[0][at], self._dense[1][at]
+
+    def reach(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.reach`."""
+        at = self._at(i, j)
+        return self._dense[2][at], self._dense[3][at]
+
+    def apart(self, i: Tensor, j: Tensor) -> Tensor:
+        """As `Plan.apart`."""
+        return self._dense[4][self._at(i, j)]
+
+    def __len__(self) -> int:
+        return self.count * len(self.template)
+
+
+def copies_of(room: Plan, position: Tensor, yaw: Tensor, moved: Tensor) -> Copies:
+    """Copies of a plan of one room.
+
+    Arguments:
+        room: N boxes. position: (K, N, 3) float, metres; yaw: (K, N) float, radians, of the copies.
+        moved: (N,) bool, boxes that do not stand alike in all of them.
+    """
+    count = len(yaw)
+    return Copies(
+        room.kinds * count, room.size.repeat(count, 1), position.reshape(-1, 3), yaw.reshape(-1),
+        torch.arange(count).repeat_interleave(len(room)), room.floor.expand(count, *room.floor.shape[1:]),
+        room.openings * count, room.triplets[:0], room.given.repeat(count),
+        None if room.height is None else room.height.expand(count), room.rules, room.stated,
+        template=room, apart_in=moved,
+    )  # fmt: skip

@@ -1,0 +1,60 @@
+"""Copies of a room are judged as each of them alone, whatever moves in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from echomodel.data.rooms.generator import generate_rooms
+
+from echomodel.objective import TERMS, plan_of
+from echomodel.objective.copies import copies_of
+from echomodel.rules import label_relations
+from echomodel.rules.placements import Stated
+
+ROOMS = [
+    room
+    for count, seed, word in ((3, 5, None), (2, 7, "living_dining_room"), (2, 3, "bedroom"))
+    for room in generate_rooms(count, seed, room_type=word)
+    if len(room) > 4
+]
+
+
+@pytest.fixture(scope="module", params=range(len(ROOMS)))
+def copied(request):
+    """A plan, seven copies of it with two boxes elsewhere, each as a plan of its own, and which boxes these are."""
+    room = ROOMS[request.param]
+    told = label_relations(room, rules="strict", drop=0.7, rng=np.random.default_rng(0))
+    stated = (Stated("against_wall", 0), Stated("between", 1, (0, 2)))
+    plan = plan_of(room, room.categories, room.floor_polygon, room.openings, told, height=2.7, stated=stated)
+    luck = torch.Generator().manual_seed(request.param)
+    position, yaw = plan.position[None].repeat(7, 1, 1), plan.yaw[None].repeat(7, 1)
+    moved = torch.zeros(len(plan), dtype=torch.bool)
+    moved[[1, len(plan) // 2]] = True
+    position[:, moved] += torch.randn(7, int(moved.sum()), 3, generator=luck).double() * torch.tensor([0.6, 0.0, 0.6])
+    yaw[:, moved] += torch.randint(0, 4, (7, int(moved.sum())), generator=luck) * np.pi / 2
+    alone = [replace(plan, position=position[k], yaw=yaw[k]) for k in range(7)]
+    for one in alone:
+        for name in ("anchor", "carrier", "joins"):
+            vars(one)[name] = getattr(plan, name)
+    return plan, copies_of(plan, position, yaw, moved), alone, moved
+
+
+@pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
+def test_terms_find_in_copies_what_they_find_in_each(copied, term):
+    plan, copies, alone, moved = copied
+    seen, differ = term.find(copies), {}
+    for k, one in enumerate(alone):
+        whole = term.find(one)
+        rows = seen.who // len(plan) == k
+        here = sorted(zip((seen.who[rows] % len(plan)).tolist(), seen.margin[rows].tolist(), strict=True))
+        every = sorted(zip(whole.who.tolist(), whole.margin.tolist(), strict=True))
+        for who, margin in here:
+            match = [row for row in every if row[0] == who and row[1] == pytest.approx(margin, abs=1e-6)]
+            assert match, (term.name, who, margin, every)
+            every.remove(match[0])
+        differ[k] = [(who, round(margin, 6)) for who, margin in every]  # left out, as it stands alike in all copies
+    assert all(left == differ[0] for left in differ.values()), term.name
+    assert not any(moved[who] for who, _ in differ[0])
