@@ -41,11 +41,12 @@ def seat_faces(plan: Plan) -> Found:
 
 
 def seat_in_reach(plan: Plan) -> Found:
-    """A seat whose work is at a table or desk stands at it."""
+    """A seat whose work is at a table or desk stands at it, a stool at its dressing table."""
     i, j = plan.attended("at")
     if not len(i):
         return nobody(plan.size)
-    bound = ~plan.which(lambda kind: kind.solid)[i]  # stools go anywhere
+    works = plan.which(lambda kind: kind.access > 0 or kind.wall)  # at a dinner table stools go anywhere
+    bound = ~plan.which(lambda kind: kind.solid)[i] | works[j]
     i, j = i[bound], j[bound]
     off = plan.gap(i, j) - plan.size[i, 2] / 2
     return found(i, REACH - off, other=j, measure=off)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -375,7 +375,7 @@ def plan_of(
     none = np.zeros(len(size), bool)
     triplets = np.zeros((0, 3), int) if relations is None else np.asarray(relations)
     return Plan(
-        tuple(kind_of(word) for word in categories),
+        kinds_of(categories, triplets),
         size,
         torch.as_tensor(boxes.position).to(dtype),
         torch.as_tensor(boxes.yaw).to(dtype),
@@ -392,6 +392,23 @@ def plan_of(
 
 def _listed(i: Tensor, j: Tensor) -> list[tuple[int, int]]:
     return list(zip(i.tolist(), j.tolist(), strict=True))
+
+
+def kinds_of(categories: Sequence[str], triplets: np.ndarray | Tensor) -> tuple[Category, ...]:
+    """The rows of N words; an armchair that is told to be at a desk where nobody else sits is a chair of that desk.
+
+    Arguments:
+        categories: N words. triplets: (E, 3) int, [subject, predicate id, object].
+    """
+    rows = [kind_of(word) for word in categories]
+    near = {vocabulary().predicate_id(word) for word in ("close_by", "facing")}
+    told = [(a, b) for a, predicate, b in np.asarray(triplets).reshape(-1, 3).tolist() if predicate in near]
+    pairs = [(a, b) for a, b in (*told, *((b, a) for a, b in told)) if rows[b].role == "board" and rows[b].access]
+    for seat, desk in pairs:
+        others = any(b == desk and a != seat and rows[a].stands == "at" for a, b in pairs)
+        if rows[seat].role == "seat" and rows[seat].stands == "company" and not others:
+            rows[seat] = replace(rows[seat], stands="at", belongs_to=(rows[desk].name,))
+    return tuple(rows)
 
 
 def kind_of(word: str) -> Category:

@@ -11,6 +11,7 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.objective import TERMS, faults, faults_of, missed, plan_of
+from echomodel.objective.plan import kinds_of
 from echomodel.objective.ways import ways
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
@@ -338,3 +339,34 @@ def test_the_sofa_that_screen_and_table_are_told_of_is_the_first_whatever_its_si
     assert plan_of(Boxes, words).joins.tolist() == [-1, 0, -1, -1]
     told = np.array([(3, opposite, 1), (2, near, 0)])
     assert plan_of(Boxes, words, None, (), told).joins.tolist() == [1, -1, -1, -1]
+
+
+def told_near(*pairs):
+    near = vocabulary().predicate_id("close_by")
+    return np.array([(a, near, b) for a, b in pairs])
+
+
+def test_an_armchair_that_is_told_to_be_at_a_desk_is_its_chair():
+    room = Room({
+        "desk": {"kind": "desk", "size": (1.4, 0.75, 0.7), "at": (0.0, -1.65)},
+        "armchair": {"kind": "armchair", "size": (0.75, 0.9, 0.75), "at": (1.3, -1.6)},
+    })  # fmt: skip
+    assert ("armchair", "seat_faces") in room.found(relations=told_near((1, 0)))  # beside it, facing away
+    assert ("armchair", "seat_faces") not in room.found()
+    drawn_up = room.moved("armchair", at=(0.0, -0.95), yaw=np.pi)
+    assert drawn_up.found(relations=told_near((1, 0))) == {}
+    assert drawn_up.found(relations=told_near((0, 1))) == {}
+
+
+def test_an_armchair_beside_a_desk_where_somebody_sits_is_company():
+    words = ["desk", "office_chair", "armchair"]
+    assert [row.stands for row in kinds_of(words, told_near((1, 0), (2, 0)))] == ["", "at", "company"]
+    assert [row.stands for row in kinds_of(words, told_near((2, 0)))] == ["", "at", "at"]
+
+
+def test_a_stool_stands_at_its_dressing_table_and_anywhere_at_a_dinner_table():
+    stool = {"kind": "stool", "size": (0.4, 0.45, 0.4), "at": (0.0, 0.2)}
+    dressing = {"kind": "dressing_table", "size": (1.0, 0.75, 0.45), "at": (0.0, -1.77)}
+    dining = {"kind": "dining_table", "size": (1.4, 0.75, 0.8), "at": (0.0, -1.3)}
+    assert ("stool", "seat_in_reach") in Room({"stool": stool, "table": dressing}).found()
+    assert ("stool", "seat_in_reach") not in Room({"stool": stool, "table": dining}).found()
