@@ -60,6 +60,9 @@ class PlainModel(BaseModel, metaclass=_Plain):
     def _title(cls, fields: dict[str, Any]) -> str:
         return ""
 
+    def __dir__(self) -> list[str]:
+        return sorted({*dir(type(self)), *type(self).model_fields})
+
     def replaced(self, **fields: Any) -> Any:
         """A copy with other values in `fields`, validated."""
         return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **fields})

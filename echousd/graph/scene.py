@@ -16,6 +16,7 @@ from echousd.graph.consistency import GraphError, listed, name_faults, raise_all
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.text import graph_from_text
+from echousd.graph.titles import name_of
 from echousd.graph.writing import graph_to_json, graph_to_yaml
 
 
@@ -118,8 +119,15 @@ class SceneGraph(PlainModel):
         return self.update_node(name, locked=locked)
 
     def relate(self, subject: str, predicate: str, object: str, confidence: float = 1.0) -> SceneGraph:
-        """With one more relation."""
-        return self.replaced(relations=(*self.relations, Relation(subject, predicate, object, confidence)))
+        """With one more relation in any words that files take, `relate("tv", "under", "shelf")`; raises `GraphError`."""
+        ends = self._ends(subject, predicate, object)
+        return self.replaced(relations=(*self.relations, Relation(*ends, confidence)))
+
+    def _ends(self, subject: str, predicate: str, object: str) -> tuple[str, str, str]:
+        """Names and predicate of a relation in somebody's words: `a under b` is `b above a`."""
+        subject, object = name_of(subject, self.titles), name_of(object, self.titles)
+        turned = vocabulary().swapped(predicate) if isinstance(predicate, str) else None
+        return (subject, predicate, object) if turned is None else (object, turned.name, subject)
 
     def unrelate(self, subject: str, predicate: str, object: str) -> SceneGraph:
         """Without a relation."""
@@ -136,6 +144,7 @@ class SceneGraph(PlainModel):
 
     def relation(self, subject: str, predicate: str, object: str) -> Relation:
         """The relation with these ends and this predicate (or alias); raises `GraphError`."""
+        subject, predicate, object = self._ends(subject, predicate, object)
         wanted = (subject, vocabulary().predicate(predicate).name, object)
         found = next((r for r in self.relations if r.triple == wanted), None)
         if found is None:

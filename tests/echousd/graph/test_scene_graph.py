@@ -313,3 +313,23 @@ def test_every_step_is_named(bedroom):
 def test_the_type_of_an_attribute_is_a_difference(bedroom):
     one = bedroom.update_node("bed", attributes={"a": 1})
     assert one.diff(one.update_node("bed", attributes={"a": True})).touched == {"bed"}
+
+
+def test_relations_are_stated_in_the_words_that_files_take(bedroom):
+    titled = bedroom.update_node("bed", title="Große Liege")
+    above = titled.relate("Große Liege", "under", "lamp")
+    assert above.relations[-1].triple == ("lamp", "above", "bed")
+    assert above.relation("bed", "below", "lamp") is above.relations[-1]
+    assert above.unrelate("Große Liege", "under", "lamp") == titled
+    with pytest.raises(GraphError, match="unknown predicate 'beneathish'"):
+        bedroom.relate("bed", "beneathish", "lamp")
+    with pytest.raises(GraphError):
+        bedroom.relate("bed", 3, "lamp")
+
+
+def test_names_that_pydantic_brings_along_are_not_shown(bedroom):
+    for thing in (bedroom, bedroom.node("bed"), bedroom.room):
+        shown = dir(thing)
+        assert not [name for name in shown if name.startswith(("model_", "_", "parse_", "copy"))]
+        assert set(type(thing).model_fields) <= set(shown)
+    assert {"relate", "names", "nodes"} <= set(dir(bedroom))
