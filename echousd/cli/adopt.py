@@ -25,6 +25,7 @@ def adopt(
         typer.Option(help="Object to add, name:category; default: what such a room usually holds and this one lacks."),
     ] = None,
     relate: Annotated[list[str] | None, typer.Option(help='Relation to keep: "lamp close by sofa".')] = None,
+    names: Annotated[bool, typer.Option("--names", help="Names of prims count where labels are missing.")] = False,
     force: Force = False,
     wait: Wait = False,
     outside: Outside = None,
@@ -53,7 +54,7 @@ def adopt(
         from echousd.stage.apart import check_apart
 
         check_apart(stage)
-        graph = adopted(stage, room=room, add=add, relate=relate or ())
+        graph = adopted(stage, room=room, add=add, relate=relate or (), names=names)
         made = generate(graph, options=options, outside=outside or (), progress=listen)
         written = write_room(made, output, StageTimer(listen), force=force)
     kept = sum(node.asset is not None for node in graph.nodes)

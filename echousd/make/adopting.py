@@ -19,7 +19,12 @@ ONE_IS_ENOUGH = ("bed", "sofa", "screen")  # roles of which a room that has one 
 
 
 def adopted(
-    file: Path, *, room: str | None = None, add: Sequence[str] | None = None, relate: Sequence[str] = ()
+    file: Path,
+    *,
+    room: str | None = None,
+    add: Sequence[str] | None = None,
+    relate: Sequence[str] = (),
+    names: bool = False,
 ) -> SceneGraph:
     """The graph of a stage of somebody else's, completed: its objects are locked where they stand and refer to it.
 
@@ -28,13 +33,14 @@ def adopted(
         room: room type, None = as the stage's words and furniture say.
         add: new objects as `name:category`, None = what such a room usually holds and this one lacks.
         relate: relations, `lamp close by sofa`.
+        names: what has no label is known by the name of its asset or prim.
 
     Raises ValueError for a stage that cannot be read, that has nothing to adopt, or that has a scene graph already.
     """
     stage = open_stage(file)
     if find_rooms(stage):
         raise ValueError(f"{file}: has a scene graph already; echousd generate and echousd update go on with it")
-    graph, paths = foreign_pieces(stage, room)
+    graph, paths = foreign_pieces(stage, room, names=names)
     theirs = tuple(
         node.replaced(locked=True, source=None, asset=joined(file.absolute().as_posix(), paths[node.name]))
         for node in graph.nodes

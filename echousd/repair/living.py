@@ -30,7 +30,7 @@ class LivingFault:
 def living_faults(
     graph: SceneGraph, boxes: BoxesLike, floor: np.ndarray | None = None, *, all_blamed: bool = False
 ) -> tuple[LivingFault, ...]:
-    """Every living rule that an object breaks; objects whose place the graph states are not blamed.
+    """Every living rule that an object breaks; obstacles and objects whose place the graph states are not blamed.
 
     Arguments:
         graph: N objects, their relations, the room with its openings.
@@ -50,7 +50,7 @@ def living_faults(
         floor if corners is None else np.asarray(corners, float),  # openings count the edges of the stated floor
         graph.room.openings if corners is not None else (),
         np.array(triplets, int).reshape(-1, 3),
-        given=np.array([node.position is not None and not all_blamed for node in graph.nodes]),
+        given=np.array([bool(n.obstacle) or (n.position is not None and not all_blamed) for n in graph.nodes]),
     )
     return tuple(
         LivingFault(names[f.object], f.rule, names[f.other] if f.other >= 0 else None, f.margin, f.sentence(names))

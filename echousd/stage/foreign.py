@@ -18,11 +18,21 @@ from echousd.graph.nodes import OBSTACLE
 from echousd.naming import free_name
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source
-from echousd.stage.labels import category_of_name, is_floor, is_structure, known_category, labels, room_word
+from echousd.stage.labels import (
+    STRUCTURE,
+    category_of_name,
+    is_floor,
+    is_structure,
+    known_category,
+    labels,
+    room_word,
+    spaced,
+)
 from echousd.stage.units import metres_per_unit, up_axis
 
 TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
 LARGE = 0.3  # metres: a thing of an unknown class with two longer sides is in the way
+COLUMN = (1.2, 0.1, 1.2)  # metres: least height, least and largest side of what stands in the way without a label
 STOREY = 2.6  # metres above a floor that its furniture stands in
 _UPRIGHT = 1e-3  # how far an axis may lean, as the deviation of a rotation matrix's entries
 _FLAT = 1e-18  # the determinant of a transform that leaves no volume
@@ -104,8 +114,8 @@ def foreign_graph(
 def foreign_pieces(
     stage: Usd.Stage, room_type: str | None = None, *, names: bool = False
 ) -> tuple[SceneGraph, dict[str, str]]:
-    """The graph as `foreign_graph` reads it, and the prim path of every node."""
-    found = _read(stage, names=names)
+    """The graph as `foreign_graph` reads it, and the prim path of every node; columns without a label are obstacles."""
+    found = _read(stage, names=names, columns=True)
     floor = next((box for _, box in found.floors), None)
     graph = _graph(stage, [node for _, node in found.nodes], floor, room_type, found.words)
     return graph, {node.name: str(path) for path, node in found.nodes}
@@ -149,7 +159,7 @@ class _Found:
     words: list[str]
 
 
-def _read(stage: Usd.Stage, *, names: bool) -> _Found:
+def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
     frame = StageFrame.of(stage)
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
     found = _Found([], [], [])
@@ -169,6 +179,8 @@ def _read(stage: Usd.Stage, *, names: bool) -> _Found:
         if category is None:
             if is_floor(prim, words, names=names) and (ground := frame.box(_object_bound(cache, prim))) is not None:
                 found.floors.append((prim.GetPath(), ground))
+            if columns and not words and _is_column(prim, frame.box(_object_bound(cache, prim))):
+                words = [spaced(prim.GetName()) or OBSTACLE]
             if not words or any(is_structure(word) for word in words):
                 continue
             if not _holds_furniture(prim) and _is_large(frame.box(_object_bound(cache, prim))):
@@ -194,7 +206,7 @@ def _read(stage: Usd.Stage, *, names: bool) -> _Found:
     if not found.nodes:
         raise StageError(
             f"{source(stage)}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds "
-            "to make one of" + ("" if names else "; `echousd graph --names` takes the names of prims for labels")
+            "to make one of" + ("" if names else "; --names takes the names of prims for labels")
         )
     return found
 
@@ -223,6 +235,20 @@ def _graph(
 
 def _is_large(box: Box | None) -> bool:
     return box is not None and min(box.size) > 0 and sorted(box.size)[1] >= LARGE
+
+
+def _is_column(prim: Usd.Prim, box: Box | None) -> bool:
+    """Whether a thing without a label stands in the way: high, and no wall by its plan or its name."""
+    if box is None or box.size[1] < COLUMN[0] or any(any(labels(below)) for below in Usd.PrimRange(prim)):
+        return False
+    if not COLUMN[1] <= min(box.size[0], box.size[2]) <= max(box.size[0], box.size[2]) <= COLUMN[2]:
+        return False
+    above = prim
+    while above and not above.IsPseudoRoot():
+        if any(labels(above)) or not STRUCTURE.isdisjoint(spaced(above.GetName()).split("_")):
+            return False
+        above = above.GetParent()
+    return True
 
 
 def _holds_furniture(prim: Usd.Prim) -> bool:

@@ -3,13 +3,18 @@ import json
 
 import numpy as np
 import pytest
+import torch
 from pxr import Gf, Usd, UsdGeom, UsdSemantics
 from small_models import chest, seat
 from small_room import BARE, StandIn
 
 import echousd
+from echomodel.boxes import Boxes
 from echousd import check
+from echousd.graph import RoomSpec
 from echousd.make.adopting import adopted, seen_in_theirs
+from echousd.make.reading import read_room
+from echousd.repair.living import living_faults
 from echousd.stage import open_stage
 
 
@@ -96,7 +101,8 @@ def stage_of(path, *pieces):
         prim = UsdGeom.Xform.Define(stage, f"/World/{name}")
         prim.AddTranslateOp().Set(Gf.Vec3d(*place))
         prim.AddRotateYOp().Set(turn)
-        UsdSemantics.LabelsAPI.Apply(prim.GetPrim(), "category").CreateLabelsAttr([label])
+        if label:
+            UsdSemantics.LabelsAPI.Apply(prim.GetPrim(), "category").CreateLabelsAttr([label])
         form = UsdGeom.Mesh.Define(stage, f"/World/{name}/form")
         form.CreatePointsAttr([tuple(map(float, point)) for point in mesh.vertices])
         form.CreateFaceVertexCountsAttr([3] * len(mesh.faces))
@@ -121,7 +127,7 @@ def test_what_a_person_would_point_at_in_their_arrangement_is_told(tmp_path, tur
 
 
 def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monkeypatch):
-    monkeypatch.setattr("echomodel.loading.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
     words = ("adopt", loft, "-o", tmp_path / "room", "--add", "wardrobe:wardrobe", "--shapes", "boxes")
     done = echousd_command(*words, "--collect", "--json")
     assert done.code in (0, 1), done.err
@@ -134,3 +140,40 @@ def test_the_command_collects_their_pieces(loft, tmp_path, echousd_command, monk
     done = echousd_command(*words, "--text", "mid-century oak")
     assert done.code == 2
     assert "text 'mid-century oak' needs models to choose from; name a library's index (assets)" in done.err
+
+
+def test_a_stage_without_labels_is_known_by_its_names(tmp_path, echousd_command, monkeypatch):
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    loft = stage_of(tmp_path / "loft.usda", ("SM_Double_Bed_03", seat(1.8, 1.0, 2.1), "", (0, 0, 0), 0))
+    words = ("adopt", loft, "-o", tmp_path / "room", "--add", "wardrobe:wardrobe", "--shapes", "boxes", "--quiet")
+    done = echousd_command(*words)
+    assert (done.code, "no prims with semantics labels and bounds" in done.err) == (2, True)
+    assert "--names takes the names of prims for labels" in done.err
+    done = echousd_command(*words, "--names")
+    assert done.code in (0, 1), done.err
+    assert read_room(tmp_path / "room/room.usda").graph.node("SM_Double_Bed_03").category == "double_bed"
+
+
+def test_a_column_without_a_label_stands_in_the_way_and_nowhere_better(tmp_path):
+    sofa = ("sofa", seat(2.0, 0.8, 0.9), "sofa", (0, 0, 1.5), 180)
+    pieces = (
+        ("column", chest(0.4, 2.6, 0.4), "", (2.2, 0, -0.5), 0),
+        ("Wall", chest(0.2, 2.6, 0.9), "", (3, 0, 0), 0),
+    )
+    graph = adopted(stage_of(tmp_path / "loft.usda", sofa, *pieces), room="living_room", add=["plant:plant"])
+    assert graph.names == ("sofa", "column", "plant")
+    assert (graph.node("column").obstacle, graph.node("column").locked) == ("column", True)
+    room = echousd.generate(graph, shapes="boxes", steps=2, drafts=1, **BARE)
+    assert not [one for one in seen_in_theirs(room) if "column" in one]
+    report = check(room.save(tmp_path / "room", preview=False))
+    assert (report.errors, report.placement, report.layouts[0].living) == ((), (), ())
+
+
+def test_an_obstacle_is_not_told_to_stand_at_a_wall(tmp_path):
+    loft = stage_of(tmp_path / "loft.usda", ("sofa", seat(2.0, 0.8, 0.9), "sofa", (0, 0, 2.5), 180),
+                    ("column", chest(0.4, 2.6, 0.4), "", (0.5, 0, -2), 0))  # fmt: skip
+    graph = adopted(loft, add=[]).replaced(room=RoomSpec("living_room", size=(8.0, 8.0)))
+    boxes = Boxes(*(torch.tensor([getattr(n, word) for n in graph.nodes]) for word in ("size", "position", "yaw")))
+    assert "column" not in {fault.object for fault in living_faults(graph, boxes, all_blamed=True)}
+    cabinet = graph.update_node("column", attributes={})
+    assert "column" in {fault.object for fault in living_faults(cabinet, boxes, all_blamed=True)}

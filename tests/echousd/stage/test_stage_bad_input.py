@@ -109,7 +109,7 @@ def test_a_stage_without_a_graph():
     name = stage.GetRootLayer().identifier
     assert complaint(stage) == (
         f"{name}: no scene graph (no EchoSceneGraph prim) and no prims with semantics labels and bounds to make one "
-        "of; `echousd graph --names` takes the names of prims for labels"
+        "of; --names takes the names of prims for labels"
     )
     assert read_rooms(stage) == {}
     with pytest.raises(StageError, match="no scene graph"):

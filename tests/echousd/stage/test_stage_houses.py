@@ -63,7 +63,7 @@ def test_a_house_is_split_by_its_floors_where_no_names_tell(tmp_path):
 
 def test_names_count_only_when_asked_and_the_error_says_so(tmp_path):
     stage = house(tmp_path / "house.usda", labelled=False)
-    with pytest.raises(StageError, match=r"semantics labels and bounds to make one of; `echousd graph --names` takes"):
+    with pytest.raises(StageError, match=r"semantics labels and bounds to make one of; --names takes"):
         foreign_graph(stage)
     assert len(foreign_graph(stage, names=True).nodes) == 4
 
