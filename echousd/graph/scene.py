@@ -119,7 +119,7 @@ class SceneGraph(PlainModel):
         return self.update_node(name, locked=locked)
 
     def relate(self, subject: str, predicate: str, object: str, confidence: float = 1.0) -> SceneGraph:
-        """With one more relation in any words that files take, `relate("tv", "under", "shelf")`; raises `GraphError`."""
+        """With one more relation in words that files take, `relate("tv", "under", "shelf")`; raises `GraphError`."""
         ends = self._ends(subject, predicate, object)
         return self.replaced(relations=(*self.relations, Relation(*ends, confidence)))
 
