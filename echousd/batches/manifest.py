@@ -16,6 +16,9 @@ from echousd.batches.rows import COLUMNS
 MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
 
 
+SUMS = ("objects", "relations_asked", "relations_kept", "collisions", "restless", "faces", "bytes", "seconds")
+
+
 def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
     """One row for every room of the plan, whatever became of it; `root` is relative to the run's folder."""
     journals = read_journals(folder)
@@ -39,7 +42,7 @@ def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
         if row["state"] != "done":
             continue
         kinds[row["type"]] += 1
-        for name in ("objects", "relations_asked", "relations_kept", "collisions", "faces", "bytes", "seconds"):
+        for name in SUMS:
             sums[name] += row[name]
         sums["living_faults"] += len(row["living_faults"])
         sums["passed_check"] += row["check"]

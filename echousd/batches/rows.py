@@ -21,7 +21,7 @@ FARTHEST = 1e6  # metres
 COLUMNS: dict[str, Any] = {
     "id": "", "state": "missing", "source": "", "seed": 0, "type": "", "graph": "", "weights": "", "version": "",
     "shapes": "", "root": "", "bounds": [], "objects": 0, "categories": {}, "relations_asked": 0,
-    "relations_kept": 0, "living_faults": [], "collisions": 0, "check": False, "check_errors": [],
+    "relations_kept": 0, "living_faults": [], "collisions": 0, "restless": 0, "check": False, "check_errors": [],
     "faces": 0, "bytes": 0, "licences": [], "sha256": "", "seconds": 0.0, "error": "",
 }  # fmt: skip
 

@@ -45,20 +45,21 @@ def verify(folder: Path, *, check: bool = False, to: str = "") -> Iterator[Wrong
         raise ValueError(f"{folder}: the rooms are {where}")
     for entry in plan.entries:
         row, place = rows.get(entry.id), entry.folder(folder)
+        settle = plan.options[entry.options].settle  # its verdict said so, too
         if row is None:
             yield Wrong(entry.id, "missing" if not place.is_dir() else "in the folder, not in the journal")
         elif row["state"] != "done":
             yield Wrong(entry.id, f"failed: {row['error']}")
         elif plan.to:
             with fetched(plan.to, entry.path) as copy:
-                fault = _fault(copy / entry.path, row, whole_keys(copy), check=check)
+                fault = _fault(copy / entry.path, row, whole_keys(copy), check=check, settle=settle)
         else:
-            fault = _fault(place, row, stored, check=check)
+            fault = _fault(place, row, stored, check=check, settle=settle)
         if row is not None and row["state"] == "done" and fault:
             yield Wrong(entry.id, fault)
 
 
-def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: bool) -> str:
+def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: bool, settle: bool) -> str:
     fault = fault_of(place, row, stored)
     if fault or not check:
         return fault
@@ -67,11 +68,13 @@ def _fault(place: Path, row: dict[str, Any], stored: Collection[str], *, check: 
 
     try:
         check_apart(place / row["root"])
-        report = checked(place / row["root"])
+        report = checked(place / row["root"], settle=settle)
     except (ValueError, OSError) as error:
         return f"check: {error}"
     counts = (len(report.broken), len(report.collisions), len(report.placement), len(report.errors))
-    return "" if report.ok else "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
+    restless = sum(len(found.restless) for found in report.settled or ())
+    told = "check: {} relations, {} collisions, {} misplaced, {} errors".format(*counts)
+    return "" if report.ok else told + f", {restless} restless" * bool(restless)
 
 
 def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:

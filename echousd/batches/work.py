@@ -149,7 +149,7 @@ def room(job: Job) -> dict[str, Any] | Best | Wanted:
         except SamplesWanted as wanted:
             return Wanted(wanted.call)
         root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
-    facts = {**_facts(made, root), "rounds": max(1, len(job.rounds))}
+    facts = {**_facts(made, root, settle=job.options.settle), "rounds": max(1, len(job.rounds))}
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
     facts["seconds"] = round(time.perf_counter() - started, 3)
     return facts
@@ -220,15 +220,16 @@ def _boxes(rows: Rows) -> Any:
     return Boxes(numbers[:, :3].contiguous(), numbers[:, 3:6].contiguous(), numbers[:, 6].contiguous())
 
 
-def _facts(made: Any, root: Path) -> dict[str, Any]:
+def _facts(made: Any, root: Path, *, settle: bool) -> dict[str, Any]:
     from echousd.checks import check
 
-    report = check(root)
+    report = check(root, settle=settle)
     floor, geometry = made.floor, made.geometry
     states = Counter(verdict.state for verdict in made.verdicts)
     users = made.asset_users
     misplaced = [f"{one.object} is {one.problem}" for one in report.placement]
     errors = [f"{fault.rule} <{fault.prim}>: {fault.message}" for fault in report.errors]
+    restless = [sentence for found in report.settled or () for sentence in found.sentences]
     low, high = floor.min(0), floor.max(0)
     text = made.graph.to_json()
     return {
@@ -244,8 +245,9 @@ def _facts(made: Any, root: Path) -> dict[str, Any]:
         "relations_kept": states["kept"],
         "living_faults": [fault.says for fault in report.layouts[0].living],
         "collisions": len(report.collisions),
+        "restless": len(restless),
         "check": report.ok,
-        "check_errors": [text[:300] for text in (*misplaced, *errors)][:10],
+        "check_errors": [text[:300] for text in (*restless, *misplaced, *errors)][:10],
         "faces": sum(geometry[name].faces for name in users.values()),
         "licences": sorted({geometry[name].origin.licence for name in users.values()} - {""}),
         "bytes": sum(path.stat().st_size for path in root.parent.rglob("*") if path.is_file()),

@@ -60,7 +60,7 @@ def settled(room: Room) -> Settled:
         )
         room = replace(room, boxes=found[0], layouts=found, outcomes=outcomes)
         reports = settle_layouts(room.stage)
-    return Settled(room, moved, tuple(_sentence(report, *told) for report in reports for told in _left(report)))
+    return Settled(room, moved, tuple(sentence for report in reports for sentence in report.sentences))
 
 
 def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list[str]]:
@@ -89,12 +89,3 @@ def _in_room(room: Room, place: np.ndarray) -> np.ndarray:
         return place
     turn = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # (x, y, z) with Z up -> (x, z, -y)
     return np.asarray(turn @ place @ turn.T)
-
-
-def _left(report: SettleReport) -> list[tuple[str, str]]:
-    return [(motion.name, motion.why) for motion in report.restless]
-
-
-def _sentence(report: SettleReport, name: str, why: str) -> str:
-    which = f"{report.layout}: " if report.layout else ""
-    return f"{which}{name} does not rest: it {why}"

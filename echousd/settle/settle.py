@@ -71,6 +71,12 @@ class SettleReport:
         """Whether everything rests."""
         return not self.restless
 
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """One for every piece that does not rest."""
+        which = f"{self.layout}: " if self.layout else ""
+        return tuple(f"{which}{motion.name} does not rest: it {motion.why}" for motion in self.restless)
+
     def to_json(self) -> dict[str, Any]:
         """The entry of `echousd check --settle --json`."""
         return {

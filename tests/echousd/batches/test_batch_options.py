@@ -14,6 +14,8 @@ from echousd.assets.index import index
 from echousd.batches.batch import batch
 from echousd.batches.journal import read_journals
 from echousd.batches.options import parse_options, read_toml, request_of
+from echousd.batches.verify import finish, verify
+from echousd.graph import Node
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +111,28 @@ def test_rooms_come_to_rest_if_wanted(source, tmp_path, monkeypatch):
     made(source, tmp_path / "run", settle=True)
     (row,) = read_journals(tmp_path / "run").values()
     assert "lamp stands where it comes to rest" in row["notes"]
+
+
+def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tmp_path, monkeypatch):
+    """A lamp that stands in the air falls."""
+    pytest.importorskip("mujoco")
+    from echousd import settle
+
+    monkeypatch.setattr(settle, "settled", lambda room: settle.Settled(room, (), ()))  # nobody puts it right
+    lamp = Node("lamp", "table_lamp", size=(0.25, 0.45, 0.25), position=(1.2, 1.5, 1.2), yaw=0.0)
+    nodes = tuple(lamp if node.name == "lamp" else node for node in small_graph().nodes)
+    relations = tuple(told for told in small_graph().relations if told.subject != "lamp")
+    source.write_text(small_graph().replaced(nodes=nodes, relations=relations).to_json())
+    for settles in (False, True):
+        made(source, tmp_path / str(settles), repair=False, settle=settles)
+        (row,) = read_journals(tmp_path / str(settles)).values()
+        assert bool(row["restless"]) == settles
+        told = [text for text in row["check_errors"] if text.startswith("lamp does not rest: it ")]
+        assert bool(told) == settles, row["check_errors"]
+    summary = finish(tmp_path / "True")
+    assert (summary["restless"], summary["passed_check"]) == (row["restless"], 0)
+    (wrong,) = verify(tmp_path / "True", check=True)
+    assert wrong.problem.endswith(f"{row['restless']} restless")
 
 
 def test_any_option_is_set_by_its_name(echousd_command, tmp_path):
