@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from echomodel.data.rooms.generator import generate_rooms
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.data.room_files import load_rooms
@@ -28,6 +27,7 @@ from echomodel.metrics.room_figures import with_known_words
 from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.repair import RepairConfig, repair_boxes
 

@@ -268,6 +268,8 @@ def repair_boxes(
     hung = lamps_along(categories, at.position, found.position, triplets, fixed) if at is not drawn else found.position
     size_end = in_proportion(problem.categories, found.size, ~rigid)
     end = stacked(size_end, hung, problem.carrier, None, fixed)
+    ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
+    end[~fixed, 1] = np.clip(end[:, 1], 0.0, ceiling)[~fixed]  # whatever is told of a lamp, it stays in the room
     ends = torch.as_tensor(size_end), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)

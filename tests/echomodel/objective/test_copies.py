@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from echomodel.data.rooms.generator import generate_rooms
 
 from echomodel.objective import TERMS, plan_of
 from echomodel.objective.copies import copies_of
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.rules.placements import Stated
 

@@ -1,0 +1,156 @@
+"""The search over the objective: each of its moves, what it may cost, and that nothing it knows is without weight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from echomodel.objective import TERMS, plan_of
+from echomodel.rooms.generator import generate_rooms
+from echomodel.rules import label_relations
+from echomodel.rules.placements import Stated
+from echomodel.vocabulary import vocabulary
+from echousd.repair import repair_boxes
+from echousd.repair.problem import pose
+from echousd.repair.search import PRICE, Search, State, price
+from echousd.repair.setting import setting_of
+
+ID = {row.name: row.id for row in vocabulary().predicates}
+FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
+
+
+def searched(words, size, position, yaw, told=(), *, turned=(), fixed=(), floor=FLOOR):
+    """A search in a room, and the state that its boxes were drawn in."""
+    still, kept = np.isin(np.arange(len(words)), fixed), np.isin(np.arange(len(words)), turned)
+    triplets = np.array([(a, ID[word], b) for a, word, b in told], int).reshape(-1, 3)
+    at = pose(
+        words, np.array(size, float), np.array(position, float), np.array(yaw, float), triplets,
+        floor_polygon=floor, height=2.7, fixed=still, rigid=still, turned=still | kept,
+    )  # fmt: skip
+    setting = setting_of(at, still | kept, openings=(), outline=floor)
+    return Search(setting), State(setting.draft, setting.heading, np.zeros(len(words)))
+
+
+@pytest.fixture(scope="module")
+def missed():
+    """Every term with what it finds in rooms whose boxes were shaken, by its name."""
+    found = {}
+    rooms = [
+        room
+        for word in ("bedroom", "living_dining_room", "living_room", "dining_room", "study")
+        for room in generate_rooms(8, 2, room_type=word)
+    ]
+    for number, room in enumerate(rooms):
+        luck = np.random.default_rng(number)
+        told = label_relations(room, rules="strict", drop=0.0, rng=luck)
+        more = [(0, ID[word], 1) for word in ("facing", "opposite", "aligned_with", "centered_on")]
+        told = np.concatenate([told, np.array(more)])
+        shaken = replace(
+            room,
+            position=room.position + luck.normal(0, 0.8, room.position.shape),
+            yaw=room.yaw + luck.normal(0, 1.0, len(room)),
+            size=room.size * luck.uniform(0.4, 2.5, room.size.shape),
+        )  # fmt: skip
+        stated = (Stated("against_wall", 0),)
+        plan = plan_of(shaken, room.categories, room.floor_polygon, room.openings, told, height=2.5, stated=stated)
+        for term in TERMS:
+            seen = term.find(plan)
+            if bool((seen.margin < 0).any()):
+                found.setdefault(term.name, (seen, plan))
+    return found
+
+
+@pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
+def test_every_term_and_its_weight_count(missed, term):
+    if term.name not in missed:
+        pytest.skip("no shaken room breaks it")
+    seen, plan = missed[term.name]
+    full = price(term, seen, plan)
+    assert float(full.max()) > PRICE[term.kind][0]
+    assert float(price(replace(term, weight=0.0), seen, plan).sum()) < float(full.sum())
+    kept = replace(seen, margin=seen.margin.abs() + 1.0)
+    assert float(price(term, kept, plan).sum()) == 0.0
+
+
+def test_most_terms_are_broken_by_shaken_rooms(missed):
+    assert len(missed) > 0.8 * len(TERMS)
+
+
+def test_what_is_given_is_blamed_for_relations_and_collisions_alone(missed):
+    for name in ("parallel", "apart"):
+        seen, plan = missed[name]
+        given = replace(plan, given=torch.ones(len(plan), dtype=torch.bool))
+        term = next(term for term in TERMS if term.name == name)
+        assert (float(price(term, seen, given).sum()) > 0) == (name == "apart")
+
+
+def test_a_screen_goes_along_to_the_wall_ahead():
+    words = ["multi_seat_sofa", "tv_stand"]
+    search, state = searched(words, [(2.0, 0.8, 0.9), (1.6, 0.5, 0.4)], [(0, 0, -1.5), (1.0, 0, 1.8)], [0, np.pi])
+    row = np.array([[-2.0, 0.3, np.pi / 2, 0.0]])
+    position, yaw = search._carried(state, 0, [0], row, screens=[1])
+    assert position[0, 1, [0, 2]] == pytest.approx([2.5 - 0.2 - search.setting.behind[1], 0.3], abs=1e-6)
+    assert np.cos(yaw[0, 1] + np.pi / 2) == pytest.approx(1.0)
+
+
+def test_a_group_goes_as_one_and_mirrored():
+    words, size = ["double_bed", "nightstand"], [(1.6, 1.0, 2.0), (0.5, 0.5, 0.4)]
+    search, state = searched(words, size, [(0, 0, -1.0), (1.1, 0, -1.8)], [0.0, 0.0])
+    row = np.array([[1.5, 0.0, -np.pi / 2, 0.0]])
+    for mirrored, side in ((False, 1.1), (True, -1.1)):
+        position, yaw = search._carried(state, 0, [0, 1], row, mirrored=mirrored)
+        x, z = position[0, 1, [0, 2]] - row[0, :2]
+        lateral = np.cos(-np.pi / 2) * x - np.sin(-np.pi / 2) * z
+        assert lateral == pytest.approx(side, abs=0.1)
+        assert np.cos(yaw[0, 1] - yaw[0, 0]) == pytest.approx(1.0)
+
+
+def test_chairs_are_seated_together():
+    words = ["dining_table", *["dining_chair"] * 4]
+    drawn = [(0, 0, 0), (0.3, 0, 0.7), (0.35, 0, -0.7), (-0.5, 0, 0.6), (1.2, 0, -0.1)]
+    search, state = searched(words, [(1.6, 0.75, 0.9), *[(0.45, 0.9, 0.5)] * 4], drawn, [0, np.pi, 0, np.pi, -1.2])
+    every = np.ones(5, bool)
+    before, after = (search.faults(one)[0] for one in (state, search.reseated(state, every, 0)))
+    assert before > 2.0
+    assert after < before - 1.9
+
+
+def test_two_pieces_change_places():
+    words, size = ["wardrobe", "bookshelf"], [(2.4, 2.2, 0.6), (0.8, 2.0, 0.3)]
+    told = [(0, "left", 1)]
+    search, state = searched(words, size, [(-1.2, 0, 1.7), (-1.2, 0, -1.8)], [np.pi, 0.0], told)
+    after = search.exchanged(state, [0])
+    assert after.position[0, 2] == pytest.approx(-1.8, abs=0.2)
+    assert search.faults(after)[0] < search.faults(state)[0] - 5
+
+
+def test_what_is_fixed_or_turned_is_not_moved():
+    words = ["double_bed", "nightstand", "wardrobe"]
+    size, drawn = [(1.6, 1.0, 2.0), (0.5, 0.5, 0.4), (1.5, 2.2, 0.6)], [(0, 0, 0.3), (1.0, 0, 1.5), (0.5, 0, 0.2)]
+    search, _ = searched(words, size, drawn, [0.7, 1.0, 1.5], fixed=[0], turned=[2])
+    found = search.run()
+    assert found.position[0].tolist() == [0, 0, 0.3]
+    assert found.yaw[[0, 2]].tolist() == [0.7, 1.5]
+
+
+def test_no_more_poses_are_judged_than_were_allowed():
+    words = ["double_bed", *["wardrobe"] * 5]
+    search, _ = searched(
+        words, [(2.0, 1, 2.2), *[(1.8, 2.2, 0.6)] * 5], np.zeros((6, 3)), np.zeros(6), floor=0.6 * FLOOR
+    )
+    search.budget = 500
+    found = search.run()
+    assert found.judged < 500 + 200  # the move that was begun
+    assert search.faults(State(found.position, found.yaw, np.zeros(6)))[0] == pytest.approx(found.cost)
+
+
+def test_a_lamp_that_is_told_the_impossible_stays_in_the_room():
+    words = ["coffee_table", "pendant_lamp"]
+    size, drawn = np.array([(1.0, 0.4, 0.6), (0.5, 0.9, 0.5)]), np.array([(0.0, 0, 0), (0.2, 0.2, 0.1)])
+    told = np.array([(1, ID["shorter_than"], 0), (1, ID["close_by"], 0)])
+    done = repair_boxes(words, size, drawn, np.zeros(2), told, floor_polygon=FLOOR, height=2.7)
+    assert done.position[:, 1].min() >= 0.0
+    assert (done.position[:, 1] + done.size[:, 1]).max() <= 2.7 + 1e-6
