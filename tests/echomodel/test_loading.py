@@ -1,10 +1,15 @@
+import pickle
 import subprocess
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import pytest
+import torch
 
 from echomodel import loading
+from echomodel.compact.model import load_weights
+from echomodel.echo import EchoModel
 from echomodel.loading import load_model
 
 
@@ -49,6 +54,23 @@ def test_formats_are_those_that_are_written():
     for place in loading.LOADERS.values():
         module, name = place.split(":")
         assert callable(getattr(import_module(module), name).load)
+
+
+def test_weights_that_few_rooms_need_are_read_when_they_are_asked_for():
+    model = EchoModel.load().model
+    assert {"latent", "layout", "furniture", "shape", "autoencoder"} == set(model.parts)
+    assert set(model.later) == {"shape", "autoencoder"}
+    assert not any(name.startswith(("shape.", "autoencoder.")) for name in model.state_dict())
+    whole, _ = load_weights(sorted((Path(loading.__file__).parent / "weights").glob("*.safetensors")))
+    again = pickle.loads(pickle.dumps(EchoModel.load())).model
+    for part in ("shape", "autoencoder"):
+        own, read = model.get_submodule(part).state_dict(), again.get_submodule(part).state_dict()
+        for key, value in whole.get_submodule(part).state_dict().items():
+            assert torch.equal(own[key], value)
+            assert torch.equal(read[key], value)
+    assert model.later == {}
+    with pytest.raises(AttributeError, match="colour"):
+        _ = model.colour
 
 
 def test_a_default_model_brings_no_published_network():

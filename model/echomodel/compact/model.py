@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +51,15 @@ class CompactModel(nn.Module):
         super().__init__()
         self.config, self.statistics = config, statistics
         self.parts = tuple(parts)
+        self.later: dict[str, Callable[[], nn.Module]] = {}  # parts that are read when they are asked for
         for name in self.parts:
             self.add_module(name, PARTS[name].module(config))
+
+    def __getattr__(self, name: str) -> Any:
+        make = self.__dict__.get("later", {}).pop(name, None)
+        if make is not None:
+            self.add_module(name, make().to(self.device).eval())
+        return super().__getattr__(name)
 
     latent: LatentGraph
     layout: LayoutDenoiser
@@ -110,6 +118,15 @@ class _Undrawn(TorchFunctionMode):
         return (args[0] if args else given["tensor"]) if drawn else func(*args, **given)
 
 
+def read_header(path: Path) -> dict[str, str]:
+    """Metadata of a safetensors file; raises WeightsError where it cannot be read."""
+    try:
+        with safe_open(path, "pt") as handle:
+            return handle.metadata() or {}
+    except (OSError, SafetensorError) as error:
+        raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
+
+
 def read_weights(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
     """Metadata and tensors of a safetensors file as they are; raises WeightsError where it cannot be read."""
     try:
@@ -119,8 +136,14 @@ def read_weights(path: Path) -> tuple[dict[str, str], dict[str, Tensor]]:
         raise WeightsError(f"{path}: not a readable safetensors file ({error})") from None
 
 
-def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> tuple[CompactModel, str]:
+def load_weights(
+    paths: Sequence[Path], device: torch.device | str = "cpu", later: Collection[str] = ()
+) -> tuple[CompactModel, str]:
     """Build the model that the files hold together and return it with a short hash of their contents.
+
+    Arguments:
+        paths: at least one. device: where to.
+        later: parts whose files are read when the parts are asked for, where they hold nothing else.
 
     Raises:
         WeightsError: a file is missing, truncated or of another kind, two files disagree on the configuration, or
@@ -128,25 +151,25 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
     """
     if not paths:
         raise WeightsError("no weights files found: install the package with its weights or name a file")
-    metadata, tensors, digest = {}, {}, hashlib.sha256()
+    metadata: dict[Path, dict[str, str]] = {}
+    tensors: dict[str, Tensor] = {}
+    waiting: dict[str, Path] = {}
+    digest = hashlib.sha256()
     for path in sorted(paths):
-        header, held = read_weights(path)
+        header = read_header(path)
         digest.update(path.read_bytes())
-        try:
-            tensors.update(restored(held))
-        except ValueError as error:
-            raise WeightsError(f"{path}: {error}") from None
         if header.get("format") != FORMAT:
             raise WeightsError(f"{path}: format is {header.get('format')!r}, expected {FORMAT!r}")
         metadata[path] = header
-    first, where = next(iter(metadata)), ", ".join(str(path) for path in metadata)
-    for key, tensor in tensors.items():
-        if not tensor.is_floating_point() or not bool(torch.isfinite(tensor).all()):
-            what = "numbers that are not finite" if tensor.is_floating_point() else f"{tensor.dtype}"
-            raise WeightsError(f"{where}: tensor {key} holds {what}, allowed: finite floating-point numbers")
+        if later and set(json.loads(header["parts"])) <= set(later):
+            waiting |= dict.fromkeys(json.loads(header["parts"]), path)
+        else:
+            tensors.update(_numbers(path))
+    first, where = next(iter(metadata)), ", ".join(str(path) for path in metadata if path not in waiting.values())
     try:
         config = _joined_config(metadata)
-        parts = [part for part in PARTS if any(part in json.loads(header["parts"]) for header in metadata.values())]
+        held = {part for header in metadata.values() for part in json.loads(header["parts"])}
+        parts = [part for part in PARTS if part in held and part not in waiting]
         # only a file with the layout branch knows the boxes
         own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
         statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
@@ -161,9 +184,39 @@ def load_weights(paths: Sequence[Path], device: torch.device | str = "cpu") -> t
     ) as error:  # fmt: skip
         reason = " ".join(str(error).split())[:200]
         raise WeightsError(f"{where}: malformed metadata ({type(error).__name__}: {reason})") from None
-    wanted = model.state_dict()
-    model.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
+    _fill(model, tensors)
+    model.later = {part: partial(_read_part, path, config, part) for part, path in waiting.items()}
+    model.parts = tuple(part for part in PARTS if part in held)
     return model.to(device).eval(), digest.hexdigest()[:12]
+
+
+def _fill(module: nn.Module, tensors: Mapping[str, Tensor]) -> None:
+    wanted = module.state_dict()
+    module.load_state_dict({key: value.to(wanted[key].dtype) for key, value in tensors.items()})
+
+
+def _read_part(path: Path, config: CompactConfig, part: str) -> nn.Module:
+    """One part from its file, which ships with the package."""
+    module, held = PARTS[part].module(config), _numbers(path)
+    own = {key.removeprefix(f"{part}."): value for key, value in held.items() if key.startswith(f"{part}.")}
+    _check_fit(module.state_dict(), own, str(path))
+    _fill(module, own)
+    return module
+
+
+def _numbers(path: Path) -> dict[str, Tensor]:
+    """The tensors of a weights file as they are used; raises WeightsError for some that are no finite numbers."""
+    try:
+        tensors = restored(read_weights(path)[1])
+    except WeightsError:
+        raise
+    except ValueError as error:
+        raise WeightsError(f"{path}: {error}") from None
+    for key, tensor in tensors.items():
+        if not tensor.is_floating_point() or not bool(torch.isfinite(tensor).all()):
+            what = "numbers that are not finite" if tensor.is_floating_point() else f"{tensor.dtype}"
+            raise WeightsError(f"{path}: tensor {key} holds {what}, allowed: finite floating-point numbers")
+    return tensors
 
 
 def _joined_config(metadata: dict[Path, dict[str, str]]) -> CompactConfig:

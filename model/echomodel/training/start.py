@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 import torch
 
 from echomodel.boxes import BoxStatistics
-from echomodel.compact.model import WORDS, CompactModel, load_weights, read_weights, words_of
+from echomodel.compact.model import WORDS, CompactModel, load_weights, read_header, words_of
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet
@@ -101,7 +101,7 @@ def _in_words(recipe: Recipe) -> CompactConfig:
         return replace(config, **{kind: getattr(given, kind) for kind in WORDS})
     if not recipe.warm:
         return config
-    named = words_of(Path(recipe.warm[0]), read_weights(Path(recipe.warm[0]))[0])
+    named = words_of(Path(recipe.warm[0]), read_header(Path(recipe.warm[0])))
     new = {kind: tuple(name for name in getattr(config, kind) if name not in named[kind]) for kind in WORDS}
     if new["predicates"]:
         raise ValueError(f"{recipe.warm[0]}: knows no relation {new['predicates'][0]!r}, which networks learn today")
