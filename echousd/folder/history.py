@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from echomodel.files import within_memory
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest, read_manifest
@@ -275,7 +276,7 @@ def _read_archive(folder: Path, path: str, *, only: str = "", digest: str = "") 
     if digest and folders.digest(content) != digest:
         raise ValueError(f"{folder / path}: was changed since it was written, so that the room cannot be put back")
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        with within_memory(folder / path), zipfile.ZipFile(io.BytesIO(content)) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
                 raise zipfile.BadZipFile(f"more than {LARGEST >> 20} MiB")
             return {e.filename: archive.read(e) for e in archive.infolist() if only in ("", e.filename)}

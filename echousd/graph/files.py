@@ -49,8 +49,9 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
         raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
     except GraphError:
         raise
-    except ValueError as error:
-        raise GraphError(str(error)) from None
+    except ValueError as error:  # of a word alone, or of memory
+        told = str(error)
+        raise GraphError(told if told.startswith(f"{path}: ") else f"{path}: {told}") from None
 
 
 def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from echomodel import files
+from echousd.folder import history
 from echousd.graph import GraphError, load_graph
 from echousd.textures import TextureError, read_image
 
@@ -82,13 +83,23 @@ def test_a_gigabyte_is_enough_for_what_somebody_packed(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="no other system counts what a process holds")
 def test_graphs_and_images_are_read_within_the_limit(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "HELD", 0)
-    for name, many in (("g.yaml", "[]," * 99_999), ("g.json", "{}," * 599_999)):
+    for name, many in (("g.yaml", "[]," * 39_999), ("g.json", "{}," * 599_999)):
         (tmp_path / name).write_text('{"room": "bedroom", "nodes": [' + many + "{}]}")
         with pytest.raises(GraphError, match=rf"{name}: takes more memory to read than \d+ MiB, allowed: that much"):
             load_graph(tmp_path / name)
     Image.new("RGB", (4096, 4096)).save(tmp_path / "image.png")
     with pytest.raises(TextureError, match=r"image.png: takes more memory to read than \d MiB"):
         read_image(str(tmp_path / "image.png"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system counts what a process holds")
+def test_an_archive_of_undo_is_read_within_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "HELD", 0)
+    (tmp_path / "history").mkdir()
+    with zipfile.ZipFile(tmp_path / "history/1.zip", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("room.usda", b" " * 2**26)
+    with pytest.raises(ValueError, match=r"history/1.zip: .*takes more memory to read than \d MiB"):
+        history._read_archive(tmp_path, "history/1.zip")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no other system counts what a process holds")
