@@ -93,7 +93,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     files |= lights.image_files(room)
     layers = {
         "geometry": geometry_layer(room),
-        "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell")),
+        "shell": structure.shell_layer(built, layer_data(room, f"{room.name}_shell"), room.graph.room.openings),
         "graph": graph_layer(room),
         "layout": layout_layer(room),
         "physics": physics_layer(room, built),

@@ -9,6 +9,7 @@ import numpy as np
 from echomodel.openings import direction, edge_lengths, inward_normal
 from echomodel.vocabulary import vocabulary
 from echousd.room import RoomData
+from echousd.shapes.walls import wall_name
 
 THIRD = 3  # one room in so many has the flooring of its type, or a papered wall
 NEAR = 0.45  # metres between a wall and the back of what stands at it
@@ -36,7 +37,7 @@ def papered_wall(room: RoomData) -> str:
             inside, off = inward_normal(corners, edge), back - corners[edge]
             before = 0 <= float(off @ direction(corners, edge)) <= length  # not beside it, before another wall in line
             if length > 1.0 and front @ inside > 0.97 and before and abs(float(off @ inside)) < NEAR:
-                return f"Wall_{edge + 1}"
+                return wall_name(edge)
     return ""
 
 

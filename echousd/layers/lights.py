@@ -28,7 +28,8 @@ LUMENS = {"ceiling": 1500.0, "floor": 1000.0, "table": 450.0, "wall": 400.0}  # 
 SHARES = {"open": (1.0, 1.0), "walls": (1.4, 0.12), "ceiling": (3.6, 0.95)}
 SKY = "textures/sky.jpg"
 BULB = 0.04  # metres, radius
-# Kelvin. White is 6504 to a renderer, which adapts to nothing as eyes do: lamps of 2,900 K would turn a room orange.
+# Kelvin, written as colours, as Blender reads no temperatures. White is 6504 to a renderer, which adapts to nothing as
+# eyes do: lamps of 2,900 K would turn a room orange.
 DAYLIGHT, BULBS = 6500.0, 4700.0
 # Irradiance of the sun: through windows alone a white surface that faces it gains 0.45, about what the sky gives; over
 # walls without a ceiling, which have the sky already, so much would leave them blank.
@@ -102,8 +103,7 @@ def _panel(stage: Usd.Stage, volume: Volume, height: float) -> tuple[Sdf.Path, f
     width, depth = (max(float(s), 0.5) for s in side)
     panel.CreateWidthAttr(width)
     panel.CreateHeightAttr(depth)
-    panel.CreateEnableColorTemperatureAttr(True)
-    panel.CreateColorTemperatureAttr(DAYLIGHT)
+    panel.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT))
     panel.AddTranslateOp().Set(Gf.Vec3d(float(volume.centre[0]), height - 0.02, float(volume.centre[2])))
     panel.AddRotateXOp().Set(-90.0)
     return panel.GetPath(), np.pi * NITS * width * depth
@@ -123,8 +123,7 @@ def _sun(stage: Usd.Stage, room: RoomData) -> Intensities:
     sun = UsdLux.DistantLight.Define(stage, f"{LIGHTS}/sun")
     sun.CreateAngleAttr(0.53)
     sun.CreateNormalizeAttr(True)  # intensity is irradiance, whatever the disc's size
-    sun.CreateEnableColorTemperatureAttr(True)
-    sun.CreateColorTemperatureAttr(DAYLIGHT - 700)
+    sun.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(DAYLIGHT - 700))
     matrix = view_matrix(-way, np.zeros(3))
     matrix[:3, 3] = 0.0
     sun.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
@@ -141,8 +140,7 @@ def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
         bulb = UsdLux.SphereLight.Define(stage, f"{LIGHTS}/lamp_{node.name}")
         bulb.CreateRadiusAttr(BULB)
         bulb.CreateNormalizeAttr(True)  # intensity is radiance times area; Blender reads it so whatever stands here
-        bulb.CreateEnableColorTemperatureAttr(True)
-        bulb.CreateColorTemperatureAttr(BULBS)
+        bulb.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(BULBS))
         bulb.AddTranslateOp()
         full[bulb.GetPath()] = (2, LUMENS[row.support] / (np.pi * NITS))
     if len(room.layouts) < 2:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade
 
 from echousd.shapes.finishes import baking
+from echousd.shapes.finishes.slots import material_of
 from echousd.shapes.looks import Look
 
 LOOKS = "/Room/Looks"
@@ -47,8 +48,8 @@ def define_material(
         tinted: leave colours to `tint_material`, which a variant calls.
     """
     material = UsdShade.Material.Define(stage, path)
-    slot = path.rpartition("/")[2].rpartition("_")[2]
-    UsdSemantics.LabelsAPI.Apply(material.GetPrim(), "material").CreateLabelsAttr([slot])
+    word = material_of(path.rpartition("/")[2])
+    UsdSemantics.LabelsAPI.Apply(material.GetPrim(), "material").CreateLabelsAttr([word])
     shader = UsdShade.Shader.Define(stage, f"{path}/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
     images = look_images(look, harmony) if harmony else {}

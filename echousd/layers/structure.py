@@ -11,6 +11,7 @@ import trimesh
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 from echomodel.furniture.solids import Joint
+from echomodel.openings import Opening
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.finishes.harmonies import linear
@@ -18,16 +19,17 @@ from echousd.shapes.geometry import Mass
 from echousd.shapes.looks import Look
 from echousd.shapes.shell import floor_mesh
 from echousd.shapes.surface import Surface, surface
-from echousd.shapes.walls import Piece, ShellPart, ceiling, walls
+from echousd.shapes.walls import Piece, ShellPart, ceiling, wall_name, walls
+from echousd.stage import encoding
 from echousd.stage.files import new_stage
-from echousd.stage.paths import SHELL, piece_name
+from echousd.stage.paths import OPENINGS, SHELL, piece_name
 from echousd.stage.taxonomy import ade20k
 
 LEAF = 320.0  # kg/m³ of a door's leaf
 LOOKS = {
     "ceiling": Look(linear("f6f4f0"), 0.95),
     "trim": Look(linear("f7f5f1"), 0.4),
-    "leaf": Look(linear("efebe3"), 0.4),
+    "door_leaf": Look(linear("efebe3"), 0.4),
     "rail": Look(linear("8e9194"), 0.35, metallic=0.85),
     "glass": Look(linear("d6e6ee"), 0.05, opacity=0.06),
 }
@@ -77,12 +79,30 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]
 
 
-def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any]) -> Sdf.Layer:
-    """`layers/shell.usdc`: floor, walls and what is in them, as meshes; `data`: customLayerData."""
+def shell_layer(built: Sequence[ShellPrim], data: Mapping[str, Any], openings: Sequence[Opening] = ()) -> Sdf.Layer:
+    """`layers/shell.usdc`: floor, walls and what is in them, as meshes, and what each opening of the graph became.
+
+    Arguments:
+        data: customLayerData. openings: of the graph, which point to their wall, frame and leaf.
+    """
     stage = new_stage("Room", ".usdc", data)
     for path in ("/Room", SHELL):
         UsdGeom.Xform.Define(stage, path)
     write_shell(stage, built)
+    paths = {path for part in built for path in (part.path, *(mesh.path for mesh in part.meshes))}
+    for opening in openings:
+        wall = wall_name(opening.edge)
+        name = piece_name(wall, opening.name)
+        inside = f"{SHELL}/{wall}/{name}"
+        ends = {
+            encoding.WALL: f"{SHELL}/{wall}",
+            encoding.FRAME: f"{inside}/{piece_name(name, 'frame')}",
+            encoding.LEAF: f"{inside}/{piece_name(name, 'hinge')}",
+        }
+        prim = stage.OverridePrim(f"{OPENINGS}/{opening.name}") if ends[encoding.WALL] in paths else None
+        for relationship, target in ends.items():
+            if prim and target in paths:
+                prim.CreateRelationship(relationship, custom=False).SetTargets([target])
     return stage.GetRootLayer()
 
 

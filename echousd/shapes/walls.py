@@ -67,7 +67,7 @@ def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: f
     for edge, length in enumerate(lengths):
         if length < 1e-3:
             continue
-        name = f"Wall_{edge + 1}"
+        name = wall_name(edge)
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
         pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, height, here), frame))]
@@ -81,6 +81,11 @@ def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: f
         ]
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
     return tuple(parts)
+
+
+def wall_name(edge: int) -> str:
+    """Name of the prim of the wall along an edge of the floor."""
+    return f"Wall_{edge + 1}"
 
 
 def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
@@ -152,7 +157,7 @@ def _filled(
         return ShellPart(name, "window", pieces)
     if opening.kind != "door":
         return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)))
-    leaf = made("leaf", "leaf", fittings.door_leaf(opening))
+    leaf = made("leaf", "door_leaf", fittings.door_leaf(opening))
     handle = made("handle", "rail", fittings.door_handle(opening, left_first), solid=False)
     hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first))
     return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)), (hinge,))

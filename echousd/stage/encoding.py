@@ -39,6 +39,7 @@ WIDTH = "echo:width"
 SILL = "echo:sill"
 HINGE = "echo:hinge"
 SWING = "echo:swing"
+WALL, FRAME, LEAF = "echo:wall", "echo:frame", "echo:leaf"  # what an opening became in the room
 OPENING_FIELDS = {
     KIND: "kind",
     EDGE: "edge",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
+OPENINGS = "/Room/SceneGraph/Openings"
 DRESSING = "/Room/Dressing"
 CLASSES = "_class_"  # the prim that an asset's class stands below
 GEO, MTL = "geo", "mtl"  # scopes of an asset: what is seen and what collides, and what it is made of

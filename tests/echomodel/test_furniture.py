@@ -173,3 +173,13 @@ def test_no_stile_shows_before_the_board_of_a_back():
         board, *stiles = back_rest(style, "panel", 0.4, 0.45, 0.9, -0.2, 0.03, 0.0)
         front = bounds([board])[0, 1, 2]
         assert all(bounds([stile])[0, 1, 2] < front + 1e-6 for stile in stiles), number
+
+
+@pytest.mark.parametrize("softness", [0.2, 0.8])
+def test_no_two_faces_of_an_arched_headboard_lie_in_one_plane(softness):
+    style = replace(Style.draw(np.random.default_rng(1)), headboard="arched", softness=softness)
+    size = np.array([1.7, 1.1, 2.1])
+    parts = [p.mesh()[0] for p in solids("double_bed", style, Choices.draw(np.random.default_rng(2)), size)
+             if p.role == "headboard"]  # fmt: skip
+    fronts, rears = ([round(float(end(part[:, 2])), 4) for part in parts] for end in (np.max, np.min))
+    assert len(set(fronts)) == len(set(rears)) == len(parts) == 2

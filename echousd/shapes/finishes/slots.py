@@ -16,6 +16,7 @@ class Slot:
         pattern: a word of `patterns.PATTERNS`, "" = plain; `painting_0` ... are pictures.
         metres: of surface that one picture of the pattern covers; 0 = the whole of it fits the thing.
         mix: an sRGB hex and how much of it is mixed in.
+        material: what it is made of, the word of the label `semantics:labels:material`; "" = as the slot is called.
     """
 
     color: str
@@ -25,52 +26,62 @@ class Slot:
     metallic: float = 0.0
     opacity: float = 1.0
     mix: tuple[str, float] = ("ffffff", 0.0)
+    material: str = ""
 
 
 SLOTS: Mapping[str, Slot] = {
     "wood": Slot("wood", 0.5, "wood", 0.7),
-    "front": Slot("front", 0.45, "veneer", 0.9),
+    "front": Slot("front", 0.45, "veneer", 0.9, material="wood"),
     "fabric": Slot("cloth", 0.92, "woven", 0.22),
-    "cushion": Slot("cloth", 0.92, "woven", 0.22, mix=("f0e8da", 0.25)),
+    "cushion": Slot("cloth", 0.92, "woven", 0.22, mix=("f0e8da", 0.25), material="fabric"),
     "linen": Slot("linen", 0.9, "linen", 0.6),
-    "blanket": Slot("blanket", 0.95, "linen", 0.6),
+    "blanket": Slot("blanket", 0.95, "linen", 0.6, material="wool"),
     "metal": Slot("metal", 0.35, "brushed", 0.3, metallic=0.85),
     "ceramic": Slot("ceramic", 0.35, "stone", 0.35),
-    "leaf": Slot("4f7d3c", 0.6, "leaf", 0.3),
+    "leaf": Slot("4f7d3c", 0.6, "leaf", 0.3, material="foliage"),
     "soil": Slot("4a3a2c", 0.95),
-    "shade": Slot("f6e7c8", 0.8),
-    "screen": Slot("15171b", 0.12),
+    "shade": Slot("f6e7c8", 0.8, material="fabric"),
+    "screen": Slot("15171b", 0.12, material="glass"),
     "glass": Slot("dfeae8", 0.08, opacity=0.35),
-    "mirror": Slot("c9d2d4", 0.05, metallic=1.0),
-    "book": Slot("7a4a40", 0.8),
-    "stem": Slot("6b5436", 0.85),
-    "rug": Slot("rug", 0.97, "bordered", 0.0),
-    "rug_striped": Slot("rug", 0.97, "striped", 0.0),
-    "rug_lattice": Slot("rug", 0.97, "latticed", 0.0),
-    "curtain": Slot("curtain", 0.92, "linen", 0.6),
-    "accent_cloth": Slot("accent", 0.95, "knitted", 0.3),
-    "accent_plain": Slot("accent", 0.92, "woven", 0.22),
-    "picture_0": Slot("ffffff", 0.7, "painting_0", 0.0),
-    "picture_1": Slot("ffffff", 0.7, "painting_1", 0.0),
-    "picture_2": Slot("ffffff", 0.7, "painting_2", 0.0),
-    "frame": Slot("wood", 0.45, "wood", 0.7),
+    "mirror": Slot("c9d2d4", 0.05, metallic=1.0, material="glass"),
+    "book": Slot("7a4a40", 0.8, material="paper"),
+    "stem": Slot("6b5436", 0.85, material="wood"),
+    "rug": Slot("rug", 0.97, "bordered", 0.0, material="wool"),
+    "rug_striped": Slot("rug", 0.97, "striped", 0.0, material="wool"),
+    "rug_lattice": Slot("rug", 0.97, "latticed", 0.0, material="wool"),
+    "curtain": Slot("curtain", 0.92, "linen", 0.6, material="linen"),
+    "accent_cloth": Slot("accent", 0.95, "knitted", 0.3, material="wool"),
+    "accent_plain": Slot("accent", 0.92, "woven", 0.22, material="fabric"),
+    "picture_0": Slot("ffffff", 0.7, "painting_0", 0.0, material="print"),
+    "picture_1": Slot("ffffff", 0.7, "painting_1", 0.0, material="print"),
+    "picture_2": Slot("ffffff", 0.7, "painting_2", 0.0, material="print"),
+    "frame": Slot("wood", 0.45, "wood", 0.7, material="wood"),
     "paper": Slot("f1ede4", 0.9),
-    "book_a": Slot("accent", 0.7, "bound", 0.24),
-    "book_b": Slot("ceramic", 0.7, "bound", 0.24),
-    "book_c": Slot("2f3b45", 0.7, "bound", 0.24),
-    "book_d": Slot("cloth", 0.7, "bound", 0.24),
-    "petal": Slot("f0dfd5", 0.8),
+    "book_a": Slot("accent", 0.7, "bound", 0.24, material="paper"),
+    "book_b": Slot("ceramic", 0.7, "bound", 0.24, material="paper"),
+    "book_c": Slot("2f3b45", 0.7, "bound", 0.24, material="paper"),
+    "book_d": Slot("cloth", 0.7, "bound", 0.24, material="paper"),
+    "petal": Slot("f0dfd5", 0.8, material="foliage"),
     "fruit": Slot("c9862e", 0.5),
     "wax": Slot("f3eadb", 0.5),
     "wicker": Slot("b08a58", 0.9, "wicker", 0.3),
     "leather": Slot("5a3d2b", 0.5, "leather", 0.25),
-    "floor": Slot("floor", 0.5, "planks", 1.6),
-    "carpet": Slot("curtain", 0.97, "carpet", 1.6, mix=("8d8376", 0.35)),
-    "tiles": Slot("floor", 0.3, "tiles", 1.6, mix=("e6e1d8", 0.65)),
-    "wall": Slot("wall", 0.92, "plaster", 1.4),
-    "wallpaper": Slot("wall", 0.9, "papered", 1.4, mix=("8f9a94", 0.22)),
+    "floor": Slot("floor", 0.5, "planks", 1.6, material="wood"),
+    "carpet": Slot("curtain", 0.97, "carpet", 1.6, mix=("8d8376", 0.35), material="wool"),
+    "tiles": Slot("floor", 0.3, "tiles", 1.6, mix=("e6e1d8", 0.65), material="ceramic"),
+    "wall": Slot("wall", 0.92, "plaster", 1.4, material="plaster"),
+    "wallpaper": Slot("wall", 0.9, "papered", 1.4, mix=("8f9a94", 0.22), material="paper"),
 }
 SECOND = {"wood": "wood2", "cloth": "cloth2", "accent": "blanket"}  # what every other style group takes instead
+SHELL = {"ceiling": "plaster", "trim": "wood", "door_leaf": "wood", "rail": "metal"}  # of the shell alone
+
+
+def material_of(name: str) -> str:
+    """The word of the material that a look is of, by its name, which ends in a slot; raises KeyError for others."""
+    words = name.split("_")
+    slots = ["_".join(words[start:]) for start in range(len(words))]
+    slot = next((slot for slot in slots if slot in SHELL or slot in SLOTS), "")
+    return SHELL[slot] if slot in SHELL else SLOTS[slot].material or slot
 
 
 def metres_of(slot: str) -> float:

@@ -12,6 +12,8 @@ from echomodel.furniture.choices import Choices
 from echomodel.furniture.solids import Ball, Block, Solid, Turned, rotation
 from echomodel.furniture.style import Style
 
+SET_BACK = 0.006  # metres between two faces that would lie in one plane
+
 
 def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
     """The board at the head of a bed, its rear on the plane z, `w` wide and `h` high."""
@@ -67,17 +69,12 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
         ]
         parts += [Ball(centre=np.array([s * (w / 2 - r), h - r, z + r]), half=np.full(3, r * 1.2)) for s in (-1, 1)]
         return [*parts, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
+    stuff = "fabric" if style.softness > 0.5 else "wood"
     arch = Turned(
-        centre=np.array([0, h * 0.6, z + t * 0.5]),
-        low=(w / 2, h * 0.4),
-        high=(w / 2, h * 0.4),
-        height=t,
-        turn=rotation(x=np.pi / 2),
-        power=2.4,
-        material="fabric" if style.softness > 0.5 else "wood",
-    )
-    arch = replace(arch, centre=np.array([0, h * 0.6, z]))
-    return [arch, box((-w / 2, 0.02, z), (w / 2, h * 0.62, z + t), "fabric" if style.softness > 0.5 else "wood")]
+        centre=np.array([0, h * 0.6, z]), low=(w / 2, h * 0.4), high=(w / 2, h * 0.4), height=t,
+        turn=rotation(x=np.pi / 2), power=2.4, material=stuff,
+    )  # fmt: skip
+    return [arch, box((-w / 2, 0.02, z + SET_BACK), (w / 2, h * 0.62, z + t - SET_BACK), stuff)]
 
 
 def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style: Style, pillows: int) -> list[Solid]:

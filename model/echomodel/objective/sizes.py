@@ -33,6 +33,8 @@ def size_range(category: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
     low, high = table.low * SMALLEST, table.high * LARGEST
     if usual and kind_of(category).role == "bed":  # one of 1.5 m is longer than half of few beds; nobody sleeps in it
         low = np.maximum(low, np.array([side[0] for side in usual]) * SHORTER)
+    if usual:
+        high = np.maximum(high, np.array([side[1] for side in usual]))
     return tuple(low.tolist()), tuple(high.tolist())
 
 

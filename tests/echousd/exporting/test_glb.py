@@ -156,7 +156,7 @@ def test_cameras_and_lights_look_and_shine_as_on_the_stage(root, tmp_path):
     area = panel.GetWidthAttr().Get() * panel.GetHeightAttr().Get()
     for name, share in (("sun", 1.0), ("ceiling", area), ("lamp_lamp", 0.25)):
         light = UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/{name}"))
-        color = UsdLux.BlackbodyTemperatureAsRgb(light.GetColorTemperatureAttr().Get())
+        color = light.GetColorAttr().Get()
         wanted = share * light.GetIntensityAttr().Get() * np.array(color)
         np.testing.assert_allclose(np.array(lights[name]["color"]) * lights[name]["intensity"], wanted, atol=1e-5)
     np.testing.assert_allclose(worlds[nodes["ceiling"][0]][:3, 2], (0, 1, 0), atol=1e-6)  # shines along -Z, down

@@ -72,6 +72,14 @@ def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path
     assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
 
 
+def test_lights_are_coloured_without_temperatures_which_blender_does_not_read(stage) -> None:
+    for name in ("sun", "ceiling", "lamp_pendant"):
+        light = UsdLux.LightAPI(stage.GetPrimAtPath(f"/Room/Lights/{name}"))
+        assert not light.GetEnableColorTemperatureAttr().Get()
+        red, green, blue = light.GetColorAttr().Get()
+        assert (red > 1.2 > green > 0.8 > blue) == (name == "lamp_pendant")
+
+
 def test_lamps_shine_where_they_are(stage) -> None:
     cache = UsdGeom.BBoxCache(0, ["default"])
     for name, below in (("pendant", True), ("lamp", False)):
@@ -102,3 +110,21 @@ def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
         places.append(np.array(bulb.ComputeLocalToWorldTransform(0).ExtractTranslation()))
         assert intensity(stage, "lamp_pendant") > 0
     assert places[1] - places[0] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_openings_of_the_graph_point_to_what_they_became(tmp_path) -> None:
+    door = Opening("door", "door", 1, 0.4, 0.9, 2.0)
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW, door)))
+    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(dress="none"))
+    stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    found = {}
+    for name in ("window", "door"):
+        prim = stage.GetPrimAtPath(f"/Room/SceneGraph/Openings/{name}")
+        ends = {word: prim.GetRelationship(f"echo:{word}") for word in ("wall", "frame", "leaf")}
+        found[name] = {word: rel.GetTargets()[0] for word, rel in ends.items() if rel.GetTargets()}
+        assert all(stage.GetPrimAtPath(path) for path in found[name].values())
+    assert set(found["window"]) == {"wall", "frame"}
+    assert str(found["window"]["wall"]) == "/Room/Shell/Wall_1"
+    assert str(found["door"]["wall"]) == "/Room/Shell/Wall_2"
+    turns = UsdGeom.Xformable(stage.GetPrimAtPath(found["door"]["leaf"])).GetOrderedXformOps()
+    assert [op.GetOpName() for op in turns] == ["xformOp:translate", "xformOp:rotateY"]

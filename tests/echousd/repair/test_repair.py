@@ -337,3 +337,15 @@ def test_a_nightstand_touches_its_bed_at_most() -> None:
         config=RepairConfig(arrange=False),
     )  # fmt: skip
     assert separation(done.size, done.position, done.yaw, np.array([(0, 1)]))[0] > -0.001
+
+
+@pytest.mark.parametrize("word", ["pendant_lamp", "wall_lamp", "ceiling_lamp"])
+def test_what_cannot_be_met_never_leaves_the_room(word):
+    ids = {p.name: p.id for p in vocabulary().predicates}
+    size = np.array([(1.8, 0.9, 2.0), (0.4, 0.6, 0.4)])
+    position = np.array([(0.0, 0.0, 0.0), (0.2, 2.0, 0.3)])
+    floor = np.array([(-2, -2), (2, -2), (2, 2), (-2, 2.0)])
+    told = np.array([(0, ids["above"], 1)])  # the bed above the lamp
+    done = repair_boxes(["double_bed", word], size, position, np.zeros(2), told, floor_polygon=floor, height=2.6)
+    assert (done.position[:, 1] >= 0).all()
+    assert (done.position[:, 1] + done.size[:, 1] <= 2.6 + 1e-6).all()

@@ -18,7 +18,7 @@ from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.harmonies import HARMONIES, linear
 from echousd.shapes.finishes.patterns import PATTERNS, SIZE, relief
-from echousd.shapes.finishes.slots import SLOTS
+from echousd.shapes.finishes.slots import SHELL, SLOTS, material_of
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
 from echousd.shapes.looks import look
@@ -137,3 +137,14 @@ def test_materialx_stands_beside_preview_surfaces(root, tmp_path):
 def _tint_of(stage, harmony):
     stage.GetPrimAtPath("/Room").GetVariantSet("palette").SetVariantSelection(harmony)
     return tuple(UsdShade.Shader(stage.GetPrimAtPath("/Room/Looks/floor/mtlx_tint")).GetInput("in2").Get())
+
+
+def test_labels_say_what_things_are_made_of():
+    told = {"a_b_book_b": "paper", "room_rug_lattice": "wool", "picture_0": "print", "style_accent_plain": "fabric"}
+    told |= {"door_leaf": "wood", "plant_leaf": "foliage", "wallpaper": "paper", "wall": "plaster", "glass": "glass"}
+    assert {name: material_of(name) for name in told} == told
+    words = {material_of(f"suite_{slot}") for slot in (*SLOTS, *SHELL)}
+    assert words <= {
+        "ceramic", "fabric", "foliage", "fruit", "glass", "leather", "linen", "metal", "paper", "plaster", "print",
+        "soil", "wax", "wicker", "wood", "wool",
+    }  # fmt: skip
