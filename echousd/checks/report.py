@@ -11,6 +11,7 @@ from pxr import Usd
 from echomodel.dressing import SMALL
 from echousd.checks.collisions import find_collisions
 from echousd.checks.living import find_living
+from echousd.checks.manifests import rewritten
 from echousd.checks.placement import Misplacement, find_misplaced, misplaced_screens, misplaced_small
 from echousd.checks.relations import MeasuredRelation, measured_relations
 from echousd.checks.validity import Fault, find_faults
@@ -178,6 +179,9 @@ def check(
     rooms = found[0][0]
     if not rooms and not errors:
         raise StageError(f"{source(stage)}: no room (no EchoSceneGraph prim), nothing to check")
+    first = found[0][1]
+    if len(rooms) == 1 and first.name in ("", "layout_0"):
+        errors = (*errors, *rewritten(stage, rooms[0], first.relations))
     settled = None
     if settle:
         from echousd.settle import settle_layouts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -99,6 +100,36 @@ def test_nothing_is_wrong_with_the_room(room: Usd.Stage) -> None:
 @pytest.mark.parametrize("sabotage", SABOTAGES, ids=lambda one: one.name)
 def test_each_sabotage_is_named(room: Usd.Stage, sabotage: Sabotage) -> None:
     assert (sabotage.rule, sabotage.prim) in after(room, sabotage, judged(sabotage.rule))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda told: told["verdicts"][0].update(state="broken"), "says that 'lamp standing_on nightstand' is broken"),
+        (lambda told: told["verdicts"].pop(), "says nothing of 'nightstand close_by bed'"),
+        (lambda told: told["relations"].update(kept=9), "its verdicts say 3 kept"),
+        (lambda told: told.update(seed=-1), "seed is -1, allowed"),
+    ],
+)
+def test_a_manifest_says_what_is_measured(room: Usd.Stage, change: Callable[[dict], object], message: str) -> None:
+    root = Path(room.GetRootLayer().realPath)
+    file = root.with_suffix(".json")
+    before = file.read_text()
+    told = json.loads(before)
+    change(told)
+    file.write_text(json.dumps(told))
+    try:
+        errors = check(room).errors
+        found = [fault for fault in errors if message in fault.message]
+        assert {(fault.rule, fault.prim) for fault in found} == {("echo:Manifest", "/Room")}, errors
+        layer = root.parent / "layers/layout.usda"
+        written = layer.read_text()
+        layer.write_text(written + "\n")  # somebody's own change: the room is measured, its manifest no longer asked
+        found = [fault for fault in check(room).errors if fault.rule == "echo:Manifest"]
+        layer.write_text(written)
+        assert bool(found) == ("seed" in message)
+    finally:
+        file.write_text(before)
 
 
 def test_every_rule_has_a_sabotage_or_a_broken_file() -> None:
