@@ -40,7 +40,7 @@ def remembered(
     Arguments:
         folder: the room's, as it is before the edit.
         old: its manifest. files: what the edit writes, without the manifest. steps: what the edit says.
-        owned: digests of those of the files that are ours from then on. copies: those that only keep somebody's bytes.
+        owned: digests of what is ours from then on. copies: those that only keep somebody's bytes.
     """
     manifest = f"{old['name']}.json"
     known = [path for path in old["files"] if not path.startswith(f"{FOLDER}/")]
@@ -50,7 +50,7 @@ def remembered(
         for path, content in before.items()
         if content is not None
         and files.get(path) != content
-        and (path in files or folders.digest(content) == old["files"][path])
+        and (path in files or (path not in owned and folders.digest(content) == old["files"][path]))
     }
     told = ownership.read(folder, manifest)
     if told is None or not (replaced or steps):

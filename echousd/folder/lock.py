@@ -134,7 +134,7 @@ def _take(folder: Path) -> int | None:
     except OSError as error:
         os.close(file)
         raise ValueError(f"{folder}: cannot be written ({error.strerror or error}); nothing was changed") from None
-    except ValueError:
+    except BaseException:  # Ctrl-C, too
         os.close(file)
         raise
     os.close(file)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Sdf, Tf, UsdUtils
 
 from echousd.draw.pictures import is_ours
 from echousd.folder.folder import backup_name
@@ -98,7 +98,7 @@ def merged_root(path: Path, current: bytes, fresh: bytes) -> bytes:
         readable = False
     if not readable:
         raise ValueError(f"{path}: edited by hand and no longer readable as USD; repair it or delete it")
-    axes = [Usd.Stage.Open(layer, Usd.Stage.LoadNone).GetMetadata("upAxis") for layer in (theirs, ours)]
+    axes = [layer.pseudoRoot.GetInfo("upAxis") for layer in (theirs, ours)]
     if axes[0] != axes[1]:
         raise ValueError(f"{path}: edited by hand and {axes[0]}-up; a {axes[1]}-up room needs another folder")
     present = [path for path in theirs.subLayerPaths if path in ours.subLayerPaths or not path.startswith("./layers/")]

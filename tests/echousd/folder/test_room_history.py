@@ -145,6 +145,15 @@ def test_a_step_gives_back_what_a_person_had_edited_before_it(root):
         history.undo(root)
 
 
+def test_an_edit_that_changes_nothing_is_no_step_where_an_asset_is_kept_for_a_layer(root):
+    put(root, "shot.usda", b'#usda 1.0\ndef "A" (references = @./assets/pendant/pendant.usda@) {}\n')
+    for _ in range(2):
+        change(root, small_graph().remove_node("pendant"))
+        assert [e["number"] for e in json.loads(root.with_suffix(".json").read_text())["history"]] == [1]
+    history.undo(root)
+    assert "pendant" in read_room(root).graph.names
+
+
 def test_remarks_in_a_root_layer_that_is_merged_are_kept_beside_it(root):
     text = root.read_text().rstrip()
     root.write_text(text[:-1] + '\n    # a remark\n    def Cube "Toy"\n    {\n    }\n}\n')
