@@ -95,7 +95,7 @@ def undo(root: Path, *, wait: bool = False) -> tuple[str, ...]:
         words = _Told(
             after=folders.digest(files[name]),
             steps=last["steps"],
-            removes=[path for path in files if ownership.read(folder, path) is None],
+            removes=[path for path in files if path not in expected and ownership.read(folder, path) is None],
             leaves=_others(files, earlier, name),
         )
         again = _step(folder, last["restores"], files, gone, expected, earlier, "take the edit back")

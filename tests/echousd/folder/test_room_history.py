@@ -154,6 +154,15 @@ def test_an_edit_that_changes_nothing_is_no_step_where_an_asset_is_kept_for_a_la
     assert "pendant" in read_room(root).graph.names
 
 
+def test_a_layer_that_was_moved_away_before_an_undo_is_not_taken_by_the_redo(root):
+    change(root, with_chair())
+    layer = root.parent / "layers/layout.usda"
+    layer.rename(root.parent / "kept.usda")
+    history.undo(root)
+    history.redo(root)
+    assert layer.is_file()
+
+
 def test_remarks_in_a_root_layer_that_is_merged_are_kept_beside_it(root):
     text = root.read_text().rstrip()
     root.write_text(text[:-1] + '\n    # a remark\n    def Cube "Toy"\n    {\n    }\n}\n')
