@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 
+HOUSE = "echousd_house"  # in the metadata of a layer that composes rooms
+
 
 def as_identifier(word: str) -> str:
     """A word, such as the name of a file or folder, as a USD identifier."""

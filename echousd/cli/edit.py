@@ -56,11 +56,12 @@ def edit(
 
     Every option may be given several times.
     """
-    from echousd.folder.found import room_at
+    from echousd.folder.found import refuse_house, room_at
     from echousd.make.reading import read_room
     from echousd.make.wishes import Wishes, wished
 
     if not recover:
+        refuse_house(room)
         room = room_at(room)
     wishes = Wishes(
         remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),

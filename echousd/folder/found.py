@@ -7,7 +7,10 @@ from pathlib import Path
 
 from echousd.folder.manifest import find_manifest
 from echousd.graph.files import STAGE_FORMS
+from echousd.naming import HOUSE
 from echousd.pending import half_written
+
+HEAD = 2**16  # bytes in which a layer's own metadata stand
 
 
 def rooms_at(place: Path) -> list[Path]:
@@ -39,6 +42,13 @@ def room_at(place: Path) -> Path:
         shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
         raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
     return rooms[0]
+
+
+def refuse_house(place: Path) -> None:
+    """Raises ValueError that names its rooms for a layer of ours that composes several."""
+    if place.suffix == ".usda" and place.is_file() and f"int {HOUSE} ".encode() in place.read_bytes()[:HEAD]:
+        rooms = ", ".join(str(path.relative_to(place.parent)) for path in _rooms_below(place.parent)[:8])
+        raise ValueError(f"{place}: a house, which composes rooms; name one of them: {rooms}")
 
 
 def layer_over(place: Path) -> Path:

@@ -78,7 +78,7 @@ def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
 
 
 def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
-    """The graph with a door and windows where it states no opening, placed where none of the furniture stands.
+    """The graph with a door where it states no opening, and windows where it states none, placed where nothing stands.
 
     Arguments:
         graph: with a floor; without one it comes back as it is.
@@ -88,9 +88,11 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
     from echomodel.rooms.openings import place_openings
 
     corners = graph.room.corners
-    if graph.room.openings or corners is None:
+    if corners is None or any(opening.kind == "window" for opening in graph.room.openings):
         return graph
-    placed = place_openings(corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes)
+    placed = place_openings(
+        corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings
+    )
     return graph.replaced(room=graph.room.replaced(openings=placed))
 
 

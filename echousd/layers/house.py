@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 
 import echousd
 from echousd.graph.files import STAGE_FORMS
+from echousd.naming import HOUSE as MARK
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_whole
 from echousd.stage.read import find_rooms
@@ -19,7 +20,6 @@ from echousd.stage.turning import turn_up
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import matrix
 
-MARK = "echousd_house"
 GAP = 1.0  # metres between rooms that stand nowhere in particular
 Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from echousd.graph import SceneGraph
@@ -25,6 +26,36 @@ def with_locked_places(graph: SceneGraph, *files: Path | None) -> tuple[SceneGra
             wanted -= found
     lost = sorted(name for name in wanted if graph.node(name).position is None)
     return graph, tuple(f"{name} is locked but stands nowhere yet: it gets a place like all others" for name in lost)
+
+
+def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGraph, tuple[str, ...]]:
+    """The graph in which what the last generation has locked stays so, where the graph says nothing of its place.
+
+    Arguments:
+        earlier: folder or root layer of that generation.
+
+    Returns: the graph, and a sentence for each object that stays.
+    """
+    from echousd.folder.manifest import find_manifest
+
+    folder = earlier if earlier is None or earlier.is_dir() else earlier.parent
+    manifest = find_manifest(folder, earlier.stem) if earlier and folder and folder.is_dir() else None
+    try:
+        old = SceneGraph.from_json(json.dumps((manifest or {}).get("graph")))
+    except ValueError:  # no graph that can be read
+        return graph, ()
+    kept = [
+        node.replaced(locked=True, size=node.size or was.size, position=was.position, yaw=was.yaw)
+        for node in graph.nodes
+        if node.name in old.names and (node.locked, node.position, node.yaw) == (False, None, None)
+        for was in [old.node(node.name)]
+        if was.locked and was.category == node.category
+    ]
+    names = {node.name: node for node in kept}
+    graph = graph.replaced(nodes=tuple(names.get(node.name, node) for node in graph.nodes)) if kept else graph
+    return graph, tuple(
+        f"{name} stays locked as in the room that is there; echousd edit --unlock frees it" for name in names
+    )
 
 
 def _stage_of(file: Path) -> Path | None:

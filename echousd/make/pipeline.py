@@ -28,7 +28,7 @@ from echousd.make.layouts import (
     with_free_openings,
     with_sizes,
 )
-from echousd.make.locking import with_locked_places
+from echousd.make.locking import with_earlier_locks, with_locked_places
 from echousd.make.owned import with_own_boxes, with_own_pieces
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
@@ -102,8 +102,10 @@ def generate(
         file, beside = Path(graph).name, Path(graph).parent
         with timer.stage("read"):
             read = Path(graph)
-            graph, homeless = with_locked_places(load_graph(read, room), None if room else read, earlier)
+            graph, held = with_earlier_locks(load_graph(read, room), earlier)
+            graph, homeless = with_locked_places(graph, None if room else read, earlier)
     else:
+        graph, held = with_earlier_locks(graph, earlier)
         graph, homeless = with_locked_places(graph, earlier)
     graph = anchored(without_openings(graph) if asked.openings == "drawn" else graph, beside)
     if file:  # a graph that was read may come from anybody; one in memory is the caller's own
@@ -180,7 +182,7 @@ def generate(
         floor=floor,
         layouts=tuple(layouts),
         outcomes=outcomes,
-        notes=(*crowded, *homeless, *notes, *unusual_sizes(stated)),
+        notes=(*crowded, *held, *homeless, *notes, *unusual_sizes(stated)),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=asked,
         timings=timer.seconds,

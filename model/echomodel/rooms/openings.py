@@ -33,6 +33,7 @@ def place_openings(
     rng: np.random.Generator,
     *,
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+    stated: Sequence[Opening] = (),
 ) -> tuple[Opening, ...]:
     """A door and one or two windows (two doors in halls), each where least stands in its way.
 
@@ -43,11 +44,13 @@ def place_openings(
         height: of the room, metres.
         rng: decides between places that are equally good.
         boxes: size (n, 3), position (n, 3) of the bottom centre and yaw (n,) of what stands in the room.
+        stated: openings that are there, which come first in what is returned; doors among them are all that there are,
+            windows likewise.
     """
     area = abs(signed_area(polygon))
-    made: list[Opening] = []
+    made = list(stated)
     for kind, count in (("door", 1 + (area > SECOND_DOOR)), ("window", 1 + (area > SECOND_WINDOW))):
-        for _ in range(count):
+        for _ in range(count if not stated or (kind == "window" and kind not in {o.kind for o in stated}) else 0):
             best = _best(kind, polygon, height, rng, made, boxes)
             if best is not None:
                 made.append(best)

@@ -60,6 +60,9 @@ def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
     layers = [tmp_path / "out" / name for name in ("West/West.usda", "East/East.usda")]
     assert [room["room"] for room in told["rooms"]] == [str(layer) for layer in layers]
     assert told["written"][0] == str(tmp_path / "out" / "out.usda")
+    done = echousd_command("edit", tmp_path / "out/out.usda", "--lock", "bed")
+    assert done.code == 2
+    assert "out.usda: a house, which composes rooms; name one of them: East/East.usda, West/West.usda" in done.err
 
 
 def test_one_of_them(file, tmp_path, echousd_command):

@@ -7,6 +7,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 from echomodel.boxes import Boxes
+from echomodel.openings import Opening
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.make.locking import with_locked_places
 from echousd.make.verdicts import relation_verdicts
@@ -221,3 +222,28 @@ def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
     room = echousd.generate(graph, model=StandIn(), shapes="boxes", **BARE)
     assert room.boxes.size[0].tolist() == pytest.approx([0.18, 0.9, 2.0])
     assert room.notes == ("bed is 0.18 m wide as stated; such furniture: 1.32 to 3.28 m",)
+
+
+def test_a_lock_of_the_last_generation_stays(tmp_path):
+    """A source that says nothing of a place does not undo what an edit or an update has locked there."""
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    root = room.save(tmp_path / "room", preview=False)
+    locked = room.graph.update_node("wardrobe", locked=True, position=(-1.2, 0.0, 0.5), yaw=0.5)
+    echousd.edit(root, locked, model=StandIn(), repair=False).save(root.parent, preview=False)
+    again = echousd.generate(small_graph(), seed=4, model=StandIn(), shapes="boxes", repair=False, earlier=root.parent)
+    assert again.graph.node("wardrobe").locked
+    assert again.boxes.position[again.names.index("wardrobe")].tolist() == pytest.approx([-1.2, 0.0, 0.5], abs=1e-3)
+    assert any(note.startswith("wardrobe stays locked as in the room that is there") for note in again.notes)
+    moved = small_graph().update_node("wardrobe", position=(1.0, 0.0, 1.0))
+    again = echousd.generate(moved, model=StandIn(), shapes="boxes", repair=False, earlier=root.parent)
+    assert not again.graph.node("wardrobe").locked
+
+
+def test_windows_are_proposed_beside_a_stated_door():
+    door = Opening("door", "door", 3, 0.3, 0.9, 2.0, 0.0)
+    graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(door,)))
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    assert room.graph.room.openings[0] == door
+    assert {opening.kind for opening in room.graph.room.openings[1:]} == {"window"}
+    again = echousd.generate(room.graph, model=StandIn(), shapes="boxes", repair=False)
+    assert again.graph.room.openings == room.graph.room.openings
