@@ -22,7 +22,7 @@ BETWEEN = 0.002  # metres from book to book
 EYE = 1.7  # metres: what is put higher cannot be seen
 
 # What is put on a top, by what a row calls `top`: kinds of which one is taken, places, and whether only in full rooms.
-SHELVED = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
+CASES = ("cabinet", "shelf")  # looks of what books and baskets stand in and on: no cistern, no fridge
 TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
     "nightstand": (
         (("book_stack", "cup", "small_plant"), FRONT, False),
@@ -100,7 +100,7 @@ def tabletops(setting: Setting) -> None:
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in TOPS and tops:
             _top(setting, host, tops[0], name)
-        if host.row.role == "storage" and host.row.look in SHELVED:
+        if host.row.role == "storage" and host.row.look in CASES:
             for surface in levels:
                 if surface is not (tops[0] if tops and name in TOPS else None):
                     _shelf(setting, host, surface)

@@ -69,11 +69,11 @@ def washbasin(size: Size, style: Style, choices: Choices) -> list[Solid]:
     ]
     rim += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.1)
     if w < 0.62 and choices.chance("kind", 0.35):
-        foot = Turned(
+        column = Turned(
             low=(0.11, 0.1), high=(0.085, 0.085), height=h - thick + 0.004, centre=np.array([0, 0, -0.05]), power=2.8,
             material="ceramic", role="foot",
         )  # fmt: skip
-        return [*rim, foot]
+        return [*rim, column]
     foot = 0.25 if choices.chance("raised", 0.6) else 0.08
     x, z = w / 2 - 0.02, d / 2 - 0.05
     body = box((-x, foot, -d / 2), (x, h - thick + 0.004, z), "wood", 0.0, "body")

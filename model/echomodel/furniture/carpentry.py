@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,7 +25,7 @@ def core(low: tuple, high: tuple, material: str = "wood") -> Block:
     return replace(box(low, high, material), core=True)
 
 
-def of_role(role: str, parts: list[Solid], **changes: Any) -> list[Solid]:
+def of_role(role: str, parts: Sequence[Solid], **changes: Any) -> list[Solid]:
     """The parts with this role and other fields changed."""
     return [replace(part, role=role, **changes) for part in parts]
 

@@ -93,11 +93,11 @@ def hob_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
         )  # fmt: skip
         parts.append(ring)
     side = (w - UNIT) / 2
-    wide = (-w / 2, w / 2) if side < 0.15 else (-UNIT / 2, UNIT / 2)
-    parts += _oven(*wide, (PLINTH, h - WORKTOP), _deep(d))
+    low, high = (-w / 2, w / 2) if side < 0.15 else (-UNIT / 2, UNIT / 2)
+    parts += _oven(low, high, (PLINTH, h - WORKTOP), _deep(d))
     if side >= 0.15:
-        for low, high in ((-w / 2, -UNIT / 2), (UNIT / 2, w / 2)):
-            parts += _unit(low, high, (PLINTH, h - WORKTOP), _deep(d), "drawer", style)
+        for left, right in ((-w / 2, low), (high, w / 2)):
+            parts += _unit(left, right, (PLINTH, h - WORKTOP), _deep(d), "drawer", style)
     return parts
 
 
