@@ -5,7 +5,7 @@ import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
-from echomodel.metrics.living_evaluation import living_scores
+from echomodel.metrics.layout_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures
 from echomodel.openingrows import ROW
 from echomodel.rooms import generate_room, generate_rooms

@@ -24,7 +24,6 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.learned import places
-from echomodel.compact.rounding import restored, rounded
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
 from echomodel.files import whole_file
@@ -32,6 +31,8 @@ from echomodel.files import whole_file
 WORDS = ("categories", "predicates", "room_types")
 _SHARED = (*WORDS, "rules")
 FORMAT = "echousd-compact-1"
+ROUNDED = ("shape.basis",)  # nearly half of all weights; its rows are directions, which two digits tell well enough
+SCALES = ".scales"
 
 
 class WeightsError(ValueError):
@@ -267,3 +268,36 @@ def words_of(path: Path, header: Mapping[str, str]) -> dict[str, tuple[str, ...]
         if twice := [name for number, name in enumerate(names) if name in names[:number]]:
             raise WeightsError(f"{path}: names {twice[0]!r} twice among its {kind}")
     return named
+
+
+def rounded(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors as a file keeps them: those in `ROUNDED` (rows, n) as int8, with float32 scales (rows,) beside."""
+    out = dict(tensors)
+    for name in ROUNDED:
+        if name in out:
+            rows = out[name].float()
+            scale = rows.abs().amax(1) / 127
+            steps = rows / scale.clamp_min(torch.finfo(scale.dtype).tiny)[:, None]
+            out[name], out[name + SCALES] = steps.round().clamp(-127, 127).to(torch.int8), scale
+    return out
+
+
+def restored(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors of a file as numbers; those that are not rounded, as in older files, as they are.
+
+    Raises ValueError for rows and scales that are not of a kind or do not fit.
+    """
+    out = dict(tensors)
+    for name in ROUNDED:
+        scales = out.pop(name + SCALES, None)
+        if scales is None:
+            continue
+        rows = out.get(name)
+        if rows is None or rows.dtype != torch.int8 or scales.dtype != torch.float32:
+            raise ValueError(f"{name + SCALES} is {scales.dtype}, {name} {rows if rows is None else rows.dtype}, "
+                             "allowed: float32 scales of int8 rows")  # fmt: skip
+        if rows.ndim != 2 or scales.shape != rows.shape[:1]:
+            shapes = f"{tuple(scales.shape)} and {tuple(rows.shape)}"
+            raise ValueError(f"{name + SCALES} and {name} have shapes {shapes}, allowed: (r,) and (r, n)")
+        out[name] = rows.float() * scales[:, None]
+    return out

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import torch
+from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 from echomodel.boxes import Boxes
@@ -14,9 +16,8 @@ from echomodel.drafts import drafted
 from echomodel.graph import GraphBatch
 from echomodel.metrics.judge import judged
 from echomodel.metrics.layout import relation_scores, size_rows, touched_triplets
-from echomodel.metrics.living_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures, with_known_words
-from echomodel.metrics.variety import variety_scores
+from echomodel.objective import BY_EYE, TERMS, faults_of, plan_of, unreached, walk
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules import label_rooms
@@ -275,4 +276,79 @@ def _distributions(drawn: Sequence[RoomBoxes], rooms: Sequence[RoomBoxes]) -> di
         "sizes": [asdict(row) for row in rows if row.category in words],
         "figures": room_figures(drawn),
         "real_figures": room_figures(rooms),
+    }
+
+
+def variety_scores(graphs: Sequence[GraphBatch], sample: Callable[[GraphBatch], Boxes], seeds: int, rules: str) -> dict:
+    """Mean distance between layouts of one graph (`layout_distance`), and of arrangements that are told nothing.
+
+    Arguments:
+        graphs: of one scene each. sample: boxes of packed scenes. seeds: layouts of each graph.
+        rules: the rule set that the relations are meant in.
+
+    Returns:
+        `here`, `generator`: metres; `ratio` of the two; `rooms` (those with a floor), `seeds`: how many.
+    """
+    here, generator = [], []
+    luck = torch.Generator().manual_seed(0)
+    for graph in graphs:
+        if not bool(torch.isfinite(graph.floor[0, 0]).all()):
+            continue
+        here.append(variety(sample(GraphBatch.pack([graph] * seeds)), graph, seeds))
+        bare = GraphBatch.pack([graph.with_triplets(graph.triplets[:0])] * seeds)
+        generator.append(variety(drafted(bare, luck, rules=rules, draws=1)[0], graph, seeds))
+    if not here:
+        return {"rooms": 0, "seeds": seeds}
+    means = float(np.mean(here)), float(np.mean(generator))
+    return {"here": means[0], "generator": means[1], "ratio": means[0] / means[1], "rooms": len(here), "seeds": seeds}
+
+
+def variety(boxes: Boxes, graph: GraphBatch, count: int) -> float:
+    """Mean distance of all pairs of `count` layouts of one graph that lie behind one another in `boxes`, metres."""
+    places = boxes.position[:, [0, 2]].detach().cpu().double().numpy().reshape(count, graph.num_nodes, 2)
+    category = graph.category.cpu().numpy()
+    return float(np.mean([layout_distance(places[i], places[k], category) for i in range(count) for k in range(i)]))
+
+
+def layout_distance(one: np.ndarray, other: np.ndarray, category: np.ndarray) -> float:
+    """Mean distance in plan between the pieces of two layouts of the same furniture, metres; equal pieces may swap.
+
+    Arguments:
+        one, other: (n, 2) float, metres. category: (n,) int.
+    """
+    total = 0.0
+    for number in np.unique(category):
+        mine = category == number
+        apart = np.linalg.norm(one[mine][:, None] - other[mine][None], axis=-1)
+        total += float(apart[linear_sum_assignment(apart)].sum())
+    return total / max(len(one), 1)
+
+
+def living_scores(rooms: Sequence[RoomBoxes], relations: Sequence[np.ndarray]) -> dict:
+    """Faults by the living rules.
+
+    Arguments:
+        rooms: in the vocabulary's words. relations: (e, 3) int of each, what its graph tells.
+
+    Returns:
+        `per_object`, faults an object; `free_of_faults`, share of rooms without any; `walkable`, mean share of the free
+        floor that is reached from the door; `rules`, faults an object of every rule that found one.
+    """
+    found: Counter[str] = Counter()
+    free, shares, objects = 0, [], 0
+    for room, edges in zip(rooms, relations, strict=True):
+        plan = plan_of(room, room.categories, room.floor_polygon, room.openings, edges)
+        seen = faults_of(plan) + unreached(plan)
+        found.update(fault.rule for fault in seen)
+        free += not seen
+        objects += len(room)
+        walked = walk(plan)
+        if walked is not None:
+            shares.append(walked.share)
+    return {
+        "per_object": sum(found.values()) / max(objects, 1),
+        "free_of_faults": free / max(len(rooms), 1),
+        "walkable": float(np.mean(shares)) if shares else None,
+        "rules": {name: count / max(objects, 1) for name, count in found.most_common()},
+        "measured": sum(term.kind in BY_EYE for term in TERMS) + 1,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -13,13 +14,15 @@ from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.builder import Builder
 from echomodel.rooms.floor import sample_floor
-from echomodel.rooms.halls import hall_of, together
 from echomodel.rooms.recipes import furnish, wanted
 from echomodel.rooms.statistics import RoomTypeStatistics, room_requests, room_type_statistics
 from echomodel.vocabulary import vocabulary
 
 REDRAWS = 4  # rooms in which what they are for finds no place are drawn anew so often
 STYLES = 327  # of the full set of shapes, which has each of 46 categories in all of them
+THREE = 0.4  # share of the halls that have a third zone
+WALLS_SHARED = 0.85  # zones of one room need less floor than rooms of their own
+LARGEST = 80.0  # square metres
 
 
 def drawn_shares() -> dict[str, float]:
@@ -115,3 +118,28 @@ def _boxes(builder: Builder, name: str, room_type: str) -> RoomBoxes:
 def _seen_in_a_mirror(opening: Opening) -> Opening:
     """The opening of a mirrored room, whose corners keep their order."""
     return replace(opening, hinge="left" if opening.hinge == "right" else "right")
+
+
+def hall_of(statistics: RoomTypeStatistics, rng: np.random.Generator) -> tuple[RoomTypeStatistics, list[str]]:
+    """Statistics of a floor for several zones, and the room types of all zones, the room's own first."""
+    names, shares = zip(*vocabulary().room_type(statistics.name).zones, strict=True)
+    weights = np.cumsum(shares)
+    count = 1 + int(rng.random() < THREE)
+    types = [statistics.name, *(names[int(np.searchsorted(weights, rng.random() * weights[-1]))] for _ in range(count))]
+    area = WALLS_SHARED * sum(room_type_statistics(name).area[2] for name in types) * float(rng.uniform(0.9, 1.5))
+    area = min(area, LARGEST)
+    side = (area / statistics.area[2]) ** 0.5
+    return replace(
+        statistics,
+        area=(area,) * 5,
+        short=tuple(side * value for value in statistics.short),
+        long=tuple(side * value for value in statistics.long),
+    ), types
+
+
+def together(wanted: list[dict[str, int]]) -> dict[str, int]:
+    """What all zones ask for."""
+    total: Counter[str] = Counter()
+    for zone in wanted:
+        total.update(zone)
+    return dict(total)

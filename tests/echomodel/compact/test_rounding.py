@@ -9,8 +9,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 import echomodel
-from echomodel.compact.model import WeightsError, load_weights
-from echomodel.compact.rounding import SCALES, restored, rounded
+from echomodel.compact.model import SCALES, WeightsError, load_weights, restored, rounded
 
 NAME = "shape.basis"
 

@@ -9,8 +9,7 @@ import echousd
 from echousd.assets.index import index
 from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
-from echousd.shapes.originals.conversion import CONVERTED, converted
-from echousd.shapes.originals.winding import outward
+from echousd.shapes.originals.conversion import CONVERTED, converted, outward
 from echousd.stage import open_stage
 
 
