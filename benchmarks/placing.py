@@ -14,6 +14,8 @@ import argparse
 import json
 import time
 from collections import Counter
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +26,13 @@ from echomodel.data.room_files import load_rooms
 from echomodel.metrics.layout_evaluation import EditedGraph, LayoutEvaluation, told_graphs
 from echomodel.metrics.layout_sources import model_layouts
 from echomodel.metrics.room_figures import with_known_words
-from echomodel.objective import KINDS, faults_of, plan_of, unreached
+from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.repair import RepairConfig, repair_boxes
+from echousd.repair.search import Search
 
 SEED = 770_000  # of the generated rooms
 CELL = 420  # pixels
@@ -112,7 +115,10 @@ def main() -> None:
     parser.add_argument("--sheet", type=Path)
     parser.add_argument("--ways", nargs="+", default=["drawn", "placed"])
     parser.add_argument("--only", type=int, nargs="*")
+    parser.add_argument("--off", nargs="*", default=[], help="terms that the search does without")
     options = parser.parse_args()
+    repairing = import_module("echousd.repair.repair")  # the package has a function of that name
+    repairing.Search = partial(Search, terms=tuple(term for term in TERMS if term.name not in options.off))
     torch.set_num_threads(1)
     every = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(every) if len(room) > 1]
