@@ -58,7 +58,7 @@ def request_of(raw: Mapping[str, Any], where: str) -> BatchRequest:
     try:
         request = BatchRequest(**{**raw, "options": _options(raw.get("options", {}))})
         if fixed := {"device", "seed"} & request.variations.keys():
-            raise ValueError(f"variations: {fixed.pop()}, allowed: options that a room shows")
+            raise ValueError(f"variations: {fixed.pop()}, allowed: what a room shows; one device for all")
         if not all(request.variations.values()):
             raise ValueError("variations: an empty list, allowed: at least one value of each option")
         for copy in range(min(len(list(itertools.product(*request.variations.values()))), 1000)):
