@@ -56,7 +56,7 @@ def killed(monkeypatch, moved):
 
     with monkeypatch.context() as patch, suppress(Killed):
         for name in ("save", "written") if moved is None else ():
-            patch.setattr(f"echousd.room.{name}.write_preview", dies)
+            patch.setattr(f"echousd.make.{name}.write_preview", dies)
         if moved is not None:
             patch.setattr(folders, "_finish", some)
         patch.setattr(folders, "_discard", lambda staging: None)
