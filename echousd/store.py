@@ -9,6 +9,7 @@ Whoever names a file in a store knows the hash of its content; that is why packi
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
 import re
 import shutil
@@ -35,8 +36,9 @@ NAMING = (".usda", ".json", ".mtlx", ".yaml", ".yml")  # texts in which a key ca
 LAYERS = (".usd", ".usdc")
 ARCHIVES = (".zip", ".usdz")
 CRATE = b"PXR-USDC"
-LARGEST = 4 * 2**30  # bytes of one folder
+LARGEST = 4 * 2**30  # bytes of one folder, and of what is unpacked from one file
 BLOCK = 2**20
+NESTED = 8  # archives within each other: an edit taken back holds that of the edit, with usdz in it
 
 
 @dataclass(frozen=True)
@@ -225,7 +227,8 @@ def keys_named(folders: Iterable[Path]) -> set[str]:
 
     Archives of what edits replaced are asked as well, and what an interrupted run has not moved into place yet.
 
-    Raises OSError for a folder or file that cannot be read, as it might name any.
+    Raises OSError for a folder or file that cannot be read, ValueError for archives within archives that go too deep
+    or hold too much, as they might name any.
     """
     found: set[str] = set()
     for path in (path for folder in folders for path in _all_files(folder)):
@@ -233,7 +236,7 @@ def keys_named(folders: Iterable[Path]) -> set[str]:
             continue
         if path.is_file() and store_of(path) is None:
             with suppress(FileNotFoundError), path.open("rb") as file:  # gone meanwhile
-                found.update(_keys_in(file, path))
+                found.update(_keys_in(file, _Asked(path)))
     return found
 
 
@@ -252,39 +255,56 @@ def _all_files(folder: Path) -> Iterator[Path]:
         yield from (Path(place, name) for name in sorted(names))
 
 
-def _keys_in(file: IO[bytes], path: Path) -> Iterator[str]:
-    """Words of a layer, manifest or archive that may be keys; what it is its first bytes say."""
+@dataclass
+class _Asked:
+    """A file whose words are asked for, and how many bytes were unpacked from it and from archives within."""
+
+    path: Path
+    unpacked: int = 0
+
+    def copy(self, source: IO[bytes], target: IO[bytes]) -> None:
+        """Have what can be read only forwards as a file; raises ValueError where all of it is more than `LARGEST`."""
+        while block := source.read(BLOCK):
+            self.unpacked += len(block)
+            if self.unpacked > LARGEST:
+                raise self.refusal(f"unpacks to more than {LARGEST} bytes")
+            target.write(block)
+        target.seek(0)
+
+    def refusal(self, found: str) -> ValueError:
+        return ValueError(f"{self.path}: {found}, which may name any asset; move it away")
+
+
+def _keys_in(file: IO[bytes], asked: _Asked, depth: int = 0) -> Iterator[str]:
+    """Words of a layer, manifest or archive that may be keys; what it is its first bytes say.
+
+    Arguments:
+        depth: archives around it.
+    """
     head = file.read(8)
     file.seek(0)
     if head.startswith(b"PK"):
-        yield from _keys_in_archive(file)
+        yield from _keys_in_archive(file, asked, depth + 1)
     elif head == CRATE:
-        yield from (word for name in _named_by(file, path) for word in KEY.findall(name))
+        yield from (word for name in _named_by(file, None if depth else asked.path) for word in KEY.findall(name))
     else:
         yield from _words_in(file)
 
 
-def _keys_in_archive(file: IO[bytes]) -> Iterator[str]:
+def _keys_in_archive(file: IO[bytes], asked: _Asked, depth: int) -> Iterator[str]:
+    if depth > NESTED:
+        raise asked.refusal(f"archives within archives, more than {NESTED} deep")
     try:
         with zipfile.ZipFile(file) as archive:
             for entry in archive.infolist():
                 if PurePosixPath(entry.filename).suffix in (*NAMING, *LAYERS, *ARCHIVES):
                     with archive.open(entry) as inner, tempfile.SpooledTemporaryFile(BLOCK) as whole:
-                        _copy(inner, whole)
-                        yield from _keys_in(whole, Path(entry.filename))
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, NotImplementedError):
+                        asked.copy(inner, whole)
+                        yield from _keys_in(whole, asked, depth)
+    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, UnicodeDecodeError):
         return  # nothing can be put back from it
-
-
-def _copy(source: IO[bytes], target: IO[bytes]) -> None:
-    """Have what can be read only forwards as a file; raises ValueError for more than a folder may have."""
-    total = 0
-    while block := source.read(BLOCK):
-        total += len(block)
-        if total > LARGEST:
-            raise zipfile.BadZipFile(f"more than {LARGEST} bytes")
-        target.write(block)
-    target.seek(0)
+    except OSError as error:  # of the disk, too
+        raise asked.refusal(f"cannot be read ({error.strerror or error})") from None
 
 
 def _words_in(file: IO[bytes]) -> Iterator[str]:
@@ -296,12 +316,12 @@ def _words_in(file: IO[bytes]) -> Iterator[str]:
         rest = rest[-40:]  # a word across two blocks, and what stands before it
 
 
-def _named_by(file: IO[bytes], path: Path) -> list[str]:
+def _named_by(file: IO[bytes], path: Path | None) -> list[str]:
     """What a binary layer refers to; one without a name of its own is asked under another."""
     from pxr import Tf, UsdUtils
 
     with ExitStack() as held:
-        if not (path.suffix in LAYERS and path.is_file()):
+        if path is None or path.suffix not in LAYERS:
             copy = held.enter_context(tempfile.NamedTemporaryFile(suffix=".usdc"))
             shutil.copyfileobj(file, copy)
             copy.flush()

@@ -1,8 +1,10 @@
 """`store gc` leaves what may be opened or put back: every kind of reference, in every kind of file."""
 
+import io
 import shutil
 import warnings
 import zipfile
+from contextlib import nullcontext
 
 import pytest
 from pxr import Sdf, Usd
@@ -13,7 +15,7 @@ from echousd.folder import history
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
-from echousd.store import Store, keys_named
+from echousd.store import NESTED, Store, keys_named
 
 
 def sublayer(layer, path):
@@ -167,6 +169,80 @@ def test_a_damaged_archive_or_layer_names_nothing(stored, tmp_path):
     for place, content in (("1.zip", b"PK\3\4..."), ("a.usdc", b"PXR-USDC..."), ("b.usd", b"\xff\xfe")):
         (tmp_path / "room" / place).write_bytes(content)
     assert store.collect([tmp_path / "room"], grace=0) == [key]
+
+
+def nested(depth, content):
+    """A zip of a zip of ... of a layer."""
+    name = "a.usda"
+    for _ in range(depth):
+        held = io.BytesIO()
+        with zipfile.ZipFile(held, "w") as archive:
+            archive.writestr(name, content)
+        name, content = "a.zip", held.getvalue()
+    return content
+
+
+def test_archives_hold_archives_to_a_depth_and_nothing_is_taken_beyond(stored, tmp_path, echousd_command):
+    store, key, path = stored
+    target = tmp_path / "room/1.zip"
+    target.write_bytes(nested(NESTED, path.encode()))
+    assert keys_named([tmp_path / "room"]) == {key}
+    for depth in (NESTED + 1, 60):
+        target.write_bytes(nested(depth, path.encode()))
+        found = f"archives within archives, more than {NESTED} deep, which may name any asset; move it away"
+        said = f"error: {target}: archives within archives, more than {NESTED} deep, which may name any asset; move it away\n"
+        assert (done.code, done.err) == (2, said)
+        assert list(store.keys()) == [key]
+
+
+@pytest.mark.parametrize(
+    ("first", "name", "content", "fits"),
+    [
+        (400, "b.usda", b"-" * 400, True),
+        (600, "b.usda", b"-" * 600, False),
+        (300, "b.zip", nested(1, b"-" * 200), True),
+        (300, "b.zip", nested(1, b"-" * 320), False),  # 740 bytes and the 320 in the inner one
+        (300, "b.png", b"-" * 5000, True),  # is not unpacked
+    ],
+)
+def test_all_that_an_archive_unpacks_to_is_bounded(tmp_path, monkeypatch, first, name, content, fits):
+    target = tmp_path / "1.zip"
+    monkeypatch.setattr("echousd.store.LARGEST", 1000)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.usda", "-" * first)
+        archive.writestr(name, content)
+    with nullcontext() if fits else pytest.raises(ValueError, match=r"1\.zip: unpacks to more than 1000 bytes, which"):
+        assert keys_named([tmp_path]) == set()
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_an_archive_damaged_anywhere_names_nothing_or_ends_it(tmp_path, method):
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", method) as archive:
+        archive.writestr("a.usda", "-" * 50)
+    content, target = whole.getvalue(), tmp_path / "1.zip"
+    for place in range(len(content)):
+        target.write_bytes(content[:place] + bytes([content[place] ^ 0xFF]) + content[place + 1 :])
+        try:
+            assert keys_named([tmp_path]) == set()
+        except ValueError as error:
+            said = str(error)
+            assert said.startswith(f"{target}: cannot be read (")
+            assert said.endswith("), which may name any asset; move it away")
+
+
+def test_a_layer_in_an_archive_is_not_the_file_of_its_name(stored, tmp_path, monkeypatch):
+    """The room's own folder, where layers of an earlier state have the names of those of today."""
+    _, key, path = stored
+    monkeypatch.chdir(tmp_path / "room")
+    for content in (path, "./other.usda"):
+        layer = Sdf.Layer.CreateNew("layout.usdc") if content == path else Sdf.Layer.FindOrOpen("layout.usdc")
+        layer.subLayerPaths = [content]
+        layer.Save()
+        if content == path:
+            with zipfile.ZipFile("1.zip", "w") as archive:
+                archive.write("layout.usdc")
+    assert keys_named([tmp_path / "room"]) == {key}
 
 
 def two(*more):
