@@ -13,7 +13,7 @@ from echomodel import text as texts
 from echousd.assets.index import index
 from echousd.batches.batch import batch
 from echousd.batches.journal import read_journals
-from echousd.batches.options import parse_options, read_toml, request_of
+from echousd.batches.options import BatchOptions, parse_options, read_toml, request_of
 from echousd.batches.verify import finish, verify
 from echousd.graph import Node
 
@@ -113,18 +113,23 @@ def test_rooms_come_to_rest_if_wanted(source, tmp_path, monkeypatch):
     assert "lamp stands where it comes to rest" in row["notes"]
 
 
-def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tmp_path, monkeypatch):
+def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tmp_path, monkeypatch, echousd_command):
     """A lamp that stands in the air falls."""
     pytest.importorskip("mujoco")
     from echousd import settle
+    from echousd.batches import batch as batches
 
     monkeypatch.setattr(settle, "settled", lambda room: settle.Settled(room, (), ()))  # nobody puts it right
     lamp = Node("lamp", "table_lamp", size=(0.25, 0.45, 0.25), position=(1.2, 1.5, 1.2), yaw=0.0)
     nodes = tuple(lamp if node.name == "lamp" else node for node in small_graph().nodes)
     relations = tuple(told for told in small_graph().relations if told.subject != "lamp")
     source.write_text(small_graph().replaced(nodes=nodes, relations=relations).to_json())
+    monkeypatch.setattr(batches, "_executor", lambda how, rooms, device: Inline())
+    quick = ("--shapes", "boxes", "--drafts", 1, "--steps", 2, "--no-preview", "--no-repair", "--workers", 1)
     for settles in (False, True):
-        made(source, tmp_path / str(settles), repair=False, settle=settles)
+        words = (*quick, *(["--settle"] if settles else []))
+        done = echousd_command("batch", source, "-o", tmp_path / str(settles), *words)
+        assert done.code == 0, done.err
         (row,) = read_journals(tmp_path / str(settles)).values()
         assert bool(row["restless"]) == settles
         told = [text for text in row["check_errors"] if text.startswith("lamp does not rest: it ")]
@@ -133,6 +138,14 @@ def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tm
     assert (summary["restless"], summary["passed_check"]) == (row["restless"], 0)
     (wrong,) = verify(tmp_path / "True", check=True)
     assert wrong.problem.endswith(f"{row['restless']} restless")
+
+
+@pytest.mark.parametrize("words", [("batch",), ("batch", "run")])
+def test_all_options_of_rooms_are_in_the_help(echousd_command, words):
+    shown = echousd_command(*words, "--help-all").out
+    rows = set(BatchOptions.model_fields) - {"seed"}  # whose is the batch's
+    assert "settle" in rows
+    assert [name for name in sorted(rows) if f"--{name.replace('_', '-')}" not in shown] == []
 
 
 def test_any_option_is_set_by_its_name(echousd_command, tmp_path):
