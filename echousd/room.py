@@ -49,10 +49,12 @@ class Verdict:
 
 @dataclass(frozen=True)
 class LayoutOutcome:
-    """What became of one layout: one verdict per relation and placement of the graph, and the objects that collide."""
+    """What became of one layout: one verdict per relation and placement of the graph, the objects that collide, and, of
+    a room that was simulated, a sentence for each that does not rest."""
 
     verdicts: tuple[Verdict, ...] = ()
     collisions: tuple[Collision, ...] = ()
+    restless: tuple[str, ...] = ()
 
     @property
     def broken(self) -> tuple[Verdict, ...]:
@@ -61,8 +63,8 @@ class LayoutOutcome:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """A sentence for every broken relation and every collision."""
-        return (*map(str, self.broken), *map(str, self.collisions))
+        """A sentence for every broken relation, every collision and all that does not rest."""
+        return (*map(str, self.broken), *map(str, self.collisions), *self.restless)
 
     def counts(self) -> dict[str, int]:
         """How many relations are kept, broken and unmeasured."""
@@ -71,11 +73,11 @@ class LayoutOutcome:
 
     def to_json(self) -> dict[str, Any]:
         """The entry of the manifest."""
-        broken = [verdict.to_json() for verdict in self.broken]
         return {
             "relations": self.counts(),
-            "broken": broken,
+            "broken": [verdict.to_json() for verdict in self.broken],
             "collisions": [hit.to_json() for hit in self.collisions],
+            **({"restless": list(self.restless)} if self.restless else {}),
         }
 
 
@@ -137,7 +139,7 @@ class RoomData:
 
     @property
     def faults(self) -> tuple[str, ...]:
-        """Broken relations and collisions of all layouts, one sentence each; says which layout if there are several."""
+        """What is broken, collides or does not rest, one sentence each; says which layout if there are several."""
         several = len(self.outcomes) > 1
         return tuple(
             f"layout_{number}: {fault}" if several else fault

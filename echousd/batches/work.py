@@ -172,12 +172,7 @@ def generated(job: Job, *, here: bool = False) -> Any:
     model = load_model(asked.weights, device=asked.device if here else CPU)
     if asked.device != CPU and not here:
         model = ElsewhereModel(model, job.answers)
-    made = generate(_checked(job), options=asked, seed=job.seed, model=model, drawn=drawn, outside=job.outside)
-    if not asked.settle:
-        return made
-    from echousd.settle import settled
-
-    return settled(made).noted
+    return generate(_checked(job), options=asked, seed=job.seed, model=model, drawn=drawn, outside=job.outside)
 
 
 def best_of(wanted: DraftsWanted) -> Best:

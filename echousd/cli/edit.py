@@ -154,7 +154,7 @@ def _say_finished(room: Path, steps: Sequence[str], started: float, json: bool) 
 
     _say_steps(room, _drawn(room), "finished", steps, started, json)
     layouts = (find_manifest(room.parent, room.stem) or {}).get("layouts", ())
-    if any(layout["broken"] or layout["collisions"] for layout in layouts):
+    if any(layout["broken"] or layout["collisions"] or layout.get("restless") for layout in layouts):
         raise typer.Exit(1)
 
 

@@ -68,10 +68,6 @@ def generate(
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")
-    if options.settle:
-        from echousd.settle import require_engine, settled
-
-        require_engine()
     house = () if room or flat else rooms_of(graph)
     with ExitStack() as held:
         if not house:
@@ -86,7 +82,6 @@ def generate(
         finally:
             gc.enable()
         spent = {"imports": time.perf_counter() - started}
-        restless: list[str] = []
 
         def one(path: str | None, folder: Path) -> Written:
             room = make(
@@ -98,11 +93,6 @@ def generate(
                 progress=listen,
             )
             timer = StageTimer(listen)
-            if options.settle:
-                with timer.stage("settle"):
-                    found = settled(room)
-                room = found.noted
-                restless.extend(found.restless)
             written = write_room(room, folder, timer, flat=flat, force=force, store=store)
             for stage, seconds in (*timer.seconds.items(), *room.timings.items()):
                 spent[stage] = spent.get(stage, 0.0) + seconds
@@ -117,7 +107,7 @@ def generate(
     total = time.perf_counter() - started
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
-    report(made, restless, since=started, json=json, house=root, more=more)
+    report(made, since=started, json=json, house=root, more=more)
 
 
 def rooms_of(graph: Path) -> Sequence[Place]:

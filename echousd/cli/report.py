@@ -27,24 +27,22 @@ def telling_faults() -> Iterator[None]:
 
 def report(
     made: Sequence[Written],
-    restless: Sequence[str] = (),
     *,
     since: float = 0.0,
     json: bool = False,
     house: Path | None = None,
     more: Mapping[str, Any] | None = None,
 ) -> None:
-    """Say what was made and what the graphs asked for in vain; exit code 1 for faults and pieces that do not rest.
+    """Say what was made and what the graphs asked for in vain; exit code 1 for faults.
 
     Arguments:
         made: the rooms.
-        restless: pieces that do not come to rest, a sentence each.
         since: `time.perf_counter()` when the command began.
         json: as one JSON object instead of lines.
         house: the layer that composes the rooms, told in JSON.
         more: further entries of the JSON object.
     """
-    faults = [*(fault for each in made for fault in each.room.faults), *restless]
+    faults = [fault for each in made for fault in each.room.faults]
     if json:
         files = [house, *(path for each in made for path in (each.root, each.preview))]
         rooms = {"rooms": [_room(each) for each in made]}
@@ -96,5 +94,7 @@ def tell_room(written: Written) -> None:
             say(f"broken   {verdict.said} (margin {verdict.margin:+.2f})")
         for hit in found.collisions:
             say(f"collide  {hit.first} and {hit.second} by {hit.depth:.2f} m")
+        for sentence in found.restless:
+            say(f"restless {sentence}")
     for note in room.notes:
         say(f"note     {note}")

@@ -30,12 +30,14 @@ from echousd.make.layouts import (
 )
 from echousd.make.locking import with_earlier_locks, with_locked_places
 from echousd.make.owned import with_own_boxes, with_own_pieces
+from echousd.make.resting import settled
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
 from echousd.progress import StageTimer
 from echousd.repair.living import unusual_sizes
 from echousd.reproducible import one_thread
 from echousd.room import Provenance
+from echousd.settle import require_engine
 from echousd.shapes.merging import merged
 from echousd.shapes.sources import default_source
 from echousd.shapes.sources.guided import shape_nearness
@@ -88,14 +90,17 @@ def generate(
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
-            missing, damaged or have no shape branch.
+            missing, damaged or have no shape branch, `settle` without the extra `sim`.
 
-    Warns (`RoomWarning`) of relations that are broken and of furniture that collides; `Room.faults` lists them.
+    Warns (`RoomWarning`) of relations that are broken, of furniture that collides and of what `settle` finds restless;
+    `Room.faults` lists them.
     """
     asked = (options or RoomOptions()).replaced(**given)
     timer = StageTimer(progress)
     file, beside = "", Path.cwd()
     wishes, seed, drafts = asked.wishes(outside), asked.seed, asked.drafts
+    if asked.settle:  # what is absent is told before any long work
+        require_engine()
     if not isinstance(graph, SceneGraph):
         from echousd.graph import load_graph
 
@@ -187,5 +192,8 @@ def generate(
         options=asked,
         timings=timer.seconds,
     )
+    if asked.settle:
+        with timer.stage("settle"):
+            made_room = settled(made_room)
     warn_of_faults(made_room)
     return made_room

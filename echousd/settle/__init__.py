@@ -1,16 +1,13 @@
 """Whether a room rests: its physics, simulated for a while (extra `sim`)."""
 
 from echousd.settle.engine import require_engine
-from echousd.settle.rest import Settled, settled
 from echousd.settle.settle import Motion, SettleReport, SettleUnavailable, settle, settle_layouts
 
 __all__ = [
     "Motion",
     "SettleReport",
     "SettleUnavailable",
-    "Settled",
     "require_engine",
     "settle",
     "settle_layouts",
-    "settled",
 ]

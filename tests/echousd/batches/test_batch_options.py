@@ -104,22 +104,20 @@ def test_what_has_no_place_is_left_out_if_wanted(source, tmp_path):
 
 def test_rooms_come_to_rest_if_wanted(source, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
-    from echousd import settle
+    from echousd.make import pipeline
 
-    calm = settle.settled
-    monkeypatch.setattr(settle, "settled", lambda room: replace(calm(room), moved=("lamp",)))
+    calm = pipeline.settled
+    monkeypatch.setattr(pipeline, "settled", lambda room: replace(calm(room), notes=("lamp came to rest",)))
     made(source, tmp_path / "run", settle=True)
     (row,) = read_journals(tmp_path / "run").values()
-    assert "lamp stands where it comes to rest" in row["notes"]
+    assert "lamp came to rest" in row["notes"]
 
 
 def test_what_does_not_rest_fails_the_verdict_of_a_batch_that_settles(source, tmp_path, monkeypatch, echousd_command):
-    """A lamp that stands in the air falls."""
+    """A lamp whose place in the air is stated falls."""
     pytest.importorskip("mujoco")
-    from echousd import settle
     from echousd.batches import batch as batches
 
-    monkeypatch.setattr(settle, "settled", lambda room: settle.Settled(room, (), ()))  # nobody puts it right
     lamp = Node("lamp", "table_lamp", size=(0.25, 0.45, 0.25), position=(1.2, 1.5, 1.2), yaw=0.0)
     nodes = tuple(lamp if node.name == "lamp" else node for node in small_graph().nodes)
     relations = tuple(told for told in small_graph().relations if told.subject != "lamp")

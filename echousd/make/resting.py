@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -11,56 +11,38 @@ from echomodel.boxes import Boxes
 from echousd.make.finished import Room
 from echousd.make.verdicts import relation_verdicts
 from echousd.reproducible import rounded_boxes
-from echousd.room import LayoutOutcome
-from echousd.settle.settle import SettleReport, settle_layouts
+from echousd.settle import SettleReport, settle_layouts
 from echousd.stage.paths import OBJECTS
 
 UPRIGHT = 1.0  # degrees: what leans further at rest is no pose that a layout can hold
 
 
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """A room after it came to rest.
+def settled(room: Room) -> Room:
+    """The room with its poses at rest where they differ, told in its notes; what is locked stays.
 
-    Arguments:
-        room: as it was, or with the poses at rest.
-        moved: names of the objects that stand elsewhere now.
-        restless: a sentence for every piece that still does not rest.
-    """
-
-    room: Room
-    moved: tuple[str, ...]
-    restless: tuple[str, ...]
-
-    @property
-    def noted(self) -> Room:
-        """The room that says what was moved and what does not rest."""
-        said = (*(f"{name} stands where it comes to rest" for name in self.moved), *self.restless)
-        return replace(self.room, notes=(*self.room.notes, *said))
-
-
-def settled(room: Room) -> Settled:
-    """Simulate every layout of a room and write the poses at rest where they differ; what is locked stays.
-
-    Pieces that topple or fall stay where they were and are named: a layout holds upright poses.
+    Every layout is simulated. Pieces that topple or fall stay where they were, since a layout holds upright poses: they
+    are faults of the outcome, as is all that still does not rest.
 
     Raises SettleUnavailable without MuJoCo (extra `sim`).
     """
     reports = settle_layouts(room.stage)
     if all(report.ok for report in reports):
-        return Settled(room, (), ())
+        return room
     layouts = room.layouts or (room.boxes,)
     rested = [_rested(room, boxes, report) for boxes, report in zip(layouts, reports, strict=True)]
-    moved = tuple(sorted({name for _, names in rested for name in names}))
+    moved = sorted({name for _, names in rested for name in names})
     if moved:
         found = tuple(boxes for boxes, _ in rested)
         outcomes = tuple(
-            LayoutOutcome(relation_verdicts(room.graph, boxes), before.collisions)
+            replace(before, verdicts=relation_verdicts(room.graph, boxes))
             for boxes, before in zip(found, room.outcomes, strict=True)
         )
-        room = replace(room, boxes=found[0], layouts=found, outcomes=outcomes)
+        notes = (*room.notes, *(f"{name} stands where it comes to rest" for name in moved))
+        room = replace(room, boxes=found[0], layouts=found, outcomes=outcomes, notes=notes)
         reports = settle_layouts(room.stage)
-    return Settled(room, moved, tuple(sentence for report in reports for sentence in report.sentences))
+    told = [replace(report, layout="").sentences for report in reports]
+    outcomes = tuple(replace(one, restless=each) for one, each in zip(room.outcomes, told, strict=True))
+    return replace(room, outcomes=outcomes)
 
 
 def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list[str]]:
