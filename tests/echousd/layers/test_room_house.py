@@ -12,6 +12,8 @@ from echousd.checks import check
 from echousd.layers.house import places
 from echousd.stage import write_graph
 
+QUICK = ("--shapes", "boxes", "--no-walls", "--no-repair", "--dress", "none", "--no-preview")
+
 
 @pytest.fixture(autouse=True)
 def model(monkeypatch):
@@ -40,7 +42,8 @@ def file(tmp_path):
 
 
 def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
-    done = echousd_command("generate", file, "-o", tmp_path / "out", "--shapes", "boxes", "--no-walls", "--no-repair")
+    words = ("-o", tmp_path / "out", *QUICK)
+    done = echousd_command("generate", file, *words)
     assert done.code == 0, done.err
     assert f"house    {tmp_path / 'out' / 'out.usda'}" in done.out
     assert (tmp_path / "out" / "West" / "West.usda").is_file()
@@ -53,8 +56,7 @@ def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
     assert not report.broken
     assert not report.placement
     # again: ours are replaced
-    words = ("-o", tmp_path / "out", "--shapes", "boxes", "--no-walls", "--no-repair", "--json")
-    done = echousd_command("generate", file, *words)
+    done = echousd_command("generate", file, *words, "--json")
     assert done.code == 0, done.err
     told = json.loads(done.out)
     layers = [tmp_path / "out" / name for name in ("West/West.usda", "East/East.usda")]
@@ -66,8 +68,7 @@ def test_all_rooms_are_made_and_composed(file, tmp_path, echousd_command):
 
 
 def test_one_of_them(file, tmp_path, echousd_command):
-    words = ("--shapes", "boxes", "--room", "/House/East")
-    done = echousd_command("generate", file, "-o", tmp_path / "east", *words)
+    done = echousd_command("generate", file, "-o", tmp_path / "east", *QUICK, "--room", "/House/East")
     assert done.code == 0, done.err
     assert (tmp_path / "east" / "east.usda").is_file()
     done = echousd_command("generate", file, "-o", tmp_path / "north", "--room", "/House/North")
@@ -92,7 +93,7 @@ def test_rooms_without_a_place_are_put_in_a_row(file, tmp_path, echousd_command)
     UsdGeom.Xformable(stage.GetPrimAtPath("/House/East")).ClearXformOpOrder()
     stage.Save()
     assert {tuple(place.pose[:3, 3]) for place in places(file)} == {(0.0, 0.0, 0.0)}
-    done = echousd_command("generate", file, "-o", tmp_path / "out", "--shapes", "boxes", "--no-walls", "--no-repair")
+    done = echousd_command("generate", file, "-o", tmp_path / "out", *QUICK)
     assert done.code == 0, done.err
     stage = Usd.Stage.Open(str(tmp_path / "out" / "out.usda"))
     cache = UsdGeom.BBoxCache(0, ["default"])
