@@ -4,16 +4,71 @@ python docs/make_api.py
 """
 
 import inspect
+from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import echousd
 from echomodel.rows import Predicate
 from echomodel.rules import rule_set
 from echomodel.rules.placements import RULES as PLACES
+from echousd.checks import CheckReport, Collision, Fault, MeasuredRelation, Misplacement
+from echousd.checks.report import LayoutReport
+from echousd.graph.difference import GraphDiff
+from echousd.graph.nodes import PlainModel
+from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
+from echousd.repair.living import LivingFault
+from echousd.room import LayoutOutcome, Provenance, Verdict
+from echousd.settle import Motion, SettleReport
 from echousd.shapes.finishes.harmonies import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")
-ORDER = ("generate", "edit", "check", "render", "export", "load_model", "Room", "RoomOptions")
+ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "check", "render", "export", "load_model")
+# what a name gives that has no public name of its own
+GIVES = {
+    "SceneGraph": (GraphDiff,),
+    "Room": (LayoutOutcome, Verdict, Provenance),
+    "check": (
+        CheckReport, LayoutReport, MeasuredRelation, Collision, Misplacement, LivingFault, Fault, SettleReport, Motion,
+    ),
+}  # fmt: skip
+# run by tests/test_readme.py, top to bottom in one folder
+EXAMPLES = {
+    "SceneGraph": r"""
+import echousd
+
+graph = echousd.SceneGraph(
+    echousd.RoomSpec("study", size=(3.6, 3.0)),
+    (echousd.Node("desk", "desk"), echousd.Node("chair", "office_chair")),
+    (echousd.Relation("chair", "close_by", "desk"),),
+)
+more = graph.add_node("lamp", "table_lamp").relate("lamp", "standing on", "desk").lock("lamp")
+print("\n".join(graph.diff(more).lines()))
+assert echousd.SceneGraph.from_yaml(more.to_yaml()) == more
+more.to_stage("study.usda")
+""",
+    "Room": r"""
+import echousd
+
+room = echousd.generate("study.usda", seed=7, shapes="boxes", dress="none", preview=False)
+for number, name in enumerate(room.names):
+    x, height, z = room.pose(number)[:3, 3]  # metres
+    print(f"{name:>5} at x {x:+.2f}, height {height:.2f}, z {z:+.2f}")
+print(*room.verdicts, *room.faults, sep="\n")
+print(room.stage.GetDefaultPrim().GetPath(), room.save("out/study"))
+""",
+    "check": r"""
+import echousd
+
+report = echousd.check("out/study/study.usda")
+for fault in (*report.collisions, *report.placement, *report.errors):
+    print(fault)
+for one in report.relations:
+    print(one.relation, one.kept, one.margin)
+print(report.ok, report.good(strict=True), sorted(report.to_json()))
+""",
+}
 
 
 def page() -> str:
@@ -27,7 +82,52 @@ def page() -> str:
 
 def _entry(name: str) -> list[str]:
     found = getattr(echousd, name)
-    return ["```text", f"echousd.{name}{_signature(found)}", "", inspect.getdoc(found) or "", "```"]
+    lines = _described(f"echousd.{name}", found)
+    if found is RoomOptions:
+        lines += _options()
+    for kind in GIVES.get(name, ()):
+        lines += ["", *_described(kind.__name__, kind)]
+    return [*lines, "", "```python", EXAMPLES[name].strip(), "```"] if name in EXAMPLES else lines
+
+
+def _described(title: str, found: Any) -> list[str]:
+    """Signature, docstring and members, of a class also those of the classes of ours that it builds on."""
+    kinds = [kind for kind in inspect.getmro(found) if _ours(kind)] if inspect.isclass(found) else [found]
+    docs = [inspect.getdoc(kind) or "" for kind in kinds if kind is not PlainModel]
+    lines = ["```text", f"{title}{_signature(found)}", "", *"\n\n".join(docs).split("\n"), "```"]
+    members = [f"| `{called}` | {_first_sentence(member)} |" for kind in kinds for called, member in _members(kind)]
+    return [*lines, "", "| member | what it is |", "|---|---|", *dict.fromkeys(members)] if members else lines
+
+
+def _ours(kind: type) -> bool:
+    return kind.__module__.startswith(("echousd", "echomodel"))
+
+
+def _members(kind: Any) -> Iterator[tuple[str, Any]]:
+    for name, member in vars(kind).items() if inspect.isclass(kind) else ():
+        if name.startswith("_") or (inspect.getdoc(member) or "The entry").startswith("The entry"):
+            continue
+        if isinstance(member, property | cached_property):
+            yield name, member
+        elif inspect.isroutine(member):
+            yield f"{name}{_signature(getattr(kind, name))}", member
+
+
+def _first_sentence(member: Any) -> str:
+    text = " ".join((inspect.getdoc(member) or "").split("\n\n")[0].split())
+    return text.replace("|", "or")
+
+
+def _options() -> list[str]:
+    lines = []
+    for group in GROUPS:
+        lines += ["", f"{group}:", "", "| option | default | allowed | what it does |", "|---|---|---|---|"]
+        for name, row in RoomOptions.model_fields.items():
+            extra: Any = row.json_schema_extra
+            if extra["group"] == group:
+                allowed = limits_of(row) or words_of(row).replace("|", ", ")
+                lines.append(f"| `{name}` | `{row.default!r}` | {allowed} | {row.description} |")
+    return [*lines, "", f"An edit takes {', '.join(f'`{name}`' for name in OF_NEW)}."]
 
 
 def _meaning(row: Predicate) -> str:
@@ -42,8 +142,12 @@ def _signature(found: object) -> str:
     parameters = [
         parameter.replace(annotation=inspect.Parameter.empty)
         for parameter in inspect.signature(found).parameters.values()  # type: ignore[arg-type]
+        if parameter.name != "self"
     ]
-    return str(inspect.Signature(parameters)) if len(str(parameters)) < 2000 else "(...)"
+    left = [one for one in parameters if one.name not in RoomOptions.model_fields]
+    if len(parameters) - len(left) < len(OF_NEW):  # else the table has them
+        return str(inspect.Signature(parameters))
+    return str(inspect.Signature([*left, inspect.Parameter("given", inspect.Parameter.VAR_KEYWORD)]))
 
 
 def _words() -> list[str]:

@@ -3,9 +3,14 @@
 import importlib.util
 import inspect
 import pydoc
+import re
 from pathlib import Path
 
+import pytest
+
 import echousd
+from echousd.checks import CheckReport
+from echousd.options import GROUPS, OF_NEW
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -26,6 +31,36 @@ def test_every_public_name_is_there_and_documented():
         assert inspect.getdoc(getattr(echousd, name)), name
     assert {"generate", "edit", "check", "render", "export", "load_model"} <= set(echousd.__all__)
     assert set(echousd.__all__) == set(echousd._HOME)
+
+
+def section(name):
+    """What the page says below a heading."""
+    return (DOCS / "API.md").read_text("utf-8").split(f"\n## {name}\n")[1].split("\n## ")[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("SceneGraph", echousd.SceneGraph), ("Room", echousd.Room), ("check", CheckReport)]
+)
+def test_what_people_call_stands_there_in_a_sentence_each(name, kind):
+    told = dict(re.findall(r"^\| `(\w+).*?` \| (.+) \|$", section(name), re.MULTILINE))
+    fields = getattr(kind, "model_fields", getattr(kind, "__dataclass_fields__", {}))
+    called = {one for one in dir(kind) if not one.startswith("_") and one not in fields}
+    assert called <= set(told)
+    assert all(len(sentence) > 9 for sentence in told.values())
+    assert section(name).count("```python") == 1
+
+
+def test_the_options_of_a_room_stand_in_their_groups():
+    groups = re.split(r"^(\w[\w ]+):$", section("RoomOptions"), flags=re.MULTILINE)[1:]
+    assert tuple(groups[::2]) == GROUPS
+    found = {
+        name: group for group, rows in zip(groups[::2], groups[1::2], strict=True)
+        for name in re.findall(r"^\| `(\w+)`", rows, re.MULTILINE)
+    }  # fmt: skip
+    rows = echousd.RoomOptions.model_fields
+    assert found == {name: row.json_schema_extra["group"] for name, row in rows.items()}
+    assert "| `drafts` | `None` | 1 to 64 | layouts to choose the best from;" in section("RoomOptions")
+    assert f"An edit takes {', '.join(f'`{name}`' for name in OF_NEW)}." in section("RoomOptions")
 
 
 def test_no_module_takes_the_place_of_a_public_name():

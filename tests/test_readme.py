@@ -1,5 +1,7 @@
 """The commands in the README are executed, top to bottom, in one folder that holds a copy of samples/.
 
+The examples on the page of the API are executed in this process, top to bottom, in an empty folder.
+
 Every ```bash and ```python block runs, except
 
 * blocks below a comment `<!-- not run: reason -->`,
@@ -96,6 +98,18 @@ def run(markdown: str, folder: Path) -> int:
 def test_the_commands_in_the_readme_run(tmp_path):
     shutil.copytree(REPOSITORY / "samples", tmp_path / "samples")
     assert run(README.read_text("utf-8"), tmp_path) >= 3
+
+
+def test_the_examples_on_the_page_of_the_api_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    page = REPOSITORY / "docs" / "API.md"
+    shown = [block for block in blocks(page.read_text("utf-8")) if block.language == "python"]
+    for block in shown:
+        exec(compile(block.text, f"{page.name}, block of line {block.line}", "exec"), {})
+    assert len(shown) == 3
+    printed = capsys.readouterr().out
+    assert printed.startswith("+ object lamp (table_lamp)\n+ relation lamp standing_on desk\n")
+    assert "/Room out/study/study.usda\n" in printed
 
 
 @pytest.mark.skipif(not README.exists(), reason="no README.md in this checkout")
