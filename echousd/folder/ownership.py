@@ -25,13 +25,15 @@ LAYER_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 def free_assets(folder: Path, room: RoomData, recorded: Mapping[str, str]) -> dict[str, str]:
     """Object name -> asset name, where new assets keep off names whose files in `folder` are somebody else's."""
     renamed: dict[str, str] = {}
-    present = {path.name for path in (folder / "assets").glob("*")} | set(room.assets.values())
+    files = (path for path in (folder / "assets").rglob("*") if path.is_symlink() or not path.is_dir())
+    inner = (path.relative_to(folder) for path in files)
+    taken = {path.parts[1] for path in inner if path.as_posix() not in recorded} | set(room.assets.values())
     for asset in dict.fromkeys(room.assets.values()):
-        files = (component_file(asset), payload_file(asset), coarse_file(asset))
-        foreign = any(path not in recorded and inside(folder, path, "an asset").exists() for path in files)
+        parts = (component_file(asset), payload_file(asset), coarse_file(asset))
+        foreign = any(path not in recorded and inside(folder, path, "an asset").exists() for path in parts)
         if foreign and asset not in room.carried:
-            renamed[asset] = free_name(asset, present)
-            present.add(renamed[asset])
+            renamed[asset] = free_name(asset, taken)
+            taken.add(renamed[asset])
     return {name: renamed.get(asset, asset) for name, asset in room.assets.items()}
 
 

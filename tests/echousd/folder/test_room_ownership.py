@@ -6,6 +6,7 @@ import shutil
 import warnings
 
 import pytest
+from plain_rooms import plain_files, plain_room
 from pxr import Sdf, Usd
 from small_room import BARE, StandIn, small_graph
 
@@ -57,6 +58,24 @@ def test_new_asset_keeps_off_the_name_of_an_artists_file(root, told):
     shutil.rmtree(fern.parent)
     make(1, graph).save(root.parent, preview=False)  # generated anew, the name is free again
     assert find_manifest(root.parent)["assets"]["fern"] == "fern"
+
+
+@pytest.mark.parametrize("edits", [False, True])
+def test_a_room_saved_again_beside_an_artists_file_is_the_same_room(tmp_path, edits):
+    """As by a process that died and whose next run finished its work before it did the same once more."""
+    folder = tmp_path / "bedroom"
+    with plain_files(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        root = save_room(plain_room(["bed"], 0), folder, preview=False)
+        (folder / "assets/desk").mkdir()
+        (folder / "assets/desk/desk.usda").write_text(MINE)
+        made = plain_room(["bed", "desk"], 0, root if edits else None)
+        seen = []
+        for _ in range(3):
+            save_room(made, folder, preview=False)
+            seen.append({path: path.read_bytes() for path in folder.rglob("*") if path.is_file()})
+    assert find_manifest(folder)["assets"]["desk"] == "desk_2"
+    assert seen[0] == seen[1] == seen[2]
 
 
 def test_every_edit_of_a_layer_is_kept(root, told):
