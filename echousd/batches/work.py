@@ -93,23 +93,24 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
         except ValueError as error:
             out[i] = Sampled(error=str(error))
 
-    def sample(model: Any, rows: list[int], steps: int | None) -> None:
+    def sample(model: Any, rows: list[int], steps: int | None, guided: bool) -> None:
         chosen, seeds = [graphs[i] for i in rows], [jobs[i].seed for i in rows]
         most = [jobs[i].options.drafts or most_drafts(model, len(graphs[i].nodes)) for i in rows]
-        found = sample_round(model, chosen, seeds, most, number=len(jobs[rows[0]].rounds), steps=steps)
+        number = len(jobs[rows[0]].rounds)
+        found = sample_round(model, chosen, seeds, most, number=number, steps=steps, guided=guided)
         for i, drafts in zip(rows, found, strict=True):
             out[i] = Sampled(graphs[i].to_json(), (*jobs[i].rounds, tuple(map(_rows, drafts))))
 
-    asked = {i: (jobs[i].options.weights, jobs[i].options.steps) for i in graphs}
-    for weights, steps in dict.fromkeys(asked.values()):
-        same = [i for i in graphs if asked[i] == (weights, steps)]
+    asked = {i: (one.weights, one.steps, not one.repair) for i, one in ((i, jobs[i].options) for i in graphs)}
+    for weights, steps, guided in dict.fromkeys(asked.values()):
+        same = [i for i in graphs if asked[i] == (weights, steps, guided)]
         model = load_model(weights, device=jobs[same[0]].options.device)
         try:
-            sample(model, same, steps)
+            sample(model, same, steps, guided)
         except ValueError:
             for i in same:
                 try:
-                    sample(model, [i], steps)
+                    sample(model, [i], steps, guided)
                 except ValueError as error:
                     out[i] = Sampled(error=str(error))
     return out

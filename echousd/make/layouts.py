@@ -91,12 +91,14 @@ class Draws:
     Arguments:
         seed, number: of the draws; equal ones, and equal counts, give equal drafts.
         steps: of the sampler, None = the model's own. change: what was edited in the graph, None = nothing.
+        guided: at every step by what is specified; where boxes are placed by search afterwards that changes nothing.
     """
 
     seed: int
     number: int = 0
     steps: int | None = None
     change: GraphEdit | None = None
+    guided: bool = True
 
 
 def sample_boxes(
@@ -116,13 +118,13 @@ def sample_boxes(
         extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
     if draws.steps is not None:
         extra["steps"] = draws.steps
+    if not draws.guided and model.preset == "compact":
+        extra["relation_guidance"] = 0.0
     if draws.change is not None:
         extra["edit"] = repeated(draws.change, len(nodes), count)
     generator = seeded(draws.seed, "layout", draws.number)
     with timer.stage("layout") as tell, one_thread():
         found = model.sample_layout(batch, generator=generator, progress=tell, **extra).to("cpu")
-    mounted = torch.tensor([vocabulary().category(node.category).mounted for node in nodes]).repeat(count)
-    found.position[mounted > 0, 1] = mounted[mounted > 0]
     return [
         rounded_boxes(graph, Boxes(found.size[rows], found.position[rows] + centre, found.yaw[rows]))
         for rows in torch.arange(count * len(nodes)).chunk(count)
@@ -167,7 +169,7 @@ def best_boxes(
         if not given and best is not None and drawn is not None and drawn.elsewhere:
             raise DraftsWanted(BestDraft(of, *best, worth))
         for draft in given or sample_boxes(
-            model, graph, replace(draws, number=draws.number + start), count=count, timer=timer
+            model, graph, replace(draws, number=draws.number + start, guided=not repair), count=count, timer=timer
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
@@ -224,7 +226,7 @@ def finished_boxes(
     graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], repair: bool, timer: StageTimer
 ) -> tuple[Boxes, tuple[str, ...]]:
     """Sampled boxes after equal sizes within style groups and, if wanted, repair; and demands in conflict."""
-    boxes = _alike(graph, boxes, styles)
+    boxes = _alike(graph, _mounted(graph, boxes), styles)
     if not repair:
         return rounded_boxes(graph, boxes), ()
     from echousd.repair import RepairConfig, RepairResult
@@ -319,6 +321,17 @@ def plan_boxes(layouts: Sequence[Boxes]) -> tuple[np.ndarray, np.ndarray, np.nda
         for name in ("size", "position", "yaw")
     )
     return size, position, yaw
+
+
+def _mounted(graph: SceneGraph, boxes: Boxes) -> Boxes:
+    """The boxes with what is fixed to a wall at the height where such things hang, unless its place is stated."""
+    height = boxes.position[:, 1].clone()
+    for number, node in enumerate(graph.nodes):
+        row = vocabulary().category(node.category)
+        if row.mounted and node.position is None:
+            height[number] = row.mounted
+    position = torch.stack([boxes.position[:, 0], height, boxes.position[:, 2]], 1)
+    return Boxes(boxes.size, position, boxes.yaw)
 
 
 def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:

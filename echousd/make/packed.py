@@ -30,6 +30,7 @@ def sample_round(
     *,
     number: int = 0,
     steps: int | None = None,
+    guided: bool = False,
 ) -> list[tuple[Boxes, ...]]:
     """The drafts of one round (`draft_rounds`) of the first layout of every graph, as `generate` takes them (`drawn`).
 
@@ -38,7 +39,7 @@ def sample_round(
 
     Arguments:
         model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
-        graphs, seeds: as many of each. steps: sampling steps, None for the model's own.
+        graphs, seeds: as many of each. steps: sampling steps, None for the model's own. guided: as `Draws`.
         drafts: how many each graph gets at most in all rounds. number: of the round, 0 = the first draft.
     """
     starts, counts = zip(*(draft_rounds(most)[number] for most in drafts), strict=True)
@@ -57,6 +58,7 @@ def sample_round(
                 GraphBatch.pack([batches[i] for i in owners]),
                 generator=SceneGenerators([generators[i] for i in owners], rows),
                 steps=steps,
+                relation_guidance=None if guided else 0.0,
             )
         fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
         for i, size, position, yaw in zip(owners, *fields, strict=True):
@@ -66,7 +68,9 @@ def sample_round(
     for i, graph in enumerate(planned):
         if i not in found:
             found[i] = tuple(
-                sample_boxes(model, graph, Draws(seeds[i], start, steps), count=counts[i], timer=StageTimer())
+                sample_boxes(
+                    model, graph, Draws(seeds[i], start, steps, guided=guided), count=counts[i], timer=StageTimer()
+                )
             )
     return [found[i] for i in range(len(graphs))]
 

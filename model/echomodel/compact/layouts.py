@@ -13,7 +13,6 @@ from echomodel.compact.given import Sampling, starting_noise
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor
-from echomodel.drafts import drafted
 from echomodel.floors import known as floors_known
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
@@ -58,6 +57,8 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
     bound = how.known is not None or how.edit is not None or how.noise is not None
     if begin >= 1 or bound or not bool(floors_known(graph.floor).all()):
         return _denoised(model, latent, graph, how, None, 1.0)
+    from echomodel.drafts import drafted  # the room generator: a baseline, not on the way of what ships
+
     counts = graph.node_counts
     told = torch.bincount(graph.scene[graph.triplets[:, 0]], minlength=len(counts)) / counts
     open_ = told <= MOST_TOLD
