@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact import layouts
 from echomodel.compact.joined import equal_furniture
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import agreeing
@@ -72,7 +71,7 @@ def test_layouts_begin_on_a_draft_where_one_helps(model: EchoModel, monkeypatch:
         asked.append(graph.num_scenes)
         return boxes(graph.num_nodes), torch.tensor([1.0, 0.0])[: graph.num_scenes]
 
-    monkeypatch.setattr(layouts, "drafted", draft)
+    monkeypatch.setattr("echomodel.drafts.drafted", draft)
     found = model.sample_layout(packed, generator=seeded(), start=0.0)
     assert asked == [2]  # the dense graph is not drafted
     assert torch.equal(found.position[:3], torch.zeros(3, 3))  # start 0: the draft itself

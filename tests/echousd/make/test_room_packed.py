@@ -50,8 +50,9 @@ def test_further_drafts_are_those_of_single_runs():
     for number in (1, 2):
         packed = sample_round(model, graphs, seeds, [5, 8], number=number, steps=4)
         for graph, seed, most, drafts in zip(graphs, seeds, (5, 8), packed, strict=True):
-            start, count = draft_rounds(most)[number]
-            alone = sample_boxes(model, with_plan(graph, seed), Draws(seed, start, 4), count=count, timer=StageTimer())
+            (start, count), timer = draft_rounds(most)[number], StageTimer()
+            draws = Draws(seed, start, 4, guided=False)
+            alone = sample_boxes(model, with_plan(graph, seed), draws, count=count, timer=timer)
             for a, b in zip(alone, drafts, strict=True):
                 assert float((a.position - b.position).abs().max()) < 5e-4
 
