@@ -18,9 +18,7 @@ from echousd.stage import encoding as usd
 from echousd.stage import open_stage
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.layouts import VARIANTS, layout_names, showing_layout
-from echousd.stage.paths import DRESSING, OBJECTS
-
-ROOM = "/Room"
+from echousd.stage.paths import DRESSING, OBJECTS, ROOM
 
 
 def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:

@@ -10,9 +10,10 @@ from echomodel.boxes import Boxes
 from echomodel.loading import load_model
 from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
-from echousd.graph import SceneGraph
+from echousd.graph import SceneGraph, load_graph
 from echousd.graph.consistency import faults_of
 from echousd.graph.doors import check_doors
+from echousd.graph.files import STAGE_FORMS
 from echousd.graph.floors import check_space, with_plan, with_wider_floor, without_openings
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
@@ -45,6 +46,10 @@ from echousd.shapes.sources.mixing import check_sources, mixed_shapes, sources_o
 from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
+from echousd.stage import open_stage, read_graph
+from echousd.stage.paths import ROOM
+from echousd.stage.read import find_rooms
+from echousd.stage.units import unlike
 from echousd.tensors import graph_batch
 
 if TYPE_CHECKING:
@@ -97,17 +102,16 @@ def generate(
     """
     asked = (options or RoomOptions()).replaced(**given)
     timer = StageTimer(progress)
-    file, beside = "", Path.cwd()
+    file, beside, other = "", Path.cwd(), ""
     wishes, seed, drafts = asked.wishes(outside), asked.seed, asked.drafts
     if asked.settle:  # what is absent is told before any long work
         require_engine()
     if not isinstance(graph, SceneGraph):
-        from echousd.graph import load_graph
-
         file, beside = Path(graph).name, Path(graph).parent
         with timer.stage("read"):
             read = Path(graph)
-            graph, held = with_earlier_locks(load_graph(read, room), earlier)
+            graph, other = _read(read, room, asked.up_axis)
+            graph, held = with_earlier_locks(graph, earlier)
             graph, homeless = with_locked_places(graph, None if room else read, earlier)
     else:
         graph, held = with_earlier_locks(graph, earlier)
@@ -187,7 +191,7 @@ def generate(
         floor=floor,
         layouts=tuple(layouts),
         outcomes=outcomes,
-        notes=(*crowded, *held, *homeless, *notes, *unusual_sizes(stated)),
+        notes=(*filter(None, [other]), *crowded, *held, *homeless, *notes, *unusual_sizes(stated)),
         provenance=Provenance(seed, echo.preset, echo.hash, shapes, file),
         options=asked,
         timings=timer.seconds,
@@ -197,3 +201,12 @@ def generate(
             made_room = settled(made_room)
     warn_of_faults(made_room)
     return made_room
+
+
+def _read(file: Path, room: str | None, up: str) -> tuple[SceneGraph, str]:
+    """The graph in a file, and how its stage differs from a room of ours, "" where it does not."""
+    if not file.is_file() or file.suffix.lower() not in STAGE_FORMS:
+        return load_graph(file, room), ""
+    stage = open_stage(file)
+    paths = [str(prims.room.GetPath()) for prims in find_rooms(stage)]
+    return read_graph(stage, room), unlike(stage, paths[0] if len(paths) == 1 else ROOM, up)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+ROOM = "/Room"
 OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
 OPENINGS = "/Room/SceneGraph/Openings"

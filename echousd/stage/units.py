@@ -10,6 +10,8 @@ from collections.abc import Iterator
 
 from pxr import Sdf, Usd, UsdGeom
 
+from echousd.stage.paths import ROOM
+
 METRES = "metersPerUnit"
 UP_AXIS = "upAxis"
 
@@ -31,6 +33,20 @@ def set_units(layer: Sdf.Layer, stage: Usd.Stage) -> None:
     for key, value in ((METRES, metres_per_unit(stage)), (UP_AXIS, up_axis(stage))):
         if not layer.pseudoRoot.HasInfo(key):
             layer.pseudoRoot.SetInfo(key, value)
+
+
+def unlike(stage: Usd.Stage, path: str, up: str) -> str:
+    """A sentence where a stage that holds a room at a path is in other units, axis or path than a room of ours is.
+
+    Arguments:
+        up: axis of ours. What the stage leaves open differs in nothing.
+    """
+    metres = metres_per_unit(stage) if _speaker(stage, METRES) else 1.0
+    axis = up_axis(stage) if _speaker(stage, UP_AXIS) else up
+    if (round(metres, 9), axis, path) == (1.0, up, ROOM):
+        return ""
+    name = stage.GetRootLayer().GetDisplayName()
+    return f"{name} has units of {metres:g} m, {axis} up, at {path}; the room has metres, {up} up (up_axis), at {ROOM}"
 
 
 def unit_faults(stage: Usd.Stage) -> Iterator[tuple[str, bool]]:

@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from pxr import Sdf
 from small_room import BARE, StandIn, small_graph
 
 import echousd
@@ -247,3 +248,28 @@ def test_windows_are_proposed_beside_a_stated_door():
     assert {opening.kind for opening in room.graph.room.openings[1:]} == {"window"}
     again = echousd.generate(room.graph, model=StandIn(), shapes="boxes", repair=False)
     assert again.graph.room.openings == room.graph.room.openings
+
+
+@pytest.mark.parametrize(
+    ("metres", "axis", "path", "said"),
+    [
+        (1.0, "Y", "/Room", ""),
+        (None, None, "/Room", ""),
+        (0.01, "Y", "/Room", "units of 0.01 m, Y up, at /Room"),
+        (1.0, "Z", "/Room", "units of 1 m, Z up, at /Room"),
+        (0.01, "Z", "/World/Flat/Living", "units of 0.01 m, Z up, at /World/Flat/Living"),
+    ],
+)
+def test_a_room_says_which_conventions_of_its_stage_it_does_not_keep(tmp_path, metres, axis, path, said):
+    layer = Sdf.Layer.CreateNew(str(tmp_path / "flat.usda"))
+    echousd.write_graph(small_graph(), layer, path)
+    for above in Sdf.Path(path).GetParentPath().GetPrefixes():
+        layer.GetPrimAtPath(above).specifier = Sdf.SpecifierDef
+    for key, value in (("metersPerUnit", metres), ("upAxis", axis)):
+        layer.pseudoRoot.ClearInfo(key)
+        if value is not None:
+            layer.pseudoRoot.SetInfo(key, value)
+    layer.Save()
+    room = echousd.generate(tmp_path / "flat.usda", model=StandIn(), shapes="boxes", repair=False, **BARE)
+    found = [note for note in room.notes if note.startswith("flat.usda")]
+    assert found == ([f"flat.usda has {said}; the room has metres, Y up (up_axis), at /Room"] if said else [])
