@@ -96,8 +96,9 @@ class Sequences(RuleBasedStateMachine):
             self.mine.discard(before)
             toy = b""
             if path == self.root.name:
-                self.toys.add(f"Toy{self.number()}")
-                toy = b'def Cube "Toy%d" {}\n' % self.count
+                toy = b'def Cube "Toy%d" {}\n' % self.number()
+                if not self.folder_pending():  # else whoever finishes the run may keep this root under another name
+                    self.toys.add(f"Toy{self.count}")
             self.writes(path, before + toy + b"# mine %d\n" % self.number())
 
     @rule(asset=st.sampled_from(sorted(CATEGORIES)))
@@ -187,7 +188,7 @@ class Sequences(RuleBasedStateMachine):
         self.touches(path)
 
     def touches(self, path):
-        for state in (*self.back, *self.ahead):
+        for state in (*self.back, *self.ahead, self.now):
             state.pop(path, None)
         if not self.folder_pending():
             self.now = self.state()
@@ -247,6 +248,8 @@ class Sequences(RuleBasedStateMachine):
         if now.get("bedroom.json") == self.now.get("bedroom.json"):
             theirs = {path for path, content in self.now.items() if content in self.mine or path == self.root.name}
             self.same(now, {path: content for path, content in self.now.items() if path not in theirs})
+            if not self.step and now != self.now:  # the root alone was written anew: what was taken back is gone
+                self.ahead = []
             self.now = now
             return
         length = len(json.loads(now["bedroom.json"])["history"])
