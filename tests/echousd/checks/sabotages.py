@@ -261,7 +261,7 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("bed in the air", move(BED, y=0.3), "floating", "bed"),
     Sabotage("bed sunk", move(BED, y=-0.3), "sunk", "bed"),
     Sabotage("bed outside", move(BED, x=-4.0), "outside", "bed"),
-    Sabotage("bed in its wall", move(BED, z=-0.025), "collision", "bed"),
+    Sabotage("bed in its wall", move(BED, z=-0.04), "collision", "bed"),
     Sabotage("wardrobe in the bed", move(f"{OBJ}/wardrobe", z=-1.5), "collision", "wardrobe"),
     Sabotage("pendant below its ceiling", move(f"{OBJ}/pendant", y=-0.5), "floating", "pendant"),
     Sabotage("bed on its head", op(BED, "rotateX", 180.0, T.Float), "echo:Upright", BED),
