@@ -45,13 +45,23 @@ def read(path: str, memory: list, seen: set) -> bool:
         layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
         for at in paths:
             read_spec(layer, at)
-        found = [layer.ComputeAbsolutePath(name) for name in layer.GetCompositionAssetDependencies()]
+        named = [*layer.GetCompositionAssetDependencies(), *clips(layer, paths)]
+        found = [layer.ComputeAbsolutePath(name) for name in named if name]
         names = [str(Ar.GetResolver().Resolve(name)) for name in found]
     except MemoryError:
         os.abort()
     except Exception:  # told by whoever opens it next
         return True
     return all([read(name, memory, seen) for name in names if name])
+
+
+def clips(layer, paths: list) -> list:
+    """The layers that value clips of a layer name, which are no dependencies of its composition."""
+    specs = [layer.GetPrimAtPath(at) for at in paths if at.IsPrimPath()]
+    sets = [dict(spec.GetInfo("clips")) for spec in specs if spec and spec.HasInfo("clips")]
+    values = [value for each in sets for one in each.values() for value in dict(one).values()]
+    assets = [asset for value in values for asset in (value if hasattr(value, "__len__") else [value])]
+    return [asset.path for asset in assets if hasattr(asset, "path")]
 
 
 def read_spec(layer, at) -> None:
