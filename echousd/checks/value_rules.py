@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
+from echomodel.vocabulary import vocabulary
 from echousd.checks.findings import Finding, Rule
 from echousd.checks.reading import Reading
 from echousd.stage.files import said
@@ -15,6 +16,7 @@ from echousd.stage.values import LARGEST, misfit, shown
 WRAPS = ("black", "clamp", "repeat", "mirror", "useMetadata")
 WORDS = {"inputs:sourceColorSpace": ("raw", "sRGB", "auto"), "inputs:wrapS": WRAPS, "inputs:wrapT": WRAPS}
 ENGINES = {"physics:approximation": ("sdf", "sphereFill", "convexMeshSimplification")}  # words that only some know
+SPOKEN = {"echo:predicate": "predicates", "echo:roomType": "room_types"}
 INVERTED = "!invert!"
 RESET = "!resetXformStack!"
 
@@ -31,6 +33,8 @@ def value_types(reading: Reading) -> Iterator[Finding]:
             yield Finding(attribute.GetPath(), f"holds {shown(found)}, allowed: {attribute.GetTypeName()}")
         elif isinstance(found, str) and attribute.GetTypeName() == Sdf.ValueTypeNames.Token:
             words = attribute.GetMetadata("allowedTokens") or WORDS.get(attribute.GetName())
+            if words and attribute.GetName() in SPOKEN:  # the schema may be older than the words
+                words = (*words, *(row.name for row in getattr(vocabulary(), SPOKEN[attribute.GetName()])))
             if words and found not in (*words, *ENGINES.get(attribute.GetName(), ())):
                 yield Finding(attribute.GetPath(), f"is {found!r}, allowed: {', '.join(words)}")
 

@@ -9,6 +9,9 @@ import pytest
 from echomodel.data import shapeset
 from echomodel.data.shapeset import LEVELS, ShapeSet, build_shapes, piece, quantised
 from echomodel.furniture import tsdf_of
+from echomodel.vocabulary import vocabulary
+
+COUNT = len(vocabulary().categories)
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +19,7 @@ def smoke(tmp_path_factory):
     directory = tmp_path_factory.mktemp("shapes")
     calls = []
     built = build_shapes(directory, 2, 7, lambda done, total: calls.append((done, total)))
-    assert calls == [(46, 92), (92, 92)]
+    assert calls == [(COUNT, 2 * COUNT), (2 * COUNT, 2 * COUNT)]
     return built
 
 
@@ -25,10 +28,10 @@ def digest(directory):
 
 
 def test_a_set_holds_every_category_in_every_style(smoke):
-    assert len(smoke) == 92
-    assert smoke.category.tolist() == list(range(46)) * 2
-    assert smoke.style.tolist() == [0] * 46 + [1] * 46
-    assert smoke.index_of("s1_chair") == 46 + smoke.categories.index("chair")
+    assert len(smoke) == 2 * COUNT
+    assert smoke.category.tolist() == list(range(COUNT)) * 2
+    assert smoke.style.tolist() == [0] * COUNT + [1] * COUNT
+    assert smoke.index_of("s1_chair") == COUNT + smoke.categories.index("chair")
     assert (smoke.size > 0).all()
 
 

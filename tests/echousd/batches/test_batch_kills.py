@@ -42,8 +42,8 @@ def test_a_killed_run_and_its_killed_worker_leave_the_same_bytes(tmp_path):
 def test_what_check_finds_misplaced_is_in_the_row(tmp_path, monkeypatch):
     from echousd import checks
 
-    def floating(root):
-        report = checks_check(root)
+    def floating(root, **given):
+        report = checks_check(root, **given)
         layout = replace(report.layouts[0], placement=(Misplacement("desk", "floating", 0.4),))
         return replace(report, layouts=(layout, *report.layouts[1:]))
 

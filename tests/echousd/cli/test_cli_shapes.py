@@ -12,6 +12,7 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel, save_weights
 from echomodel.config import CompactConfig, from_dict
 from echomodel.data.shapeset import ShapeSet, build_shapes
+from echomodel.vocabulary import vocabulary
 from echousd.cli.main import run
 
 
@@ -101,9 +102,10 @@ def test_shapes_are_scored(tmp_path, monkeypatch, capsys):
     assert 0 <= result["generation"]["watertight"] <= 1
     assert run([*arguments, "--rooms", "0", "--per-class", "1"]) == 0
     classes = json.loads(capsys.readouterr().out)["classes"]
-    assert classes["objects"] == 46
-    assert classes["watertight"] + classes["empty"] == 46
-    assert Image.open(tmp_path / "sheet.png").size[1] == 46 * 120
+    count = len(vocabulary().categories)
+    assert classes["objects"] == count
+    assert classes["watertight"] + classes["empty"] == count
+    assert Image.open(tmp_path / "sheet.png").size[1] == count * 120
     assert run([*arguments, "--meshes", str(tmp_path)]) == 2
     assert "name one set" in capsys.readouterr().err
     save_weights(tmp_path / "model.safetensors", model, ("latent", "autoencoder"))

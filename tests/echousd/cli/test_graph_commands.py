@@ -76,7 +76,7 @@ def test_new_does_not_overwrite_unless_told(echousd_command, tmp_path):
         (["--from", "x.yaml", "--count", "desk=1"], "--count goes with --room"),
         (["--from", "gone.yaml"], "gone.yaml: no such file or directory"),
         (["--from", "gone.usda"], "gone.usda: no such file"),
-        (["--room", "kitchenette"], "room: type: unknown room type 'kitchenette': allowed: bedroom, living_room"),
+        (["--room", "spaceship"], "room: type: unknown room type 'spaceship': allowed: bedroom, living_room"),
         (
             ["--room", "study", "--count", "desk"],
             "--count desk: allowed: a category and a number, such as nightstand=2",
