@@ -23,9 +23,7 @@ from echomodel.loading import load_model
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues.sweethome import CATALOGUE
 from echousd.assets.choose import Asked, AssetWishes, choose
-from echousd.assets.describe import described
-from echousd.assets.front import front_by_shape
-from echousd.assets.likeness import named_by_shape
+from echousd.assets.describe import described, front_by_shape, named_by_shape
 from echousd.assets.measure import measure
 from echousd.assets.naming import category_of, fitted
 from echousd.assets.record import AssetRecord

@@ -23,7 +23,7 @@ from echomodel.objective.sizes import usual_sizes
 from echomodel.rooms.generator import iterate_rooms
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import weighed
-from echousd.stage.rooms import graph_of
+from echousd.stage.boxes import graph_of
 from echousd.tensors import graph_batch
 
 AT_ONCE = 50  # rooms in one batch

@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from PIL import Image, ImageDraw, ImageFont
 
-from echomodel.data.room_files import load_rooms
+from echomodel.data.roomset import load_rooms
 from echomodel.metrics.layout_evaluation import EditedGraph, LayoutEvaluation, told_graphs
 from echomodel.metrics.layout_sources import model_layouts
 from echomodel.metrics.room_figures import with_known_words

@@ -20,8 +20,7 @@ import trimesh
 from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
-from echomodel.data.mesh_sources import entries_of
-from echomodel.data.meshes import draft_table, prepared
+from echomodel.data.meshes import draft_table, entries_of, prepared
 from echomodel.echo import EchoModel
 from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.description import piece_of

@@ -20,8 +20,7 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.samplers import sample
-from echomodel.training.shape_stage import draw_suites, shape_loss
-from echomodel.training.shapes import read
+from echomodel.training.shape_stage import draw_suites, read, shape_loss
 from echomodel.vocabulary import vocabulary
 
 SUITES = 200

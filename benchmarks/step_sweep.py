@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.compact.wholeness import wholeness
+from echomodel.compact.predictors import wholeness
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch

@@ -8,20 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 from echomodel.files import within_memory
 from echomodel.vocabulary import vocabulary
 from echousd.assets.catalogues.entry import Entry
 from echousd.assets.colors import dominant
-from echousd.assets.front import SURE, front_by_shape
 from echousd.assets.licences import UNKNOWN, spdx
-from echousd.assets.likeness import named_by_shape
 from echousd.assets.measure import measure
 from echousd.assets.measured import Measured
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector
-from echousd.assets.shape import supports, thumbnail
+from echousd.assets.shape import sampled, supports, thumbnail
 
 PLACEMENT = {"floor": "floor", "table": "surface", "wall": "wall", "ceiling": "ceiling"}
 BLOCK = 2**20
@@ -156,3 +155,112 @@ def relative(path: Path, library: Path) -> str:
         return Path(os.path.relpath(path.absolute(), here)).as_posix()
     except ValueError:  # on another drive
         return path.absolute().as_posix()
+
+
+SAMPLES = 4000
+SURE = 0.12  # share by which one side must outdo its opposite to be believed against a convention
+
+
+def front_by_shape(mesh: trimesh.Trimesh, category: str) -> tuple[int, float]:
+    """(quarters, evidence): quarter turns about +Y, counter-clockwise from above, that bring the front to +Z.
+
+    Arguments:
+        mesh: +Y up, any unit. category: of the vocabulary; what looks alike from all sides has no evidence.
+
+    Seats, sofas and beds are highest at their back; cases and screens are plain and flat there and stand with it, the
+    wide side, to the wall. Evidence is 0 where nothing tells, and near 1 where all does.
+    """
+    role = vocabulary().category(category).role
+    points, normals, _ = sampled(mesh, SAMPLES)
+    weight = np.full(SAMPLES, 1 / SAMPLES)
+    low, high = points.min(0), points.max(0)
+    size = np.maximum(high - low, 1e-9)
+    at = (points - low) / size  # 0 to 1
+    if role in ("seat", "sofa", "bed"):
+        scores = _heights(at, weight)
+    elif role in ("storage", "screen"):
+        scores = _plainness(at, normals, weight, size)
+    else:
+        return 0, 0.0
+    # scores: how much each side, +Z, +X, -Z, -X in the order of quarter turns, looks like a back
+    opposite = np.roll(scores, 2)
+    best = int(np.argmax(scores - opposite))
+    back_to_front = (best + 2) % 4
+    evidence = float(scores[best] - opposite[best])
+    # a front at +X (place 1) comes to +Z by turning clockwise once, that is three quarters counter-clockwise
+    return (4 - back_to_front) % 4, evidence
+
+
+def _heights(at: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Of the surface in the upper part, how much lies near each side, as shares of what lies there."""
+    upper = at[:, 1] > 0.62
+    if upper.sum() < 20:
+        upper = at[:, 1] > 0.5
+    total = max(float(weight[upper].sum()), 1e-9)
+    lean = [at[:, 2], at[:, 0], 1 - at[:, 2], 1 - at[:, 0]]
+    return np.array([float((weight * upper * (side > 0.68)).sum()) / total for side in lean])
+
+
+def _plainness(at: np.ndarray, normals: np.ndarray, weight: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """How much of each side is one plane at its very end, weighted by how wide the side is."""
+    axes = ((2, 1.0), (0, 1.0), (2, -1.0), (0, -1.0))
+    wide = max(size[0], size[2])
+    found = []
+    for axis, sign in axes:
+        end = at[:, axis] > 0.99 if sign > 0 else at[:, axis] < 0.01
+        facing = np.abs(normals[:, axis]) > 0.9
+        across = size[0] if axis == 2 else size[2]
+        flat = float((weight * (end & facing)).sum())
+        near = at[:, axis] > 0.6 if sign > 0 else at[:, axis] < 0.4
+        around = max(float((weight * (near & facing)).sum()), 1e-9)
+        found.append(flat / around * (across / wide) ** 2)
+    return np.array(found)
+
+
+OPEN, CLOSED = 0.35, 0.75  # share of the front that is filled, of open shelves at most and of closed ones at least
+CORNER = 0.04  # share of a sofa's surface that lies in the quarter before one half of its back, at most
+LOUNGE = 0.72  # metres: a chair as deep and as low as that is for leaning back
+LOUNGE_HEIGHT = 0.95
+
+
+def named_by_shape(category: str, mesh: trimesh.Trimesh, dims: np.ndarray) -> str:
+    """A category, or the one beside it in the vocabulary that the shape tells.
+
+    Arguments:
+        category: by name. mesh: in the object frame, any unit. dims: (3) metres.
+    """
+    if category in ("multi_seat_sofa", "loveseat_sofa", "sofa") and dims[2] > 1.2 and dims[0] > 1.6:
+        return "l_shaped_sofa" if _has_empty_corner(mesh) else category
+    if category in ("bookshelf", "cabinet") and dims[1] > 0.5:
+        filled = _front_filled(mesh)
+        if category == "bookshelf" and filled > CLOSED:
+            return "cabinet"
+        return "bookshelf" if category == "cabinet" and filled < OPEN and dims[1] > 1.2 else category
+    if category == "chair" and dims[2] > LOUNGE and dims[1] < LOUNGE_HEIGHT:
+        return "lounge_chair"
+    return category
+
+
+def _places(mesh: trimesh.Trimesh) -> np.ndarray:
+    """(n, 3) float, 0 to 1 in the mesh's box."""
+    points = sampled(mesh, SAMPLES)[0]
+    low, high = mesh.bounds
+    return (points - low) / np.maximum(high - low, 1e-9)
+
+
+def _has_empty_corner(mesh: trimesh.Trimesh) -> bool:
+    at = _places(mesh)
+    front = at[:, 2] > 0.7
+    share = [float((front & side).mean()) for side in (at[:, 0] < 0.35, at[:, 0] > 0.65)]
+    return min(share) < CORNER < max(share)
+
+
+def _front_filled(mesh: trimesh.Trimesh, cells: int = 16) -> float:
+    """Share of the front, seen squarely, behind which something stands in the first quarter of the depth."""
+    at = sampled(mesh, 12_000)[0]
+    low, high = mesh.bounds
+    at = (at - low) / np.maximum(high - low, 1e-9)
+    near = at[at[:, 2] > 0.8]
+    seen = np.zeros((cells, cells), bool)
+    seen[tuple((near[:, :2] * cells).astype(int).clip(0, cells - 1).T)] = True
+    return float(seen.mean())

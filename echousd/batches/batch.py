@@ -10,7 +10,6 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from echousd.batches.devices import CPU, network_processes
 from echousd.batches.executor import Executor, LocalWorkers
 from echousd.batches.journal import Journal, fault_of, read_journals, room_digest, shard_folder, whole_keys
 from echousd.batches.options import BatchRequest, as_paths, request_of
@@ -28,6 +27,7 @@ from echousd.batches.plan import (
 )
 from echousd.batches.remote import Remote, complete
 from echousd.batches.run import Run, RunOptions
+from echousd.batches.work import CPU, network_processes
 from echousd.folder.folder import check_writable
 from echousd.folder.lock import locked
 from echousd.folder.within import inside

@@ -9,8 +9,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
-from echousd.batches.plan import STATE, STORE
-from echousd.batches.rows import LONGEST, is_row
+from echousd.batches.plan import LONGEST, STATE, STORE, is_row
 from echousd.folder.lock import LOCK
 from echousd.folder.manifest import find_manifest
 from echousd.folder.within import check_links, inside

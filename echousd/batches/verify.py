@@ -1,19 +1,210 @@
-"""How far a run is, and whether its rooms are what the journal says."""
+"""What a run leaves (manifest, sheet, index, tars), how far it is, and whether its rooms are what the journal says."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import html
+import io
+import json
+import math
+import tarfile
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
-from echousd.batches.index import INDEX, write_index
+from pxr import Gf, Sdf, Usd, UsdGeom
+
+from echomodel.files import read_bounded, read_json, whole_file
 from echousd.batches.journal import fault_of, read_journals, whole_keys
-from echousd.batches.manifest import MANIFEST, SUMMARY, TABLE, manifest_rows, summary, write_manifest
-from echousd.batches.plan import load_plan
+from echousd.batches.plan import COLUMNS, Plan, load_plan
 from echousd.batches.remote import Remote, fetched
-from echousd.batches.sheet import SHEET, write_sheet
-from echousd.batches.webdataset import write_webdataset
+from echousd.folder.manifest import LARGEST
+from echousd.folder.within import inside
+from echousd.stage.files import layer_bytes, write_whole
+from echousd.textures import MAX_BYTES
+
+SHEET = "index.html"
+STYLE = """body{font:14px system-ui,sans-serif;margin:1.5rem;background:#fafafa;color:#222}
+main{display:grid;grid-template-columns:repeat(auto-fill,minmax(210px,1fr));gap:.8rem}
+article{background:#fff;border:1px solid #ddd;border-radius:6px;padding:.5rem}
+article.bad{border-color:#c33}img{width:100%;aspect-ratio:1;object-fit:cover;background:#eee}
+h2{font-size:.9rem;margin:.3rem 0;overflow-wrap:anywhere}p{margin:.15rem 0;color:#555}.fault{color:#b22}"""
+SCRIPT = """const type=document.getElementById('type'),bad=document.getElementById('bad');
+function show(){for(const a of document.querySelectorAll('article'))
+a.hidden=(type.value&&a.dataset.type!==type.value)||(bad.checked&&!a.classList.contains('bad'))}
+type.onchange=bad.onchange=show"""
+
+
+def write_sheet(
+    folder: Path, rows: Iterable[dict[str, Any]], title: str, pictures: Collection[str] | None = None
+) -> Path:
+    """Write `index.html`; its pictures are those of the rooms, by relative paths.
+
+    Arguments:
+        rows: of the manifest. title: what stands above. pictures: paths of those that there are, None = look.
+    """
+    cards: list[tuple[int, str, str]] = []
+    kinds = set()
+    for row in rows:
+        kinds.add(row["type"])
+        worst, card = _card(row, folder, pictures)
+        cards.append((worst, row["id"], card))
+    cards.sort(key=lambda card: (-card[0], card[1]))
+    options = "".join(f"<option>{html.escape(kind)}</option>" for kind in sorted(kinds - {""}))
+    with whole_file(folder / SHEET) as beside, beside.open("w", encoding="utf-8") as file:
+        file.write(
+            f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
+            f"<style>{STYLE}</style><h1>{html.escape(title)}</h1><p><label>Type <select id=type>"
+            f"<option value=''>all</option>{options}</select></label> "
+            "<label><input type=checkbox id=bad> only rooms with faults</label></p><main>\n"
+        )
+        file.writelines(f"{card}\n" for _, _, card in cards)
+        file.write(f"</main><script>{SCRIPT}</script></html>\n")
+    return folder / SHEET
+
+
+def _card(row: dict[str, Any], folder: Path, pictures: Collection[str] | None) -> tuple[int, str]:
+    """How bad a room is, and its card."""
+    told = []
+    if row["state"] != "done":
+        told = [row["error"] or "not made yet"]
+    else:
+        missed = row["relations_asked"] - row["relations_kept"]
+        told += [f"relations not kept: {missed}"] * bool(missed)
+        told += [f"collisions: {row['collisions']}"] * bool(row["collisions"])
+        told += ["fails echousd check"] * (not row["check"])
+        told += [str(text) for text in row["check_errors"]]
+        told += row["living_faults"]
+    worst = (1000 if row["state"] != "done" else 100 * (not row["check"])) + len(told) * (row["state"] == "done")
+    picture = Path(row["root"]).with_suffix(".png") if row["root"] else None
+    image = ""
+    if picture and ((folder / picture).is_file() if pictures is None else picture.as_posix() in pictures):
+        image = f'<img loading="lazy" alt="" src="{html.escape(picture.as_posix())}">'
+    kept = f"{row['objects']} objects, {row['relations_kept']} of {row['relations_asked']} relations"
+    faults = "".join(f'<p class="fault">{html.escape(text[:300])}</p>' for text in told)
+    name = html.escape(row["id"])
+    heading = f'<a href="{html.escape(row["root"])}">{name}</a>' if row["root"] else name
+    kind = html.escape(row["type"])
+    return worst, (
+        f'<article class="{"bad" if told else ""}" data-type="{kind}">{image}<h2>{heading}</h2>'
+        f"<p>{kind}, seed {row['seed']}</p><p>{kept if row['root'] else ''}</p>{faults}</article>"
+    )
+
+
+MANIFEST, TABLE, SUMMARY = "manifest.jsonl", "manifest.parquet", "summary.json"
+
+
+SUMS = ("objects", "relations_asked", "relations_kept", "collisions", "restless", "faces", "bytes", "seconds")
+
+
+def manifest_rows(plan: Plan, folder: Path) -> Iterator[dict[str, Any]]:
+    """One row for every room of the plan, whatever became of it; `root` is relative to the run's folder."""
+    journals = read_journals(folder)
+    for entry in plan.entries:
+        found = journals.get(entry.id, {})
+        row = {name: found.get(name, default) for name, default in COLUMNS.items()}
+        if found:
+            entry.folder(folder)  # no link on the way leads elsewhere
+        root = f"{entry.path}/{found['root']}" if found.get("root") else ""
+        given = {"id": entry.id, "source": entry.origin, "seed": entry.seed, "version": plan.head["version"]}
+        yield {**row, **given, "root": root}
+
+
+def summary(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """The manifest in a few numbers."""
+    states, kinds, errors, sums = Counter[str](), Counter[str](), Counter[str](), Counter[str]()
+    for row in rows:
+        states[row["state"]] += 1
+        if row["state"] == "failed":
+            errors[row["error"][:120]] += 1
+        if row["state"] != "done":
+            continue
+        kinds[row["type"]] += 1
+        for name in SUMS:
+            sums[name] += row[name]
+        sums["living_faults"] += len(row["living_faults"])
+        sums["passed_check"] += row["check"]
+    return {
+        "rooms": sum(states.values()),
+        **{state: states[state] for state in ("done", "failed", "missing")},
+        "types": dict(sorted(kinds.items())),
+        **{name: round(value, 2) if isinstance(value, float) else value for name, value in sorted(sums.items())},
+        "errors": dict(errors.most_common(20)),
+    }
+
+
+def write_manifest(plan: Plan, folder: Path) -> dict[str, Any]:
+    """Write `manifest.jsonl`, `manifest.parquet` (extra `batch`) and `summary.json`, and return the summary.
+
+    Parquet holds categories as JSON text, so that every run has the same columns.
+    """
+    with whole_file(folder / MANIFEST) as beside, beside.open("w", encoding="utf-8") as file:
+        file.writelines(json.dumps(row) + "\n" for row in manifest_rows(plan, folder))
+    _write_table(plan, folder)
+    found = summary(manifest_rows(plan, folder))
+    with whole_file(folder / SUMMARY) as beside:
+        beside.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    return found
+
+
+def _write_table(plan: Plan, folder: Path) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet as parquet
+    except ImportError:
+        return
+    texts, numbers = pyarrow.list_(pyarrow.string()), pyarrow.list_(pyarrow.float64())
+    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
+    special = {"bounds": numbers, "categories": pyarrow.string(), "seed": pyarrow.int64()}
+    schema = pyarrow.schema(
+        [(name, special.get(name, kinds.get(type(value), texts))) for name, value in COLUMNS.items()]
+    )
+    with whole_file(folder / TABLE) as beside, parquet.ParquetWriter(beside, schema) as writer:
+        rows = []
+        for row in manifest_rows(plan, folder):
+            rows.append({**row, "categories": json.dumps(row["categories"])})
+            if len(rows) == 10000:
+                writer.write_table(pyarrow.Table.from_pylist(rows, schema))
+                rows = []
+        writer.write_table(pyarrow.Table.from_pylist(rows, schema))
+
+
+INDEX = "index.usda"
+GAP = 2.0  # metres between two rooms
+
+
+def write_index(folder: Path, rows: Iterable[dict[str, Any]]) -> Path:
+    """Write `index.usda`; rooms are payloads, so that it opens without them (`Usd.Stage.LoadNone`).
+
+    Arguments:
+        rows: of the manifest; those without a room take no place.
+    """
+    made = [row for row in rows if row["state"] == "done"]
+    width = max(
+        (max(row["bounds"][3] - row["bounds"][0], row["bounds"][5] - row["bounds"][2]) for row in made), default=0
+    )
+    pitch, columns = math.ceil(width + GAP), max(1, math.ceil(math.sqrt(len(made))))
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer, Usd.Stage.LoadNone)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Rooms").GetPrim())
+    with Sdf.ChangeBlock():
+        for number, row in enumerate(made):
+            prim = Sdf.CreatePrimInLayer(layer, f"/Rooms/{row['id']}")
+            prim.specifier, prim.typeName = Sdf.SpecifierDef, "Xform"
+            prim.payloadList.Prepend(Sdf.Payload(f"./{row['root']}"))
+            low, high = row["bounds"][:3], row["bounds"][3:]
+            middle = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
+            at = Gf.Vec3d(number % columns * pitch - middle[0], 0, number // columns * pitch - middle[2])
+            move = Sdf.AttributeSpec(prim, "xformOp:translate:grid", Sdf.ValueTypeNames.Double3)
+            move.default = at
+            order = Sdf.AttributeSpec(prim, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+            order.default = ["xformOp:translate:grid"]
+    write_whole(folder / INDEX, layer_bytes(layer, ".usda"))
+    return folder / INDEX
+
 
 ARTEFACTS = (MANIFEST, TABLE, SUMMARY, SHEET, INDEX)
 
@@ -96,3 +287,50 @@ def finish(folder: Path, *, webdataset: bool = False) -> dict[str, Any]:
     if plan.to:  # the sheet and the index name rooms beside them
         Remote(plan.to).put(folder, [name for name in ARTEFACTS if (folder / name).is_file()])
     return found
+
+
+FOLDER = "webdataset"
+ROOMS = 1000  # in one tar
+
+
+def write_webdataset(folder: Path, rows: Iterable[dict[str, Any]], rooms: int = ROOMS) -> list[Path]:
+    """Write `webdataset/rooms-000000.tar` and so on; `<id>.png` is left out of rooms that have no preview.
+
+    `<id>.json` holds the room's row of the manifest and, as `room`, what lies beside the room: its graph, verdicts,
+    assets and seed.
+
+    Arguments:
+        folder: of the run. rows: of its manifest; rooms that are not done are left out. rooms: in one tar.
+    """
+    place = inside(folder, FOLDER, f"{folder}: the run")
+    place.mkdir(exist_ok=True)
+    written: list[Path] = []
+    done = (row for row in rows if row["state"] == "done")
+    while pack := [row for _, row in zip(range(rooms), done)]:  # noqa: B905  # the last one is shorter
+        path = place / f"rooms-{len(written):06d}.tar"
+        with whole_file(path) as beside, tarfile.open(beside, "w", format=tarfile.USTAR_FORMAT) as tar:
+            for row in pack:
+                for name, content in _members(folder, row):
+                    _add(tar, name, content)
+        written.append(path)
+    for left in set(place.glob("rooms-*.tar")) - set(written):  # of a run that had more
+        left.unlink()
+    return written
+
+
+def _members(folder: Path, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
+    told = {key: value for key, value in row.items() if key != "seconds"}  # the only thing that no seed decides
+    beside, picture = (
+        inside(folder, str(PurePosixPath(row["root"]).with_suffix(ending)), f"{folder}: the manifest")
+        for ending in (".json", ".png")
+    )
+    told["room"] = read_json(beside, LARGEST)
+    yield f"{row['id']}.json", (json.dumps(told, sort_keys=True) + "\n").encode()
+    if picture.is_file():
+        yield f"{row['id']}.png", read_bounded(picture, MAX_BYTES)
+
+
+def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
+    entry = tarfile.TarInfo(name)  # its time is 1970 and its owner nobody
+    entry.size = len(content)
+    tar.addfile(entry, io.BytesIO(content))

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import pickle
 import tempfile
 import time
 import warnings
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from echousd.batches.devices import CPU
-from echousd.batches.elsewhere import ElsewhereModel, SamplesWanted, sampled
+import torch
+
 from echousd.batches.journal import room_digest
 from echousd.batches.options import BatchOptions
 from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
 from echousd.make.layouts import BestDraft, DraftsWanted, Drawn, most_drafts
+
+if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
+    from echomodel.graph import GraphBatch
+    from echomodel.protocols import RoomModel
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
 
@@ -35,7 +43,7 @@ class Best:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Samples that a room wants from the process that has the device (`echousd.batches.elsewhere`)."""
+    """Samples that a room wants from the process that has the device (`echousd.batches.work`)."""
 
     call: bytes
 
@@ -184,8 +192,7 @@ def best_of(wanted: DraftsWanted) -> Best:
 
 def _checked(job: Job) -> Any:
     """The graph, if a room can be made of it; raises ValueError."""
-    from echousd.graph.doors import check_doors
-    from echousd.graph.floors import check_space, without_openings
+    from echousd.graph.floors import check_doors, check_space, without_openings
     from echousd.make.layouts import check_objects
 
     if job.draw is not None and not job.text:
@@ -249,3 +256,83 @@ def _facts(made: Any, root: Path, *, settle: bool) -> dict[str, Any]:
         "bytes": sum(path.stat().st_size for path in root.parent.rglob("*") if path.is_file()),
         "sha256": room_digest(root.parent),
     }
+
+
+METHODS = ("sample_shapes", "sample_furniture")
+
+
+class SamplesWanted(Exception):  # no error: the caller has them sampled and asks again
+    """A room wants samples that its process does not draw; `call` is what `sampled` takes."""
+
+    def __init__(self, call: bytes) -> None:
+        super().__init__()
+        self.call = call
+
+
+class ElsewhereModel:
+    """`RoomModel` with the samples of another process for shapes and furniture; all else is its own model's.
+
+    Arguments:
+        own: a model with the same weights in this process. answers: what `sampled` gave, call by call.
+    """
+
+    def __init__(self, own: RoomModel, answers: tuple[bytes, ...]) -> None:
+        self._own = own
+        self._answers: Iterator[bytes] = iter(answers)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._own, name)
+
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **rest: Any) -> torch.Tensor:
+        """As of the model; raises SamplesWanted."""
+        return self._sampled("sample_shapes", graph, boxes, rest)
+
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **rest: Any) -> torch.Tensor:
+        """As of the model; raises SamplesWanted."""
+        return self._sampled("sample_furniture", graph, boxes, rest)
+
+    def _sampled(self, method: str, graph: GraphBatch, boxes: Boxes, rest: dict[str, Any]) -> torch.Tensor:
+        answer = next(self._answers, None)
+        if answer is None:
+            state = rest.pop("generator").get_state()
+            rest.pop("progress", None)
+            raise SamplesWanted(pickle.dumps((method, graph, boxes, state, rest)))
+        found = pickle.loads(answer)
+        assert isinstance(found, torch.Tensor)
+        return found
+
+
+def sampled(model: RoomModel, call: bytes) -> bytes:
+    """What a model samples for a call of `SamplesWanted`, for `ElsewhereModel`; raises what the model raises."""
+    method, graph, boxes, state, rest = pickle.loads(call)
+    if method not in METHODS:
+        raise ValueError(f"{method!r:.40} is no call for samples, allowed: {', '.join(METHODS)}")
+    generator = torch.Generator()
+    generator.set_state(state)
+    return pickle.dumps(getattr(model, method)(graph, boxes, generator=generator, **rest).cpu())
+
+
+CPU = "cpu"
+VISIBLE = "CUDA_VISIBLE_DEVICES"
+
+
+def network_processes(device: str) -> list[dict[str, str]]:
+    """The environment of every process that runs the network alone: one a device; none where the workers run it.
+
+    Arguments:
+        device: `cpu`, `cuda` (every one that is visible) or `mps`.
+
+    Raises ValueError where torch finds no such device.
+    """
+    if device == CPU:
+        return []
+    import torch
+
+    if device == "cuda" and torch.cuda.is_available():
+        count = torch.cuda.device_count()
+        named = [word.strip() for word in os.environ.get(VISIBLE, "").split(",") if word.strip()]
+        return [{VISIBLE: name} for name in (named or map(str, range(count)))][:count]
+    if device == "mps" and torch.backends.mps.is_available():
+        return [{}]
+    found = [CPU, *["cuda"] * torch.cuda.is_available(), *["mps"] * torch.backends.mps.is_available()]
+    raise ValueError(f"device is {device!r}, which torch {torch.__version__} finds none of; here: {', '.join(found)}")

@@ -1,8 +1,7 @@
 """Checks of rooms on stages: relations, collisions, placement, and what USD's own validators do not catch."""
 
 from echousd.checks.placement import Misplacement
-from echousd.checks.relations import MeasuredRelation
-from echousd.checks.report import CheckReport, check
+from echousd.checks.report import CheckReport, MeasuredRelation, check
 from echousd.checks.validity import RULES, Fault, register
 from echousd.repair.report import Collision
 

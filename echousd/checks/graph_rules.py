@@ -10,7 +10,7 @@ from pxr import Usd, UsdGeom
 from echousd.checks.findings import Finding, Rule, applied
 from echousd.checks.reading import Reading
 from echousd.stage import encoding as usd
-from echousd.stage.dressing import read_small
+from echousd.stage.boxes import read_small
 from echousd.stage.encoding import StageError
 from echousd.stage.read import StatedTwice, find_rooms, node_names, relation_of, room_graph
 from echousd.stage.values import targets

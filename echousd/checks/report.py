@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pxr import Usd
 
 from echomodel.dressing import SMALL
+from echomodel.vocabulary import vocabulary
 from echousd.checks.collisions import find_collisions
-from echousd.checks.living import find_living
-from echousd.checks.manifests import rewritten
 from echousd.checks.placement import Misplacement, find_misplaced, misplaced_screens, misplaced_small
-from echousd.checks.relations import MeasuredRelation, measured_relations
 from echousd.checks.validity import Fault, find_faults
-from echousd.repair.living import LivingFault
+from echousd.folder.journal import digest_of
+from echousd.folder.manifest import find_manifest
+from echousd.graph import Placed, Relation, SceneGraph
+from echousd.graph.consistency import GraphError
+from echousd.graph.floors import check_extents
+from echousd.repair.living import LivingFault, living_faults
+from echousd.repair.repair import floor_of_room
 from echousd.repair.report import Collision
 from echousd.stage.contents import RoomContents, Surrounding, read_contents, surroundings
 from echousd.stage.encoding import StageError
@@ -26,7 +34,67 @@ from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.taxonomy import SHELL
 
 if TYPE_CHECKING:
+    from echomodel.boxes import Boxes
     from echousd.settle import SettleReport
+
+
+@dataclass(frozen=True)
+class MeasuredRelation:
+    """A relation or placement with its signed margin (metres or ratio, >= 0 = kept), None where it is not measured."""
+
+    relation: Relation | Placed
+    kept: bool
+    margin: float | None
+
+    def to_json(self) -> dict:
+        """The entry of the report."""
+        subject, predicate, object_ = self.relation.triple
+        margin = None if self.margin is None else round(self.margin, 4)
+        return {"subject": subject, "predicate": predicate, "object": object_, "margin": margin}
+
+
+def measured_relations(room: RoomContents, rules: str = "strict") -> tuple[MeasuredRelation, ...]:
+    """Every relation and placement of objects with boxes; raises ValueError for unknown rules."""
+    import torch
+
+    from echomodel.boxes import Boxes
+    from echomodel.rules import fronts, margins, verdicts
+
+    words = vocabulary()
+    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
+    triplets = torch.tensor(
+        [[index[r.subject], words.predicate_id(r.predicate), index[r.object]] for r in room.relations],
+        dtype=torch.int64,
+    ).reshape(-1, 3)
+    size = np.array([thing.size for thing in room.objects]).reshape(-1, 3)
+    position = np.array([thing.position for thing in room.objects]).reshape(-1, 3)
+    yaw = np.array([thing.yaw for thing in room.objects])
+    boxes = Boxes(*(torch.tensor(v, dtype=torch.float64) for v in (size, position, yaw)))
+    polygon = None if room.spec is None else floor_of_room(room.spec)
+    centre = np.zeros(2) if polygon is None else (polygon.max(0) + polygon.min(0)) / 2
+    center = torch.as_tensor(centre)
+    headed = fronts(thing.node.category for thing in room.objects)
+    verdict = verdicts(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
+    margin = margins(boxes, triplets, rules=rules, center=center, fronts=headed).tolist()
+    # Meshes are stored in single precision: a relation that holds to a tenth of a millimetre holds.
+    return tuple(
+        MeasuredRelation(relation, bool(found != 0 or value > -1e-4), None if found < 0 else float(value))
+        for relation, found, value in zip(room.relations, verdict, margin, strict=True)
+    ) + _measured_placements(room, boxes, polygon)
+
+
+def _measured_placements(room: RoomContents, boxes: Boxes, floor: np.ndarray | None) -> tuple[MeasuredRelation, ...]:
+    from echomodel.rules.placements import Stated, placement_margins
+
+    index = {thing.node.name: i for i, thing in enumerate(room.objects)}
+    told = [one for thing in room.objects for one in thing.node.placements if set(one.others) <= index.keys()]
+    stated = [Stated(one.placement, index[one.subject], tuple(index[name] for name in one.others)) for one in told]
+    margin = placement_margins(boxes, stated, floor, [thing.node.category for thing in room.objects]).tolist()
+    return tuple(
+        MeasuredRelation(one, value != value or value > -1e-4, None if value != value else value)
+        for one, value in zip(told, margin, strict=True)
+    )
+
 
 DRESSED = "Dressing"  # name of the group that holds the small things of a room
 
@@ -240,3 +308,85 @@ class Around:
             elif known_category(one.word) is not None:
                 strangers.append(one)
         return cls(tuple(small), tuple(one for one in shell if one.word != "floor"), tuple(strangers))
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+
+
+def find_living(room: RoomContents) -> tuple[LivingFault, ...]:
+    """Every living rule that an object breaks; none in a room whose graph contradicts itself, which others report."""
+    if not room.objects or room.spec is None:
+        return ()
+    things = room.objects
+    try:
+        check_extents(room.spec.extents)
+    except GraphError as error:
+        warnings.warn(f"<{room.path}>: {error}; nobody's ways are looked for on it", stacklevel=2)
+        return ()
+    try:
+        graph = SceneGraph(room.spec, tuple(thing.node for thing in things), room.relations)
+    except GraphError:
+        return ()
+    boxes = _Boxes(
+        np.array([thing.size for thing in things]),
+        np.array([thing.position for thing in things]),
+        np.array([float(thing.yaw) for thing in things]),
+    )
+    return living_faults(graph, boxes)
+
+
+RULE = "echo:Manifest"
+CLEAR = 0.02  # metres or ratio: verdicts of smaller margins may differ between boxes and meshes
+
+
+def rewritten(stage: Usd.Stage, room: str, relations: Sequence[MeasuredRelation]) -> Iterator[Fault]:
+    """Where a manifest says other than what is measured, of a room whose layers are those that it was written with.
+
+    Arguments:
+        room: prim path. relations: of the first layout.
+    """
+    root = Path(stage.GetRootLayer().realPath)
+    if not root.is_file() or not root.with_suffix(".json").is_file():
+        return
+    try:
+        manifest = find_manifest(root.parent, root.stem)
+    except ValueError as error:
+        yield Fault(RULE, room, str(error))
+        return
+    if manifest is None or manifest["name"] != root.stem or not _as_written(root, manifest["files"]):
+        return
+    measured = {one.relation.triple: one for one in relations}
+    told: dict[tuple[str, ...], str] = {}
+    for verdict in _verdicts(manifest):
+        triple = tuple(str(verdict.get(word)) for word in ("subject", "predicate", "object"))
+        told[triple] = str(verdict.get("state"))
+        found = measured.get(triple)  # type: ignore[arg-type]
+        if found is None or found.margin is None or abs(found.margin) < CLEAR:
+            continue
+        if found.kept != (told[triple] == "kept"):
+            state = "kept" if found.kept else "broken"
+            said = (
+                f"{root.stem}.json says that '{found.relation}' is {told[triple]}, it is {state} ({found.margin:+.3f})"
+            )
+            yield Fault(RULE, room, said)
+    for triple, found in measured.items():
+        if found.margin is not None and triple not in told:
+            yield Fault(RULE, room, f"{root.stem}.json says nothing of '{found.relation}'")
+    kept, counts = list(told.values()).count("kept"), manifest.get("relations")
+    if not isinstance(counts, dict) or counts.get("kept") != kept:
+        yield Fault(RULE, room, f"{root.stem}.json counts {counts} relations, its verdicts say {kept} kept")
+
+
+def _as_written(root: Path, files: dict[str, str]) -> bool:
+    """Whether the root layer and the layers below it are those that a manifest names."""
+    layers = [name for name in files if name == root.name or name.startswith("layers/")]
+    return all(digest_of(root.parent / name) == files[name] for name in layers)
+
+
+def _verdicts(manifest: dict[str, Any]) -> list[dict[str, Any]]:
+    found = manifest.get("verdicts")
+    return [verdict for verdict in found if isinstance(verdict, dict)] if isinstance(found, list) else []

@@ -85,7 +85,7 @@ def review(
 
     The table lies beside the index; what it says counts when the library is indexed again.
     """
-    from echousd.assets.corrections import read_corrections, write_table
+    from echousd.assets.index import read_corrections, write_table
     from echousd.assets.review import left_out, write_page, write_sheets
     from echousd.assets.table import read_library
 

@@ -46,7 +46,7 @@ def convert(
     if output.exists() and not force:
         raise ValueError(f"{output}: exists already (--force replaces it)")
     from echoscene import checkpoint
-    from echoscene.bounds import read_bounds
+    from echoscene.checkpoint import read_bounds
 
     statistics = read_bounds(bounds) if bounds else None
     names = classes.read_text("utf-8").split("\n") if classes else None

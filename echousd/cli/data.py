@@ -89,8 +89,8 @@ def plot(
 
     Example: echousd data plot rooms.json -o rooms.png --limit 20 --room bedroom
     """
-    from echomodel.data.plot import plot_rooms
-    from echomodel.data.room_files import load_rooms, rooms_of_type
+    from echomodel.data.roomset import load_rooms, rooms_of_type
+    from echomodel.data.sheet import plot_rooms
 
     found = load_rooms(rooms)
     if room is not None:
@@ -114,7 +114,7 @@ def report(
 
     Example: echousd data report --count 2000 --worst 20
     """
-    from echomodel.data.room_files import load_rooms
+    from echomodel.data.roomset import load_rooms
     from echomodel.metrics.report import compare, left_out, section_means
     from echomodel.rooms import generate_rooms
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import trimesh
 
 
-PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.mesh_sources` has it, which need not be loaded for --help
+PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.meshes` has it, which need not be loaded for --help
 USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
 
 
@@ -42,8 +42,7 @@ def meshes(
     """
     from rich.progress import Progress
 
-    from echomodel.data.mesh_sources import entries_of, fetched_package
-    from echomodel.data.meshes import build_meshes, draft_table, read_table, write_table
+    from echomodel.data.meshes import build_meshes, draft_table, entries_of, fetched_package, read_table, write_table
     from echousd.cli.terminal import Terminal
     from echousd.stage.meshes import stage_mesh
 

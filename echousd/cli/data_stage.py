@@ -34,9 +34,9 @@ def to_usd(
 
     Example: echousd data to-usd rooms.json -o stages --limit 10
     """
-    from echomodel.data.room_files import load_rooms
+    from echomodel.data.roomset import load_rooms
     from echomodel.metrics.room_figures import with_known_words
-    from echousd.stage.rooms import write_stages
+    from echousd.stage.boxes import write_stages
 
     found = load_rooms(rooms, limit)
     given = [room.relations for room in found]
@@ -65,7 +65,7 @@ def from_usd(
     Example: echousd data from-usd stages -o rooms.json
     """
     from echomodel.roomboxes import write_rooms
-    from echousd.stage.rooms import read_stages
+    from echousd.stage.boxes import read_stages
 
     found = read_stages(stages)
     if not found:
@@ -84,7 +84,7 @@ def to_sgfront(
 
     Example: echousd data to-sgfront rooms.json -o sgfront
     """
-    from echomodel.data.room_files import load_rooms
+    from echomodel.data.roomset import load_rooms
     from echomodel.data.sgfront_writer import write_sgfront
     from echomodel.metrics.room_figures import with_known_words
 

@@ -65,7 +65,7 @@ def layout(
     """
     from rich.progress import Progress
 
-    from echomodel.data.room_files import load_rooms
+    from echomodel.data.roomset import load_rooms
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
     from echomodel.metrics.layout_sources import model_layouts, true_layouts
     from echousd.cli.terminal import Terminal

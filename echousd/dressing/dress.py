@@ -13,7 +13,7 @@ from echousd.draw.sight import Furniture
 from echousd.dressing import bareness, corners, floors, hangings, tabletops, upholstery, walls
 from echousd.dressing.nodes import graph_of
 from echousd.dressing.setting import Setting, Thing, standing
-from echousd.graph.small import DressingGraph
+from echousd.graph.titles import DressingGraph
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes.colliders import standing_hull

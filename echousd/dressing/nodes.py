@@ -16,7 +16,7 @@ from echomodel.rules.placements import AT_WALL
 from echomodel.vocabulary import vocabulary
 from echousd.dressing.setting import Setting, Standing, Thing
 from echousd.graph import Relation
-from echousd.graph.small import DressingGraph, SmallNode
+from echousd.graph.titles import DressingGraph, SmallNode
 from echousd.stage import encoding as usd
 from echousd.stage.paths import DRESSING, OBJECTS
 from echousd.stage.write import apply_apis, author_relation, put

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from echomodel.habits import Habit
+from echomodel.rows import Habit
 from echomodel.vocabulary import vocabulary
 from echousd.graph.consistency import GraphError, check_triples
 from echousd.graph.nodes import Node, Relation, RoomSpec

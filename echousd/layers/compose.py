@@ -13,28 +13,17 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 import echousd
 from echomodel.dressing import KINDS
+from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
-from echousd.draw.thumbnails import thumbnails
 from echousd.dressing import Dressing, dress
 from echousd.folder.stored import Shelf
-from echousd.layers import (
-    assets,
-    attribution,
-    cameras,
-    component,
-    coverings,
-    lights,
-    materials,
-    materialx,
-    physics,
-    structure,
-)
+from echousd.layers import assets, cameras, component, coverings, lights, materials, materialx, physics, structure
+from echousd.layers.cameras import room_points, room_volume
 from echousd.layers.dressing import dressing_layer
-from echousd.layers.volume import room_points, room_volume
 from echousd.naming import free_name
 from echousd.room import RoomData
 from echousd.shapes import joints, looks
-from echousd.shapes.geometry import LICENCE, Geometry
+from echousd.shapes.geometry import LICENCE, Geometry, Origin
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import surface
 from echousd.stage import graph_layer as write_graph_layer
@@ -52,6 +41,31 @@ from echousd.stage.paths import (
 )
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.turning import turn_up
+
+FILE = "ATTRIBUTION.md"
+
+
+def attribution_files(room: RoomData) -> dict[str, bytes]:
+    """The text, where a room holds models of other people."""
+    origins = {name: room.geometry[user].origin for name, user in room.asset_users.items()}
+    theirs = {name: origin for name, origin in origins.items() if origin.asset}
+    return {FILE: text(room.name, theirs).encode()} if theirs else {}
+
+
+def text(room: str, origins: dict[str, Origin]) -> str:
+    """A table of the models, by licence and author."""
+    told = "Made by others, and placed and scaled here; a licence may ask that they are named."
+    lines = [f"# Models in {room}", "", told, ""]
+    lines += ["| asset | model | licence | author |", "|---|---|---|---|"]
+    for name, origin in sorted(origins.items(), key=lambda entry: (entry[1].licence, entry[1].credit, entry[0])):
+        cells = (name, origin.asset, origin.licence, origin.credit or "unknown")
+        lines.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(words: str) -> str:
+    return " ".join(words.split()).replace("|", "\\|")[:200]
+
 
 LAYERS = ("dressing", "materials", "physics", "layout", "graph", "geometry", "shell")  # strongest first
 
@@ -77,7 +91,7 @@ def room_files(room: RoomData, shelf: Shelf | None = None, folder: Path | None =
     for name, user in room.asset_users.items():
         made[name] = _asset(room, name, user, shelf, (folder or Path.cwd()) / "assets" / name)
         files.update(made[name].files)
-    files |= attribution.files(room)
+    files |= attribution_files(room)
     dressing = dress(room)
     small = {name: _small_asset(room, name, dressing) for name in dressing.geometry}
     for asset in small.values():

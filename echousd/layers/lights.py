@@ -16,7 +16,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.draw.views import view_matrix
-from echousd.layers.volume import Volume
+from echousd.layers.cameras import Volume
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
 

@@ -12,7 +12,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdUtils
 
 import echousd
-from echousd.draw.thumbnails import picture
+from echousd.draw.pictures import picture
 from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside

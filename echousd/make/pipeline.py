@@ -12,9 +12,8 @@ from echomodel.progress import StageListener
 from echomodel.roomboxes import footprints
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.consistency import faults_of
-from echousd.graph.doors import check_doors
 from echousd.graph.files import STAGE_FORMS
-from echousd.graph.floors import check_space, with_plan, with_wider_floor, without_openings
+from echousd.graph.floors import check_doors, check_space, with_plan, with_wider_floor, without_openings
 from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.fitting import fitted, with_space

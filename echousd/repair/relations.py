@@ -192,7 +192,7 @@ def _automatic(
 
 
 def _facing(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: np.ndarray) -> np.ndarray:
-    """Margins (e,) of `facing` as `echomodel.rules.turned` has them."""
+    """Margins (e,) of `facing` as `echomodel.rules.labels` has them."""
     from echomodel.rules.geometry import TINY
     from echomodel.rules.sets import LOOK
 

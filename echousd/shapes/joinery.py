@@ -11,8 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 from echomodel.furniture.assembly import Piece, pieces_of
 from echomodel.furniture.solids import FINEST, Solid
 from echomodel.triangles import area_normals
-from echousd.shapes.ballast import ballasted
 from echousd.shapes.geometry import FRAME, Collider, Geometry, Mass, Origin, Part
+from echousd.shapes.masses import ballasted
 from echousd.shapes.matter import weighed
 
 SLOTS = {"accent": "front"}  # material of a solid -> material slot, where they differ

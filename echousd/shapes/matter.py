@@ -9,8 +9,8 @@ import numpy as np
 
 from echomodel.furniture.assembly import Piece
 from echomodel.triangles import cross
-from echousd.shapes.ballast import LEAST_INERTIA
 from echousd.shapes.geometry import Mass
+from echousd.shapes.masses import LEAST_INERTIA
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Scene graphs on USD stages: written in bulk, read through any composition, changed in place."""
 
-from echousd.stage.boxes import relations_from_boxes
-from echousd.stage.dressing import read_dressing
+from echousd.stage.boxes import read_dressing, relations_from_boxes
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer
 from echousd.stage.foreign import foreign_graph, foreign_rooms

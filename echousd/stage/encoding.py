@@ -10,7 +10,7 @@ from pxr import Gf, Sdf, Vt
 if TYPE_CHECKING:
     from echomodel.openings import Opening
     from echousd.graph import Node, RoomSpec
-    from echousd.graph.small import SmallNode
+    from echousd.graph.titles import SmallNode
 
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"

@@ -15,13 +15,11 @@ from echomodel.boxes import Boxes
 from echomodel.compact.branches import branches
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
 from echomodel.compact.given import Sampling, known_values, repeated, starting_noise
-from echomodel.compact.joined import equal_furniture, joined
 from echomodel.compact.layouts import LayoutSampling, sample_boxes
 from echomodel.compact.learned import unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
-from echomodel.compact.predictors import agreeing, shape_predictor
-from echomodel.compact.wholeness import group_means, merit
+from echomodel.compact.predictors import agreeing, group_means, merit, shape_predictor
 from echomodel.config import CompactConfig, Sampler
 from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps
@@ -29,6 +27,7 @@ from echomodel.progress import StepListener, part_of
 from echomodel.protocols import GraphEdit, touched_nodes
 from echomodel.randomness import Randomness
 from echomodel.samplers import Predict, guided
+from echomodel.vocabulary import vocabulary
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 # Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
@@ -332,3 +331,34 @@ def _packed(read: Callable[[], nn.Module]) -> nn.Module:
     module = read()
     pack_linear_maps(module)
     return module
+
+
+def equal_furniture(graph: GraphBatch) -> Tensor:
+    """(N,) int64: for every node the first node of its class that relations of style or material join it to."""
+    triplets = graph.triplets
+    joins = torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("shape")))
+    joins &= graph.category[triplets[:, 0]] == graph.category[triplets[:, 2]]
+    return _first_joined(graph.num_nodes, triplets[joins][:, [0, 2]])
+
+
+def joined(graph: GraphBatch, styles: Tensor | None = None) -> Tensor:
+    """(N,) int64: for every node the first node of its style, by relations of style and by `styles` (N,), -1 = none."""
+    triplets = graph.triplets
+    ends = triplets[torch.isin(triplets[:, 1], triplets.new_tensor(vocabulary().uniting("style")))][:, [0, 2]]
+    if styles is not None:
+        styles = styles.to(triplets.device)
+        same = (styles[:, None] == styles) & (graph.scene[:, None] == graph.scene) & (styles >= 0)
+        ends = torch.cat([ends, same.nonzero()])
+    return _first_joined(graph.num_nodes, ends)
+
+
+def _first_joined(nodes: int, ends: Tensor) -> Tensor:
+    """(N,) int64: for every node the first that a chain of the pairs `ends` (E, 2) joins it to."""
+    first = torch.arange(nodes, device=ends.device)
+    while len(ends):
+        lowest = first[ends].amin(1)
+        lower = first.scatter_reduce(0, ends.flatten(), lowest.repeat_interleave(2), "amin")
+        if torch.equal(lower, first):
+            break
+        first = lower
+    return first

@@ -175,3 +175,36 @@ class RoomType:
     zones: tuple[tuple[str, float], ...] = ()
     flooring: str = ""
     aliases: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Everything that the product knows of a placement, but for the code of its rule (`echomodel.rules.placements`).
+
+    Arguments:
+        others: how many other objects it names, 0 or 2.
+        aliases: other words for it.
+    """
+
+    name: str
+    others: int = 0
+    aliases: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Habit:
+    """How objects of some categories stand to the first of `anchors` that the room holds.
+
+    Arguments:
+        categories: whose habit it is.
+        anchors: categories to relate to, the preferred ones first.
+        predicates: what holds between the object and its anchor.
+        sides: predicates of which successive objects at one anchor get one each, in turn.
+        among: what holds between an object and the first of its kind at the anchor, for pieces that come in sets.
+    """
+
+    categories: tuple[str, ...]
+    anchors: tuple[str, ...]
+    predicates: tuple[str, ...] = ()
+    sides: tuple[str, ...] = ()
+    among: tuple[str, ...] = ()

@@ -14,10 +14,9 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, expand
+from echomodel.objectives import add_noise, alpha_sigma, expand, sampling_levels
 from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
-from echomodel.schedule import alpha_sigma, sampling_levels
 
 FEWEST = 4  # steps from a draft
 Predict = Callable[[Tensor, Tensor], Tensor]

@@ -12,8 +12,6 @@ from functools import cache, cached_property
 from importlib import resources
 from typing import Any
 
-from echomodel.habits import Habit
-from echomodel.placements import Placement
 from echomodel.rows import (
     INVITES,
     MEASURES,
@@ -22,6 +20,8 @@ from echomodel.rows import (
     SUPPORTS,
     UNITES,
     Category,
+    Habit,
+    Placement,
     Predicate,
     PredicateKind,
     RoomType,

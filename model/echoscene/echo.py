@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,13 +16,10 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.protocols import touched_nodes
-from echomodel.text import TextEncoder, encoder_named
+from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
-from echoscene.editing import pack_changes, pack_scenes
 from echoscene.encoder import SceneGraphTensors
-from echoscene.grids import DISTANCE, LEVEL, published_grids, turned_back
 from echoscene.model import STRUCTURE, GraphChange, ReleasedModel
-from echoscene.scene import published_scene
 from echoscene.weights import load_released
 
 if TYPE_CHECKING:
@@ -247,3 +245,153 @@ def floor_relations(category: Tensor, triplets: Tensor) -> Tensor:
     return torch.tensor(
         [[i, above if hangs or i in raised else on, floor] for i, hangs in enumerate(hung)], dtype=torch.int64
     ).reshape(-1, 3)
+
+
+def published_scene(
+    labels: Sequence[str],
+    triples: Tensor,
+    *,
+    classes: Sequence[str],
+    text: TextEncoder,
+    edges: bool = False,
+) -> SceneGraphTensors:
+    """One scene as the published model takes it.
+
+    A floor and a `_scene_` node are put behind the objects, and every node but the last gets an `in` relation to it,
+    behind the given ones (SPEC: section 1.3). The compact vocabulary's `Category.coarse` is the label of a class in
+    the published weights of 14 classes.
+
+    Arguments:
+        labels: class names of the objects. triples: (E, 3) int64 [subject, predicate id, object] among them.
+        classes: class names in the order of their ids (`ReleasedModel.classes`).
+        text: encoder of labels and relations.
+        edges: encode relations too (`paper` preset; the published weights never use them).
+
+    Returns:
+        N + 2 nodes and E + N + 1 triples.
+
+    Raises:
+        ValueError: a label that is no class, or a triple with an unknown predicate or end; names it.
+    """
+    index = {name: number for number, name in enumerate(classes)}
+    names = [*labels, *STRUCTURE]
+    for position, name in enumerate(names):
+        if name not in index or (name in STRUCTURE and position < len(labels)):
+            allowed = ", ".join(sorted(set(classes) - {*STRUCTURE}))
+            raise ValueError(f"label of node {position} is {name!r}, allowed: {allowed}")
+    predicates = vocabulary().sgfront_predicates
+    triples = torch.as_tensor(triples, dtype=torch.int64).reshape(-1, 3)
+    for row, (subject, predicate, target) in enumerate(triples.tolist()):
+        if predicate not in predicates:
+            raise ValueError(f"predicate of triplet {row} is {predicate}, allowed: 0..{max(predicates)}")
+        if not (0 <= subject <= len(labels) and 0 <= target <= len(labels)):  # the floor is right behind the objects
+            raise ValueError(f"triplet {row} joins nodes {subject} and {target}, allowed: 0..{len(labels)}")
+    last = len(names) - 1
+    inside = torch.tensor([[node, 0, last] for node in range(last)])
+    triples = torch.cat([triples, inside])
+    features = None
+    if edges:
+        features = text([edge_text(names[s], predicates[p], names[o]) for s, p, o in triples.tolist()])
+    ids = torch.tensor([index[name] for name in names])
+    return SceneGraphTensors(ids, triples, text([node_text(name) for name in names]), features)
+
+
+DISTANCE = 4 / 64  # our grids hold distances over 4 voxels, the published ones in sides of the grid
+LEVEL = 0.02  # the published iso value of the truncated distance
+
+
+def published_grids(grids: Tensor, side: int = 64) -> Tensor:
+    """Our grids (K, 64, 64, 64) in the published frame, whose +X is an object's front, and unit: (K, 1, R, R, R).
+
+    `side` is R, 64 or a part of it for a smaller autoencoder, whose voxels are means.
+    """
+    turned = (grids.flip(1).transpose(1, 3) * DISTANCE)[:, None].contiguous()
+    return turned if side == grids.shape[1] else torch.nn.functional.avg_pool3d(turned, grids.shape[1] // side)
+
+
+def turned_back(grids: Tensor) -> Tensor:
+    """Published grids (K, 1, R, R, R) in our frame, (K, R, R, R): the point (x, y, z) of theirs is (-z, y, x) in its
+    box, a quarter turn."""
+    return grids[:, 0].transpose(1, 3).flip(1).contiguous()
+
+
+CHANGEABLE = range(1, 12)  # predicates that a relation is changed into, as published
+
+RelationText = Callable[[int, int, int], Tensor]  # (subject node, predicate id, object node) -> (text,) float32
+
+
+def pseudo_graph(
+    graph: SceneGraphTensors, generator: torch.Generator, relation_text: RelationText | None = None
+) -> GraphChange:
+    """The graph from which an edit would have led to `graph`: a node less, another relation, or the same graph.
+
+    The three are equally likely; a scene without an object or a relation to change stays as it is.
+
+    Arguments:
+        graph: one scene, its floor and `_scene_` node last. generator: source of the choice.
+        relation_text: text features of a changed relation; needed where the graph has edge texts.
+
+    Raises:
+        ValueError: the graph has edge texts and `relation_text` is missing.
+    """
+    if graph.edge_text is not None and relation_text is None:
+        raise ValueError("a graph with edge texts needs relation_text for the relations that are changed")
+    kind = int(torch.randint(3, (), generator=generator))
+    objects, triples = len(graph.classes) - 2, graph.triples
+    if kind == 0 and objects > 0:
+        node = int(torch.randint(objects, (), generator=generator))
+        return GraphChange(without_node(graph, node), added=(node,))
+    eligible = ((triples[:, 1] != 0) & (triples[:, [0, 2]] < objects).all(1)).nonzero()[:, 0]
+    if kind == 1 and len(eligible):
+        row = int(eligible[torch.randint(len(eligible), (), generator=generator)])
+        subject, old, target = triples[row].tolist()
+        others = [p for p in CHANGEABLE if p != old]
+        new = others[int(torch.randint(len(others), (), generator=generator))]
+        changed, text = triples.clone(), graph.edge_text
+        changed[row, 1] = new
+        if text is not None and relation_text is not None:
+            text = text.clone()
+            text[row] = relation_text(subject, new, target)
+        return GraphChange(replace(graph, triples=changed, edge_text=text), touched=(subject, target))
+    return GraphChange(graph)
+
+
+def without_node(graph: SceneGraphTensors, node: int) -> SceneGraphTensors:
+    """The graph without a node and its relations."""
+    keep = torch.arange(len(graph.classes)) != node
+    rows = (graph.triples[:, [0, 2]] != node).all(1)
+    triples = graph.triples[rows].clone()
+    for column in (0, 2):
+        triples[:, column] -= (triples[:, column] > node).long()
+    text = None if graph.edge_text is None else graph.edge_text[rows]
+    return SceneGraphTensors(graph.classes[keep], triples, graph.node_text[keep], text)
+
+
+def pack_scenes(graphs: Sequence[SceneGraphTensors]) -> tuple[SceneGraphTensors, Tensor]:
+    """Scenes behind one another as one disjoint graph, and the scene (N,) int64 of each node."""
+    counts = [len(graph.classes) for graph in graphs]
+    starts = [0, *accumulate(counts)]
+    texts = [graph.edge_text for graph in graphs]
+    whole = SceneGraphTensors(
+        torch.cat([graph.classes for graph in graphs]),
+        torch.cat([g.triples + torch.tensor([s, 0, s]) for g, s in zip(graphs, starts, strict=False)]),
+        torch.cat([graph.node_text for graph in graphs]),
+        None if any(text is None for text in texts) else torch.cat([text for text in texts if text is not None]),
+    )
+    return whole, torch.repeat_interleave(torch.arange(len(graphs)), torch.tensor(counts))
+
+
+def pack_changes(graphs: Sequence[SceneGraphTensors], changes: Sequence[GraphChange]) -> GraphChange:
+    """The changes that lead to `graphs`, for the packed graph.
+
+    Added nodes are counted in the packed graph before, touched ones in the packed graph after; the published code
+    counts both in the graph before, and flags the wrong nodes once an earlier scene of the batch has an addition.
+    """
+    before, _ = pack_scenes([change.before for change in changes])
+    old = [0, *accumulate(len(change.before.classes) for change in changes)]
+    new = [0, *accumulate(len(graph.classes) for graph in graphs)]
+    return GraphChange(
+        before,
+        added=tuple(start + node for start, change in zip(old, changes, strict=False) for node in change.added),
+        touched=tuple(start + node for start, change in zip(new, changes, strict=False) for node in change.touched),
+    )

@@ -16,16 +16,14 @@ from echomodel.data.shapeset import ShapeSet
 from echomodel.roomboxes import RoomBoxes
 from echomodel.text import CachedTextEncoder, ClipTextEncoder, RandomTextEncoder, TextEncoder, edge_text
 from echomodel.training.recipe import Recipe
-from echomodel.training.shapes import read
+from echomodel.training.shape_stage import read
 from echomodel.training.start import data_folder
 from echomodel.training.trainer import Report, Trainer
 from echomodel.vocabulary import vocabulary
 from echoscene.config import PaperSizes, paper
-from echoscene.editing import pack_changes, pack_scenes, pseudo_graph
+from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, published_grids, published_scene
 from echoscene.encoder import SceneGraphTensors
-from echoscene.grids import published_grids
 from echoscene.model import GraphChange, ReleasedModel
-from echoscene.scene import published_scene
 from echoscene.weights import load_released, write_released
 
 SCENE_BOX = (-1.0,) * 6  # what the published loader gives the `_scene_` node, with an angle of -1

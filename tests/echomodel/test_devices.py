@@ -29,8 +29,7 @@ from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import OptimizerConfig, Recipe
 from echomodel.training.rooms import PackedRooms
-from echomodel.training.shape_stage import ShapeStage
-from echomodel.training.shapes import EncodedShapes
+from echomodel.training.shape_stage import EncodedShapes, ShapeStage
 from echomodel.training.trainer import Trainer, step_generator
 
 GPU = pytest.param(torch.device("cuda"), marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))

@@ -9,11 +9,10 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxStatistics
-from echomodel.compact.joined import equal_furniture
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import agreeing
 from echomodel.config import CompactConfig, from_dict, from_json, to_json, with_settings
-from echomodel.echo import EchoModel
+from echomodel.echo import EchoModel, equal_furniture
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit, touched_nodes
 

@@ -8,8 +8,15 @@ import pytest
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.metrics.layout import kolmogorov_smirnov, relation_scores, size_rows, touched_triplets
-from echomodel.metrics.layout_evaluation import OPPOSITE, LayoutEvaluation, evaluate_layout
+from echomodel.metrics.layout_evaluation import (
+    OPPOSITE,
+    LayoutEvaluation,
+    evaluate_layout,
+    kolmogorov_smirnov,
+    relation_scores,
+    size_rows,
+    touched_triplets,
+)
 from echomodel.metrics.report import compare, section_means
 from echomodel.metrics.room_figures import ray_lengths, room_figures, with_known_words
 from echomodel.roomboxes import RoomBoxes

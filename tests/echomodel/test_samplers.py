@@ -7,9 +7,8 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, clean_from, expand, output_from, target
+from echomodel.objectives import add_noise, alpha_sigma, clean_from, expand, output_from, target
 from echomodel.samplers import SAMPLERS, Predict, guided, sample
-from echomodel.schedule import alpha_sigma
 
 MEAN, SPREAD = 0.7, 0.4
 SWEEP = [(s, o) for s in SAMPLERS for o in ("noise", "velocity", "flow")]

@@ -12,8 +12,7 @@ import torch
 from safetensors import safe_open
 from torch import nn
 
-from echoscene.bounds import statistics_from_bounds
-from echoscene.checkpoint import CheckpointError, convert, read_published
+from echoscene.checkpoint import CheckpointError, convert, read_published, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.model import ReleasedModel
 from echoscene.weights import load_released

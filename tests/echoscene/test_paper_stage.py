@@ -13,12 +13,10 @@ from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet
 from echomodel.data.shapeset import ShapeSet
 from echomodel.text import RandomTextEncoder, TextEncoder
-from echomodel.training.logs import read_log
 from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.run import open_run
-from echomodel.training.trainer import step_generator
-from echoscene.echo import ReleasedEcho
-from echoscene.grids import DISTANCE, published_grids, turned_back
+from echomodel.training.trainer import read_log, step_generator
+from echoscene.echo import DISTANCE, ReleasedEcho, published_grids, turned_back
 from echoscene.model import ReleasedModel
 from echoscene.tables import LayoutTables
 from echoscene.training import PaperModel, PaperStage, scene_boxes, text_encoder

@@ -13,13 +13,12 @@ from published_shapes import fit_to_box, mesh_from_grid, vertex_points
 
 from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, coverage, emd_matrix
 from echomodel.vocabulary import vocabulary
-from echoscene.bounds import read_bounds, statistics_from_bounds
+from echoscene.checkpoint import read_bounds, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, released, shape_unet
+from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.gcn import TripletGCN
-from echoscene.model import GraphChange, ReleasedModel
-from echoscene.sampling import node_budget
-from echoscene.scene import published_scene
+from echoscene.model import GraphChange, ReleasedModel, node_budget
 from echoscene.shape import ShapeUNet
 from echoscene.tables import LayoutTables
 

@@ -15,10 +15,8 @@ from echomodel.protocols import GraphEdit
 from echomodel.text import RandomTextEncoder
 from echomodel.vocabulary import vocabulary
 from echoscene.config import PaperSizes, paper
-from echoscene.echo import ReleasedEcho
-from echoscene.editing import pack_changes, pack_scenes
+from echoscene.echo import ReleasedEcho, pack_changes, pack_scenes, published_scene
 from echoscene.model import GraphChange, ReleasedModel
-from echoscene.scene import published_scene
 from echoscene.tables import LayoutTables
 
 SIZES = PaperSizes(

@@ -15,8 +15,7 @@ from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.protocols import GraphEdit
 from echomodel.vocabulary import vocabulary
-from echoscene.bounds import statistics_from_bounds
-from echoscene.checkpoint import class_names, convert
+from echoscene.checkpoint import class_names, convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.echo import ReleasedEcho, floor_relations
 from echoscene.model import ReleasedModel

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from echoscene.config import EncoderConfig
-from echoscene.editing import pack_changes, pack_scenes, pseudo_graph, without_node
+from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, without_node
 from echoscene.encoder import GraphEncoder, SceneGraphTensors
 
 CONFIG = EncoderConfig(text=6, learned=4, flag=4, hidden=8, layers=2, separated=False)

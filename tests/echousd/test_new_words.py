@@ -15,8 +15,8 @@ import echousd
 from echomodel.boxes import Boxes
 from echomodel.furniture import decor
 from echomodel.furniture.carpentry import box
-from echomodel.habits import Habit
 from echomodel.rooms.generator import drawn_shares, generate_rooms
+from echomodel.rows import Habit
 from echomodel.rules import margins, rule, rule_set
 from echomodel.vocabulary import Category, Predicate, RoomType, speaking, vocabulary
 from echousd.batches.batch import batch

@@ -9,7 +9,7 @@ from published_shapes import box_corners, fit_to_box
 
 from echomodel.boxes import Boxes
 from echomodel.metrics.pointsets import compare_sets
-from echoscene.bounds import statistics_from_bounds
+from echoscene.checkpoint import statistics_from_bounds
 
 
 def test_boxes() -> None:

@@ -9,7 +9,7 @@ from parity_numbers import Numbers, check_gradients, close
 
 from echoscene.compiled_layout import CompiledLayout
 from echoscene.layout import LayoutNet
-from echoscene.sampling import ancestral, layout_loss
+from echoscene.model import ancestral, layout_loss
 from echoscene.tables import LayoutTables
 
 

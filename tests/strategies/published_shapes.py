@@ -8,7 +8,7 @@ import trimesh
 from skimage import measure
 from torch import Tensor
 
-from echoscene.grids import LEVEL
+from echoscene.echo import LEVEL
 
 
 def mesh_from_grid(grid: np.ndarray, level: float = LEVEL) -> trimesh.Trimesh:

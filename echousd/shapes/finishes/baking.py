@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from echousd.shapes.finishes.harmonies import HARMONIES, Color, linear
-from echousd.shapes.finishes.patterns import SIZE, relief
-from echousd.shapes.finishes.pictures import painting, sky
+from echousd.shapes.finishes.patterns import SIZE, noise, relief
 from echousd.srgb import from_linear
 
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
@@ -70,3 +70,71 @@ def _encoded(value: np.ndarray, quality: int) -> bytes:
     pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
     Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=0)
     return out.getvalue()
+
+
+def painting(colors: Sequence[Sequence[float]], number: int) -> np.ndarray:
+    """(SIZE, SIZE, 3) linear RGB: hills, shapes or fields of colour, by turns.
+
+    Arguments:
+        colors: five linear RGB colours: paper, three of the harmony, a dark one.
+        number: which picture.
+    """
+    rng = np.random.default_rng([number, 7])
+    paper, *rest = (np.asarray(color, float) for color in colors)
+    u, v = np.meshgrid(np.arange(SIZE) / SIZE, np.arange(SIZE) / SIZE)
+    out = np.broadcast_to(paper, (SIZE, SIZE, 3)).copy()
+    grain = 1 + 0.03 * noise(101 + number, 90.0, 90.0)[..., None]
+    if number % 3 == 0:  # hills under a sun
+        sun = (u - rng.uniform(0.3, 0.7)) ** 2 + (v - 0.3) ** 2 < rng.uniform(0.09, 0.14) ** 2
+        out[sun] = rest[0]
+        for layer in range(4):
+            line = 0.45 + 0.14 * layer + 0.06 * np.sin(2 * np.pi * (u * rng.uniform(0.6, 1.6) + rng.random()))
+            shade = rest[1] * (1 - layer / 3) + rest[2] * (layer / 3)
+            out[v > line] = shade
+    elif number % 3 == 1:  # round shapes beside and over one another
+        for color in (rest[1], rest[0], rest[2], rest[0], rest[3]):
+            x, y, r = rng.uniform(0.25, 0.75), rng.uniform(0.25, 0.75), rng.uniform(0.08, 0.24)
+            inside = ((u - x) / r) ** 2 + ((v - y) / (r * rng.uniform(0.7, 1.6))) ** 2 < 1
+            if rng.random() < 0.5:
+                inside &= v < y
+            out[inside] = color
+    else:  # fields with soft borders
+        cuts = [0.0, *np.sort(rng.uniform(0.2, 0.8, 2)).tolist(), 1.0]
+        soft = v + 0.012 * noise(131 + number, 8.0, 8.0)
+        for color, top, bottom in zip((rest[0], rest[1], rest[2]), cuts, cuts[1:], strict=False):
+            out[(soft > top + 0.015) & (soft < bottom - 0.015) & (u > 0.06) & (u < 0.94)] = color
+    return np.clip(out * grain, 0, 1)
+
+
+SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them
+SKY = (  # elevation in degrees, linear RGB: a near lawn, fields, haze, a bright horizon, blue
+    (-90.0, -25.0, -7.0, -1.5, 2.0, 12.0, 35.0, 90.0),
+    ((0.14, 0.19, 0.08), (0.18, 0.24, 0.10), (0.24, 0.30, 0.14), (0.38, 0.44, 0.26), (0.84, 0.90, 0.95),
+     (0.68, 0.81, 0.95), (0.58, 0.74, 0.94), (0.54, 0.71, 0.93)),
+)  # fmt: skip
+HILLS = (
+    (3.2, 1.3, (0.40, 0.50, 0.55)),
+    (1.6, 0.9, (0.30, 0.40, 0.30)),
+)  # degrees high and how uneven, colour; far, near
+TREES, LEAVES = (2.2, 3.4), (0.075, 0.125, 0.045)  # degrees that trees rise over the horizon, and how unevenly
+
+
+def sky() -> np.ndarray:
+    """`SKY_SIZE` + (3,) linear RGB by latitude and longitude, the zenith first: clouds, hills and trees over a lawn."""
+    height, width = SKY_SIZE
+    elevation = (90 - (np.arange(height) + 0.5) / height * 180)[:, None]
+    level, tones = SKY[0], np.array(SKY[1])
+    out = np.stack([np.interp(elevation, level, tone) for tone in tones.T], -1) * np.ones((1, width, 1))
+    grain, puff = (np.tile(noise(141 + n, *scale), (1, 2)) for n, scale in enumerate(((60.0, 60.0), (3.0, 9.0))))
+    cloud = np.clip(0.55 * puff - 0.25, 0, 0.75) * np.clip((elevation - 5) / 12, 0, 1)
+    out += cloud[..., None] * (np.array([0.95, 0.96, 0.97]) - out)
+    out *= np.where(elevation < 0, 1 + 0.06 * grain, 1.0)[..., None]
+    ridge = noise(151, 14.0, 14.0)[:3].repeat(2, axis=1)  # smooth rows of noise, all around
+    for row, (rise, uneven, color) in enumerate(HILLS):
+        line = rise + uneven * ridge[row]
+        out[(elevation > -2) & (elevation < line)] = color
+    crown = TREES[0] + TREES[1] * np.clip(ridge[2], -1.2, 1.5) + 0.5 * grain[0]
+    leaves = np.array(LEAVES) * (1 + 0.35 * grain + 0.25 * np.clip(elevation / 4, -1, 1))[..., None]
+    wood = (elevation > -2.5) & (elevation < crown)
+    out[wood] = np.clip(leaves, 0.01, 1)[wood]
+    return np.clip(out, 0, 1)

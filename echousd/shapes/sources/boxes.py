@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+import trimesh
 
-from echousd.shapes.geometry import Geometry, Origin
+from echousd.shapes.colliders import colliders_of
+from echousd.shapes.geometry import Geometry, Origin, Part
+from echousd.shapes.looks import material_groups
 from echousd.shapes.meshing import box_mesh
-from echousd.shapes.sources.solid import solid_geometry
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 
 if TYPE_CHECKING:
@@ -36,3 +38,9 @@ class PlainBoxes:
 
 
 SOURCE = PlainBoxes()
+
+
+def solid_geometry(mesh: trimesh.Trimesh, category: str, origin: Origin) -> Geometry:
+    """The geometry of one mesh (object frame, metres) whose category says which materials it has where."""
+    cut, slots = material_groups(mesh, category)
+    return Geometry((Part("mesh", cut, slots),), colliders_of(mesh, category), origin)

@@ -11,8 +11,8 @@ from echomodel.graph import GraphBatch
 from echousd.reproducible import one_thread, rounded_grids
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.meshing import mesh_from_shape
+from echousd.shapes.sources.boxes import solid_geometry
 from echousd.shapes.sources.sdf import SOURCE as SDF
-from echousd.shapes.sources.solid import solid_geometry
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.tensors import floor_centre, graph_batch, seeded
 

@@ -10,7 +10,7 @@ from echomodel.boxes import Boxes
 from echousd.reproducible import one_thread, rounded_grids
 from echousd.shapes.geometry import Geometry, Origin
 from echousd.shapes.meshing import LEAST_FACES, mesh_from_shape
-from echousd.shapes.sources.solid import solid_geometry
+from echousd.shapes.sources.boxes import solid_geometry
 from echousd.shapes.sources.source import ShapeRequest, Shapes, per_asset
 from echousd.tensors import floor_centre, graph_batch, seeded
 

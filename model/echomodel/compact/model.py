@@ -19,9 +19,8 @@ from torch.overrides import TorchFunctionMode
 
 from echomodel.boxes import BoxScale, BoxStatistics
 from echomodel.compact.autoencoder import Autoencoder
-from echomodel.compact.branches import PARTS
+from echomodel.compact.branches import PARTS, LatentGraph
 from echomodel.compact.furniture import FurnitureDenoiser
-from echomodel.compact.latent import LatentGraph
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.learned import places
 from echomodel.compact.shape import ShapeDenoiser

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.data.folders import claim, read_note
-from echomodel.files import whole_file, write_json
+from echomodel.files import read_json, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
-from echomodel.roomboxes import RoomBoxes
+from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rooms import generate_rooms, untidied
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -349,3 +348,66 @@ def _tables(path: Path, most: Mapping[str, int]) -> dict[str, np.ndarray]:
     if wrong:
         raise ValueError(f"{path}: damaged shard, its {wrong[0]} are not those of its rooms; remove it and build again")
     return out
+
+
+LARGEST = 2**24  # bytes of a note
+
+
+def read_note(path: Path, **kinds: type) -> dict:
+    """What a folder of data says of itself, a JSON object.
+
+    Arguments:
+        kinds: fields that it must have, and their types.
+
+    Raises ValueError, with the file's path, for anything else.
+    """
+    try:
+        found = read_json(path, LARGEST)
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
+    wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
+    if wrong or not isinstance(found, dict):
+        told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
+        raise ValueError(f"{path}: not what a set of data says of itself, missing: {told}")
+    return found
+
+
+def claim(folder: Path, plan: dict) -> None:
+    """Remember what a folder is being filled with (`plan.json`).
+
+    Raises ValueError for a folder that was begun with something else.
+    """
+    note = folder / "plan.json"
+    if not note.exists():
+        write_json(note, plan)
+        return
+    found = read_note(note)
+    wrong = [key for key in plan if found.get(key) != plan[key]]
+    if wrong:
+        told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
+        raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
+
+
+def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
+    """Rooms of a rooms file, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
+
+    Raises ValueError for anything else.
+    """
+    if not path.exists():
+        raise ValueError(f"{path}: no such file or folder")
+    if path.is_dir():
+        rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
+        numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
+        return [rooms.room(int(k)) for k in numbers[:limit]]
+    if held_out:
+        raise ValueError(f"{path}: a rooms file holds nothing out, allowed with --held-out: a folder of a room set")
+    return read_rooms(path)[:limit]
+
+
+def rooms_of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBoxes]:
+    """Those of a room type, in any spelling; raises ValueError naming `path` where there are none."""
+    wanted = vocabulary().room_type(word).name
+    kept = [room for room in rooms if vocabulary().room_type(room.room_type).name == wanted]
+    if not kept:
+        raise ValueError(f"{path}: holds no room of type {wanted}")
+    return kept

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echomodel.furniture.solids import FINEST, Array, Solid
-from echomodel.furniture.surfaces import loft, superellipse
+from echomodel.furniture.solids import FINEST, Array, Solid, loft, superellipse
 
 
 @dataclass(frozen=True, eq=False)

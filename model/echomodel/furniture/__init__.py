@@ -27,9 +27,8 @@ from echomodel.furniture import (
 )
 from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.sizes import sample_size
 from echomodel.furniture.solids import Joint, Solid
-from echomodel.furniture.style import Style
+from echomodel.furniture.style import Style, sample_size
 from echomodel.vocabulary import vocabulary
 
 __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from echomodel.furniture.solids import FINEST, Array, Solid, gradient_length
-from echomodel.furniture.surfaces import loft, superellipse
+from echomodel.furniture.solids import FINEST, Array, Solid, gradient_length, loft, superellipse
 
 
 @dataclass(frozen=True, eq=False)

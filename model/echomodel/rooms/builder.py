@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.furniture.sizes import sample_size
+from echomodel.furniture.style import sample_size
 from echomodel.rooms.floor import Floor, Wall
 from echomodel.rooms.statistics import QUARTILE, back_gaps
 from echomodel.sizes import size_statistics

@@ -48,7 +48,7 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
 
     Arguments:
         name: room type.
-        requests: give as `presence` the shares to ask for (see `calibration`) instead of those of real rooms.
+        requests: give as `presence` the shares to ask for (see `benchmarks/room_requests.py`), not those of real rooms.
     """
     rooms = room_statistics()["rooms"]
     if name not in rooms:
@@ -86,7 +86,7 @@ def back_gaps(category: str) -> tuple[float, float, float]:
 
 @cache
 def room_requests() -> dict[str, dict]:
-    """What to ask for so that rooms come out like real ones (see `calibration`).
+    """What to ask for so that rooms come out like real ones (see `benchmarks/room_requests.py`).
 
     `presence`: room type -> category -> share of rooms; `size`: category -> shift of x, y, z in standard deviations.
     """

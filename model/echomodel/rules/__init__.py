@@ -1,9 +1,8 @@
 """Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for repair and guidance."""
 
-from echomodel.rules.labels import label_relations, label_rooms
+from echomodel.rules.labels import aligned, centred, facing, label_relations, label_rooms, opposite  # registers them
 from echomodel.rules.margins import fronts, margins, measured, verdicts
 from echomodel.rules.sets import RULE_SETS, Rule, RuleSet, rule, rule_set
-from echomodel.rules.turned import aligned, centred, facing, opposite  # registers them
 
 __all__ = [
     "RULE_SETS",

@@ -12,7 +12,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
 from echomodel.randomness import normal
-from echomodel.training.shapes import draw_grids, read
+from echomodel.training.shape_stage import draw_grids, read
 from echomodel.training.start import Start
 
 NOISE = 0.1  # standard deviation added to the latent, so that the decoder forgives a denoiser's small errors

@@ -12,7 +12,7 @@ from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs
 from echomodel.furniture.choices import OPEN
 from echomodel.furniture.description import draw_styles
-from echomodel.furniture.sizes import sample_size
+from echomodel.furniture.style import sample_size
 from echomodel.graph import GraphBatch
 from echomodel.objectives import add_noise, draw_levels
 from echomodel.randomness import normal

@@ -81,7 +81,7 @@ class Recipe:
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         living_weight: weight of what a person would point at in the predicted boxes (the living rules' margins).
-        own_weight: weight of what is wrong with rooms that the network arranges alone (`training.own_samples`).
+        own_weight: weight of what is wrong with rooms that the network arranges alone (`training.layout_stage`).
         own_kept: last steps of sampling that it is led back through.
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).

@@ -9,8 +9,7 @@ import torch
 
 from echomodel.compact.model import CompactModel
 from echomodel.samplers import sample
-from echomodel.training.layout_stage import LayoutStage
-from echomodel.training.own_samples import LONGEST, own_loss, own_rooms
+from echomodel.training.layout_stage import LONGEST, LayoutStage, own_loss, own_rooms
 from echomodel.training.recipe import Recipe, read_recipe
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
 from echomodel.training.run import open_run

@@ -5,9 +5,8 @@ import pytest
 from PIL import Image
 from small_models import chest, seat, small_library, write_obj
 
-from echousd.assets.corrections import read_corrections, write_table
-from echousd.assets.front import front_by_shape
-from echousd.assets.index import index
+from echousd.assets.describe import front_by_shape
+from echousd.assets.index import index, read_corrections, write_table
 from echousd.assets.review import left_out, write_page, write_sheets
 from echousd.assets.table import read_library
 

@@ -8,10 +8,10 @@ import pytest
 import torch
 from inline_batches import QUICK, Inline, digests
 
-from echousd.batches import devices, work
+from echousd.batches import work
 from echousd.batches.batch import batch, generate_many
-from echousd.batches.elsewhere import ElsewhereModel, SamplesWanted, sampled
 from echousd.batches.executor import LocalWorkers, Task
+from echousd.batches.work import ElsewhereModel, SamplesWanted, sampled
 from echousd.graph import SceneGraph
 
 
@@ -78,11 +78,11 @@ def test_only_samples_are_called_for():
 
 
 def where(_):
-    return os.getpid(), os.environ.get(devices.VISIBLE, "")
+    return os.getpid(), os.environ.get(work.VISIBLE, "")
 
 
 def test_network_tasks_go_to_the_processes_of_the_devices():
-    pool = LocalWorkers(2, networks=[{devices.VISIBLE: "7"}, {devices.VISIBLE: "9"}])
+    pool = LocalWorkers(2, networks=[{work.VISIBLE: "7"}, {work.VISIBLE: "9"}])
     try:
         assert (pool.workers, pool.free(), pool.free(network=True)) == (2, 2, 2)
         for key in range(4):
@@ -98,13 +98,13 @@ def test_network_tasks_go_to_the_processes_of_the_devices():
 
 
 def test_devices_are_found_or_refused(monkeypatch, tmp_path):
-    assert devices.network_processes("cpu") == []
+    assert work.network_processes("cpu") == []
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
-    monkeypatch.delenv(devices.VISIBLE, raising=False)
-    assert devices.network_processes("cuda") == [{devices.VISIBLE: "0"}, {devices.VISIBLE: "1"}]
-    monkeypatch.setenv(devices.VISIBLE, "3, 5")
-    assert devices.network_processes("cuda") == [{devices.VISIBLE: "3"}, {devices.VISIBLE: "5"}]
+    monkeypatch.delenv(work.VISIBLE, raising=False)
+    assert work.network_processes("cuda") == [{work.VISIBLE: "0"}, {work.VISIBLE: "1"}]
+    monkeypatch.setenv(work.VISIBLE, "3, 5")
+    assert work.network_processes("cuda") == [{work.VISIBLE: "3"}, {work.VISIBLE: "5"}]
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(ValueError, match=r"device is 'cuda', which torch .* finds none of; here: cpu"):
         batch(tmp_path / "none.yaml", tmp_path / "run", device="cuda")

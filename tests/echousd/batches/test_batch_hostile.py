@@ -11,9 +11,8 @@ import zipfile
 import pytest
 
 from echousd.batches.options import BatchRequest
-from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.plan import is_row, make_plan, save_plan
 from echousd.batches.remote import Remote, complete
-from echousd.batches.rows import is_row
 from echousd.batches.sources import find_graphs
 from echousd.batches.verify import finish
 

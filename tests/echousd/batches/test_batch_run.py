@@ -14,12 +14,9 @@ from echousd.batches import run as running
 from echousd.batches import work
 from echousd.batches.batch import batch, generate_many
 from echousd.batches.journal import read_journals, room_digest, shard_folder
-from echousd.batches.manifest import manifest_rows
 from echousd.batches.plan import load_plan
-from echousd.batches.sheet import write_sheet
 from echousd.batches.sources import find_graphs, sampled_graph
-from echousd.batches.verify import finish, status, verify
-from echousd.batches.webdataset import write_webdataset
+from echousd.batches.verify import finish, manifest_rows, status, verify, write_sheet, write_webdataset
 from echousd.folder.lock import locked
 from echousd.graph import SceneGraph
 from echousd.store import Store

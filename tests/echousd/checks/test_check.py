@@ -12,7 +12,7 @@ from pxr import Gf, Usd, UsdGeom, UsdValidation
 
 from echousd.checks import RULES, check, register
 from echousd.checks.collisions import DEEP, find_collisions, mesh_depth, winding_number
-from echousd.checks.living import find_living
+from echousd.checks.report import find_living
 from echousd.cli.main import run
 from echousd.graph import Node, RoomSpec
 from echousd.stage.contents import RoomContents, RoomObject

@@ -9,9 +9,9 @@ import time
 
 import pytest
 
-from echousd.batches.manifest import COLUMNS, write_manifest
 from echousd.batches.options import request_of
 from echousd.batches.plan import make_plan, save_plan
+from echousd.batches.verify import COLUMNS, write_manifest
 from echousd.cli.batch import _clock, _shard
 
 

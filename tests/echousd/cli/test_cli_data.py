@@ -9,7 +9,7 @@ from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
 from echomodel.rooms import generate_rooms
 from echomodel.rules import label_relations
 from echousd.cli.main import run
-from echousd.stage.rooms import graph_of, room_of
+from echousd.stage.boxes import graph_of, room_of
 
 
 @pytest.fixture(scope="module")

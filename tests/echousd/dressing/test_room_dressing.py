@@ -24,8 +24,7 @@ from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.layers.compose import room_files
 from echousd.options import RoomOptions
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
-from echousd.shapes.sources.boxes import ORIGIN
-from echousd.shapes.sources.solid import solid_geometry
+from echousd.shapes.sources.boxes import ORIGIN, solid_geometry
 from echousd.shapes.walls import walls
 from echousd.stage import read_graph
 

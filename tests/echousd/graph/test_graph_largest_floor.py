@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from echousd.checks.living import find_living
+from echousd.checks.report import find_living
 from echousd.graph import GraphError, RoomSpec
 from echousd.graph.floors import LARGEST, check_extents
 from echousd.stage.contents import RoomContents

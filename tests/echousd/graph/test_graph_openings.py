@@ -8,7 +8,7 @@ import pytest
 
 from echomodel.openings import Opening
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph
-from echousd.graph.doors import check_doors
+from echousd.graph.floors import check_doors
 from echousd.graph.openings import opening_from_words, sentence
 
 ROOM = RoomSpec("bedroom", size=(4.0, 3.0))

@@ -10,8 +10,7 @@ from PIL import Image
 
 from echomodel.vocabulary import vocabulary
 from echousd.graph import Node, Relation, SceneGraph, load_graph, starting_graph
-from echousd.graph.picture import arrows, draw_graph, to_dot
-from echousd.graph.placing import HEIGHT, WIDTH, places
+from echousd.graph.picture import HEIGHT, WIDTH, arrows, draw_graph, places, to_dot
 
 
 def overlaps(place: np.ndarray) -> int:

@@ -9,14 +9,12 @@ from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
 from echomodel.vocabulary import vocabulary
 from echousd.layers.physics import write_asset_physics
-from echousd.shapes.ballast import ballasted
 from echousd.shapes.colliders import collider, colliders_of, standing_hull
 from echousd.shapes.geometry import Collider, Geometry, Mass, Origin, Part
 from echousd.shapes.joinery import part_of, within_budget
-from echousd.shapes.masses import hull_volume, mass_of, read_mass
+from echousd.shapes.masses import ballasted, hull_volume, mass_of, read_mass
 from echousd.shapes.meshing import box_mesh
-from echousd.shapes.sources.boxes import ORIGIN
-from echousd.shapes.sources.solid import solid_geometry
+from echousd.shapes.sources.boxes import ORIGIN, solid_geometry
 
 SIZE = np.array([1.6, 2.2, 0.6])
 

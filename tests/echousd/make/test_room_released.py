@@ -16,8 +16,7 @@ from small_room import ball_tsdf, small_graph
 from echomodel.loading import load_model
 from echomodel.roomboxes import RoomBoxes, write_rooms
 from echomodel.text import ClipTextEncoder
-from echoscene.bounds import statistics_from_bounds
-from echoscene.checkpoint import convert
+from echoscene.checkpoint import convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.model import ReleasedModel
 from echoscene.tables import LayoutTables

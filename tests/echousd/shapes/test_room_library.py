@@ -16,7 +16,7 @@ from echousd.checks import check
 from echousd.exporting import export
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
-from echousd.shapes.originals.collecting import collected
+from echousd.shapes.originals.loading import collected
 from echousd.stage import open_stage
 from echousd.store import Store
 

@@ -14,8 +14,8 @@ from echousd.make.reading import read_room
 from echousd.shapes import sources
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.meshing import mesh_from_shape
+from echousd.shapes.sources.boxes import solid_geometry
 from echousd.shapes.sources.sdf import within_budget
-from echousd.shapes.sources.solid import solid_geometry
 from echousd.shapes.sources.source import Shapes, per_asset
 from echousd.stage import open_stage
 

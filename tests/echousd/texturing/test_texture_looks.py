@@ -23,7 +23,7 @@ from echousd.texturing import atlas, export_job, import_look
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.glb import glb_bytes
 from echousd.texturing.job import job_mesh
-from echousd.texturing.matching import texture_coordinates
+from echousd.texturing.results import texture_coordinates
 
 SIZE = 128
 

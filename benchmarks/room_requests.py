@@ -1,8 +1,8 @@
 """Calibration: how often and how large to ask for each category so that rooms hold it as real ones do.
 
-Not everything that is asked for finds a place, some kinds exclude each other, and what is wide fits less often. `python
--m echomodel.rooms.calibration` writes what to ask for to `room_requests.json`, which the generator reads. It
-starts from the table in place: sizes are calibrated in rooms that hold what was asked for last.
+Not everything that is asked for finds a place, some kinds exclude each other, and what is wide fits less often. This
+writes what to ask for to the model's `data/room_requests.json`, which the generator reads. It starts from the table in
+place: sizes are calibrated in rooms that hold what was asked for last.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel import data
 from echomodel.files import write_text
 from echomodel.rooms.generator import generate_room
 from echomodel.rooms.statistics import RoomTypeStatistics, room_statistics, room_type_statistics
@@ -74,4 +75,4 @@ def write_requests(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_requests(Path(__file__).parents[1] / "room_requests.json")
+    write_requests(Path(data.__file__).with_name("room_requests.json"))
