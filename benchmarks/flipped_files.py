@@ -49,7 +49,7 @@ def main() -> None:
         room = asked.room
         if room is None:
             echousd.make.pipeline.load_model = lambda *_, **__: StandIn()  # type: ignore[assignment]
-            made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+            made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False)
             room = made.save(Path(scratch) / "made/bedroom", preview=False)
         names = files_of(room)
         for number in range(asked.flips):

@@ -131,7 +131,7 @@ def spawned(words: list[str]) -> int:
 
 def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[str]], int] = forked) -> None:
     """SIGKILL for `generate` over an old room and for `edit`, half of them while files are being written."""
-    said = ["--shapes", "boxes", "--no-repair"]
+    said = ["--shapes", "boxes", "--no-place"]
     old = scratch / "old/room"
     if not old.exists():
         run(["generate", str(GRAPH), "-o", str(old), "--seed", "1", *said])
@@ -144,7 +144,7 @@ def kills(count: int, scratch: Path, told: Counter[str], begin: Callable[[list[s
         folder = scratch / "undisturbed/room"
         shutil.copytree(old, folder)
         _, status, used = os.wait4(begin(command(folder)), 0)
-        assert os.waitstatus_to_exitcode(status) in (0, 1)  # without repair things may collide
+        assert os.waitstatus_to_exitcode(status) in (0, 1)  # without placing things may collide
         spent.append(used.ru_utime + used.ru_stime)
         undisturbed.append(bytes_of(folder))
         shutil.rmtree(folder)

@@ -38,9 +38,9 @@ def parted() -> Iterator[dict[str, float]]:
     """CPU seconds by `PARTS` of what runs inside the block, each without the parts that run within it."""
     from echomodel.compact import layouts as sampling
     from echousd.make import layouts
-    from echousd.repair import living, search
+    from echousd.place import living, search
 
-    repair = import_module("echousd.repair.repair")  # the package has a function of that name
+    placing = import_module("echousd.place.placing")  # the package has a function of that name
 
     spent: dict[str, float] = defaultdict(float)
     within = [0.0]
@@ -60,7 +60,7 @@ def parted() -> Iterator[dict[str, float]]:
 
     places = (
         (sampling, "drafted", "drafts"), (sampling, "_denoised", "denoising"), (search.Search, "run", "arranging"),
-        (repair, "solve", "solving"), (living, "living_faults", "judging"), (layouts, "layout_outcome", "judging"),
+        (placing, "solve", "solving"), (living, "living_faults", "judging"), (layouts, "layout_outcome", "judging"),
     )  # fmt: skip
     kept = [(module, name, getattr(module, name)) for module, name, _ in places]
     for (module, name, of), (_, _, part) in zip(kept, places, strict=True):
@@ -73,7 +73,7 @@ def parted() -> Iterator[dict[str, float]]:
 
 
 def cold(text: str, seed: int) -> dict[str, float]:
-    """CPU seconds by part of this process, which has done nothing yet, for one graph as JSON; and drafts repaired."""
+    """CPU seconds by part of this process, which has done nothing yet, for one graph as JSON; and drafts placed."""
     out = {"start of Python": time.process_time()}
     from echomodel.loading import load_model
     from echousd.graph import SceneGraph
@@ -190,7 +190,7 @@ def batch(rooms: int, first: int, product: float) -> None:
 
 
 def best_of_one(model: Any, graph: Any, seed: int) -> float:
-    """CPU seconds of one draft of a warm model, repaired."""
+    """CPU seconds of one draft of a warm model, placed."""
     from echousd.graph.floors import with_plan
     from echousd.make.layouts import Draws, best_boxes
     from echousd.progress import StageTimer

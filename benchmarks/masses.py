@@ -3,7 +3,7 @@
     python masses.py [COUNT]
 
 Rooms are graphs of the generator (500), their boxes and descriptions those of the shipped networks; pieces are built by
-their programs as `--shapes parts` builds them, in sizes that are made usual as repair does it first.
+their programs as `--shapes parts` builds them, in sizes that are made usual as placing does it first.
 """
 
 from __future__ import annotations

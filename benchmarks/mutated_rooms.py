@@ -110,7 +110,7 @@ def main() -> None:
         scratch = Path(place)
         room = asked.room
         if room is None:
-            made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False)
+            made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False)
             room = made.save(scratch / "made/bedroom", preview=False)
         mutations = [
             Mutation(path, value, shape)

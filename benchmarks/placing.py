@@ -31,8 +31,8 @@ from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
-from echousd.repair import RepairConfig, repair_boxes
-from echousd.repair.search import Search
+from echousd.place import PlaceConfig, place_boxes
+from echousd.place.search import Search
 
 SEED = 770_000  # of the generated rooms
 CELL = 420  # pixels
@@ -86,13 +86,13 @@ def picture(room: RoomBoxes, floor: np.ndarray, boxes: tuple[np.ndarray, ...], s
 
 
 def placed(
-    room: RoomBoxes, draft: tuple[np.ndarray, ...], told: np.ndarray, config: RepairConfig | None
+    room: RoomBoxes, draft: tuple[np.ndarray, ...], told: np.ndarray, config: PlaceConfig | None
 ) -> tuple[tuple[np.ndarray, ...], list[str], int, float]:
     """Boxes, faults as `term: sentence`, relations kept and CPU seconds of one draft placed; no config = as drawn."""
     floor, begun = centred(room), time.process_time()
     size, position, yaw = draft
     if config is not None:
-        done = repair_boxes(
+        done = place_boxes(
             room.categories, size, position, yaw, told, floor_polygon=floor, height=room.height,
             openings=room.openings, config=config,
         )  # fmt: skip
@@ -117,8 +117,8 @@ def main() -> None:
     parser.add_argument("--only", type=int, nargs="*")
     parser.add_argument("--off", nargs="*", default=[], help="terms that the search does without")
     options = parser.parse_args()
-    repairing = import_module("echousd.repair.repair")  # the package has a function of that name
-    repairing.Search = partial(Search, terms=tuple(term for term in TERMS if term.name not in options.off))
+    placing = import_module("echousd.place.placing")  # the package has a function of that name
+    placing.Search = partial(Search, terms=tuple(term for term in TERMS if term.name not in options.off))
     torch.set_num_threads(1)
     every = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(every) if len(room) > 1]
@@ -127,7 +127,7 @@ def main() -> None:
     told = [graph.triplets.numpy() for graph in graphs]
     name = "generated" if options.rooms is None else options.rooms.stem
     drafts = drawn(rooms, told, options.cache / f"{name}_{options.count}.json")
-    ways = {"drawn": None, "placed": RepairConfig()}
+    ways = {"drawn": None, "placed": PlaceConfig()}
     objects = sum(len(room) for room in rooms)
     for way in options.ways:
         found, pictures, seconds, kept, free = Counter[str](), [], [], 0, 0

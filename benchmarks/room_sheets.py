@@ -28,7 +28,7 @@ from echousd import generate
 from echousd.graph import SceneGraph, load_graph
 from echousd.graph.starting import starting_graph
 from echousd.make.finished import Room
-from echousd.repair.living import living_faults
+from echousd.place.living import living_faults
 
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
 SETS = ("samples", "new", "people", "more")
@@ -118,7 +118,7 @@ def main() -> None:
         for seed in range(options.first, options.first + options.seeds):
             started = time.perf_counter()
             room = generate(graph, seed=seed, shapes="boxes")
-            took.append(room.timings["layout"] + room.timings["repair"])
+            took.append(room.timings["layout"] + room.timings["place"])
             picture, found = cell(room, f"{name} seed {seed}  {time.perf_counter() - started:.1f} s")
             cells.append(picture)
             clean, faults, objects = clean + (not found), faults + len(found), objects + len(room.names)
@@ -132,7 +132,7 @@ def main() -> None:
         f"{len(cells)} rooms, {clean} without a fault, {faults} faults at {objects} objects, {broken} relations broken,"
     )
     print(f"{collisions} other faults; {', '.join(f'{rule} {count}' for rule, count in by_rule.most_common())}")
-    print(f"layout and repair {np.mean(took):.2f} s a room, {np.quantile(took, 0.95):.2f} s in 95 of 100")
+    print(f"layout and placing {np.mean(took):.2f} s a room, {np.quantile(took, 0.95):.2f} s in 95 of 100")
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ def measure(tree: Path) -> None:
 
     graph_stage.WORDS = Words  # type: ignore[assignment, misc]
     graph = graph_stage.random_graph(150, 1500, np.random.default_rng(0))
-    room = echousd.generate(load_graph(tree / "samples" / "bedroom.usda"), seed=1, shapes="boxes", repair=False)
+    room = echousd.generate(load_graph(tree / "samples" / "bedroom.usda"), seed=1, shapes="boxes", place=False)
     draw = torch.Generator().manual_seed(0)
     triples, t = machine.scene_graph(1, draw), torch.full((12,), 500)
     x, bound = torch.randn(12, 8, generator=draw), CompiledLayout(LayoutNet(UNetConfig()).eval())

@@ -18,7 +18,7 @@ from echousd.checks.report import LayoutReport
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import PlainModel
 from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
-from echousd.repair.living import LivingFault
+from echousd.place.living import LivingFault
 from echousd.room import LayoutOutcome, Provenance, Verdict
 from echousd.settle import Motion, SettleReport
 from echousd.shapes.finishes.harmonies import HARMONIES

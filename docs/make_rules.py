@@ -22,7 +22,7 @@ def page() -> str:
     lines = [
         "# Rules", "",
         "Made by `python docs/make_rules.py` from `echomodel.objective`, the one table by which rooms are searched,",
-        "learned, repaired, checked and explained. In a conflict the kinds count in this order. A term is kept where",
+        "learned, placed, checked and explained. In a conflict the kinds count in this order. A term is kept where",
         "its margin is not negative; a search asks for its slack on top, and pays 2 for a broken term and its weight",
         "for each unit that is missed.",
     ]  # fmt: skip

@@ -26,7 +26,7 @@ FACES = 5000  # budget of each mesh
 MAX_SEED = 2**63 - 1  # what a layer stores as a whole number
 # options of an edit: how what is new is made; all others stay those of the room
 OF_NEW = (
-    "seed", "shapes", "weights", "device", "drafts", "steps", "repair", "faces",
+    "seed", "shapes", "weights", "device", "drafts", "steps", "place", "faces",
     "assets", "stretch", "licenses", "text", "collect",
 )  # fmt: skip
 ROOM, MODELS, LOOK, FILES = GROUPS = "Room", "Models of a library", "Look", "Files"
@@ -118,7 +118,7 @@ class RoomOptions(PlainModel, Look):
     drafts: int | None = row(None, ROOM, "layouts to choose the best from; else 8, fewer in large rooms", ge=1, le=64)
     steps: int | None = row(None, ROOM, "sampling steps; else the model's", ge=1)
     fit: Literal["keep", "drop"] = row("keep", ROOM, "keep all that is asked for, or leave out what has no place")
-    repair: bool = row(True, ROOM, "move and size boxes as little as possible until the graph is kept")
+    place: bool = row(True, ROOM, "move and size boxes as little as possible until the graph is kept")
     openings: Literal["kept", "drawn"] = row("kept", ROOM, "doors and windows of the graph, or new ones by the seed")
     settle: bool = row(False, ROOM, "simulate the room, put everything where it rests (extra: sim)")
     assets: File | None = row(None, MODELS, "index of a library of models", everyday=True)

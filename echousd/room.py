@@ -17,7 +17,7 @@ from echousd.shapes.styles import style_groups
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
     from echousd.graph import SceneGraph
-    from echousd.repair.report import Collision
+    from echousd.place.report import Collision
     from echousd.shapes.geometry import Geometry
 
 

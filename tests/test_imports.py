@@ -16,7 +16,7 @@ LAYERS = (
     ("checks", "texturing"),
     ("make",),
     ("settle",),
-    ("layers", "repair"),
+    ("layers", "place"),
     ("dressing", "folder"),
     ("room",),
     ("options",),
@@ -35,7 +35,7 @@ FORBIDDEN = {
     "echoscene": ("echousd", "pxr", "typer", "rich"),
     "echousd.graph": ("pxr", "torch"),
     "echousd.stage": ("torch", "typer", "rich"),
-    "echousd.repair": ("pxr", "typer", "rich", "echousd.stage", "echousd.shapes", "echousd.folder"),
+    "echousd.place": ("pxr", "typer", "rich", "echousd.stage", "echousd.shapes", "echousd.folder"),
     "echousd.checks": ("typer", "rich"),
     "echousd.make": ("typer", "rich"),
 }

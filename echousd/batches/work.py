@@ -109,7 +109,7 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
         for i, drafts in zip(rows, found, strict=True):
             out[i] = Sampled(graphs[i].to_json(), (*jobs[i].rounds, tuple(map(_rows, drafts))))
 
-    asked = {i: (one.weights, one.steps, not one.repair) for i, one in ((i, jobs[i].options) for i in graphs)}
+    asked = {i: (one.weights, one.steps, not one.place) for i, one in ((i, jobs[i].options) for i in graphs)}
     for weights, steps, guided in dict.fromkeys(asked.values()):
         same = [i for i in graphs if asked[i] == (weights, steps, guided)]
         model = load_model(weights, device=jobs[same[0]].options.device)

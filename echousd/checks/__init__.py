@@ -3,6 +3,6 @@
 from echousd.checks.placement import Misplacement
 from echousd.checks.report import CheckReport, MeasuredRelation, check
 from echousd.checks.validity import RULES, Fault, register
-from echousd.repair.report import Collision
+from echousd.place.report import Collision
 
 __all__ = ["RULES", "CheckReport", "Collision", "Fault", "MeasuredRelation", "Misplacement", "check", "register"]

@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from trimesh.triangles import closest_point
 
-from echousd.repair.geometry import axes, pair_indices, separation
-from echousd.repair.report import TOUCH, Collision
+from echousd.place.geometry import axes, pair_indices, separation
+from echousd.place.report import TOUCH, Collision
 from echousd.shapes.fittings import SKIRTING
 from echousd.stage.contents import RoomObject, Solid, Surrounding
 

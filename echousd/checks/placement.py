@@ -10,8 +10,8 @@ import numpy as np
 from echomodel.dressing import SMALL
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.repair.geometry import Floor, axes, floor_from_polygon, inside
-from echousd.repair.repair import DEFAULT_HEIGHT, floor_of_room
+from echousd.place.geometry import Floor, axes, floor_from_polygon, inside
+from echousd.place.placing import DEFAULT_HEIGHT, floor_of_room
 from echousd.stage.contents import RoomContents, RoomObject, Shape, Solid, Surrounding
 
 OUTSIDE = 0.03  # metres beyond the floor's edge

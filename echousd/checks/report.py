@@ -22,9 +22,9 @@ from echousd.folder.manifest import find_manifest
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.graph.consistency import GraphError
 from echousd.graph.floors import check_extents
-from echousd.repair.living import LivingFault, living_faults
-from echousd.repair.repair import floor_of_room
-from echousd.repair.report import Collision
+from echousd.place.living import LivingFault, living_faults
+from echousd.place.placing import floor_of_room
+from echousd.place.report import Collision
 from echousd.stage.contents import RoomContents, Surrounding, read_contents, surroundings
 from echousd.stage.encoding import StageError
 from echousd.stage.files import opened, source

@@ -47,8 +47,8 @@ def layout(
         float | None,
         typer.Option(help="Noise to begin with, on an arrangement by the room generator; 1 = noise alone."),
     ] = None,
-    repair: Annotated[bool, typer.Option("--repair", help="Repair the layouts, as generate does.")] = False,
-    drafts: Annotated[int, typer.Option(help="With --repair: the best of so many layouts of each room.")] = 1,
+    place: Annotated[bool, typer.Option("--place", help="Place the layouts, as generate does.")] = False,
+    drafts: Annotated[int, typer.Option(help="With --place: the best of so many layouts of each room.")] = 1,
     judge: Annotated[bool, typer.Option("--judge", help="Also: can a classifier tell them from true ones?")] = False,
     seeds: Annotated[int, typer.Option(help="Also: how different are so many layouts of one graph?")] = 0,
     model: Annotated[
@@ -69,7 +69,7 @@ def layout(
     from echomodel.metrics.layout_evaluation import LayoutEvaluation, evaluate_layout
     from echomodel.metrics.layout_sources import model_layouts, true_layouts
     from echousd.cli.terminal import Terminal
-    from echousd.repair.drafts import repaired
+    from echousd.place.drafts import placed
 
     found = load_rooms(rooms, limit, held_out=held_out)
     settings = LayoutEvaluation(
@@ -88,7 +88,7 @@ def layout(
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(
             found, sampler, settings, lambda done, total: bar.update(task, completed=done, total=total),
-            repaired(rules) if repair else None,
+            placed(rules) if place else None,
         )  # fmt: skip
     if out is not None:
         write_json(out, plain_json(result))

@@ -25,7 +25,7 @@ TITLES = {
     "load": "Loading the model",
     "assets": "Choosing models",
     "layout": "Placing the furniture",
-    "repair": "Repairing the layout",
+    "place": "Placing the furniture",
     "shapes": "Shaping the furniture",
     "meshes": "Cleaning the meshes",
     "settle": "Simulating the room",

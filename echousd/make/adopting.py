@@ -8,7 +8,7 @@ from pathlib import Path
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.sentences import stating
-from echousd.repair.living import living_faults
+from echousd.place.living import living_faults
 from echousd.room import RoomData
 from echousd.shapes.originals.loading import joined
 from echousd.stage import open_stage

@@ -120,7 +120,7 @@ def edit(
                 layouts.append(_boxes_of(pinned))
                 continue
             found, told = best_boxes(
-                model_used, pinned, styles, Draws(asked.seed, number, asked.steps, change), repair=asked.repair,
+                model_used, pinned, styles, Draws(asked.seed, number, asked.steps, change), place=asked.place,
                 drafts=asked.drafts or most_drafts(model_used, len(pinned.nodes)), timer=timer,
             )  # fmt: skip
             layouts.append(found)
@@ -148,8 +148,8 @@ def edit(
     names = _own_names({name: names[name] for name in graph.names}, fresh, saved)
     geometry = {name: geometry[name] for name in graph.names}
     floor, outcomes = room_floor(graph, layouts), tuple(layout_outcome(graph, found) for found in layouts)
-    if asked.repair:
-        with timer.stage("repair"), one_thread():
+    if asked.place:
+        with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
     room = Room(
         name=manifest["name"],

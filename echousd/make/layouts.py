@@ -1,4 +1,4 @@
-"""Boxes for a graph: sampled by the layout branch, equal within sets of furniture, repaired; and the floor below."""
+"""Boxes for a graph: sampled by the layout branch, equal within sets of furniture, placed; and the floor below."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def usual_drafts(objects: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class BestDraft:
-    """The best of some drafts after repair.
+    """The best of some drafts after placing.
 
     Arguments:
         of: JSON of the graph that they are of. boxes, conflicts: as `finished_boxes` gives them.
@@ -139,13 +139,13 @@ def best_boxes(
     draws: Draws,
     *,
     drafts: int = 1,
-    repair: bool = True,
+    place: bool = True,
     sized: Boxes | None = None,
     drawn: Drawn | None = None,
     proposed: bool = False,
     timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:
-    """The best of several drafts after repair: kept relations first, then collisions, then the living rules.
+    """The best of several drafts after place: kept relations first, then collisions, then the living rules.
 
     Further drafts are drawn, a few at once, only where those before leave something to be wished for.
 
@@ -170,14 +170,14 @@ def best_boxes(
         if not given and best is not None and drawn is not None and drawn.elsewhere:
             raise DraftsWanted(BestDraft(of, *best, worth))
         for draft in given or sample_boxes(
-            model, graph, replace(draws, number=draws.number + start, guided=not repair), count=count, timer=timer
+            model, graph, replace(draws, number=draws.number + start, guided=not place), count=count, timer=timer
         ):
             if sized is not None:
                 draft = Boxes(sized.size, draft.position, draft.yaw)
-            found = finished_boxes(graph, draft, styles, repair, timer)
-            if drafts == 1 or not repair:
+            found = finished_boxes(graph, draft, styles, place, timer)
+            if drafts == 1 or not place:
                 return found
-            with timer.stage("repair"), one_thread():
+            with timer.stage("place"), one_thread():
                 wrong = _wishes(graph, found, proposed)
             if best is None or wrong < worth:
                 best, worth = found, wrong
@@ -216,7 +216,7 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], proposed: b
     Arguments:
         proposed: faults of openings come last, as these may still be moved.
     """
-    from echousd.repair.living import living_faults
+    from echousd.place.living import living_faults
 
     boxes, conflicts = found
     late = [proposed and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
@@ -224,33 +224,33 @@ def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], proposed: b
 
 
 def finished_boxes(
-    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], repair: bool, timer: StageTimer
+    graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str], place: bool, timer: StageTimer
 ) -> tuple[Boxes, tuple[str, ...]]:
-    """Sampled boxes after equal sizes within style groups and, if wanted, repair; and demands in conflict."""
+    """Sampled boxes after equal sizes within style groups and, if wanted, placing; and demands in conflict."""
     boxes = _alike(graph, _mounted(graph, boxes), styles)
-    if not repair:
+    if not place:
         return rounded_boxes(graph, boxes), ()
-    from echousd.repair import RepairConfig, RepairResult
-    from echousd.repair import repair as repaired
-    from echousd.repair.living import living_faults
+    from echousd.place import PlaceConfig, PlaceResult
+    from echousd.place import place as placed
+    from echousd.place.living import living_faults
 
     judged: dict[int, tuple[int, ...]] = {}
 
-    def wrong(one: RepairResult) -> tuple[int, ...]:
+    def wrong(one: PlaceResult) -> tuple[int, ...]:
         if id(one) not in judged:
             judged[id(one)] = len(one.broken), len(one.collisions), len(living_faults(graph, one.boxes))
         return judged[id(one)]
 
     graph = _with_homeless_unlocked(graph)
-    with timer.stage("repair"), one_thread():
-        found = repaired(graph, boxes)
+    with timer.stage("place"), one_thread():
+        found = placed(graph, boxes)
         same = _alike(graph, found.boxes, styles)
         if not torch.equal(same.size, found.boxes.size):
             # chairs of one set that had to shrink: all of them, if it fits; else at other places
             fixed = with_sizes(graph, same)
-            second = repaired(fixed, same, config=RepairConfig(arrange=False))
+            second = placed(fixed, same, config=PlaceConfig(arrange=False))
             if wrong(second) > wrong(found):
-                third = repaired(fixed, same)  # both are held, as they are known by their ids
+                third = placed(fixed, same)  # both are held, as they are known by their ids
                 second = min(second, third, key=wrong)
             if wrong(second)[:2] <= wrong(found)[:2]:
                 found = second
@@ -269,7 +269,7 @@ def with_free_openings(graph: SceneGraph, layouts: Sequence[Boxes], seed: int) -
 
     A screen is in the way of a window, too: who watches it would look into the light.
     """
-    from echousd.repair.living import living_faults
+    from echousd.place.living import living_faults
 
     def faults(graph: SceneGraph) -> int:
         return sum(len(living_faults(graph, boxes)) + backlit(graph, boxes) for boxes in layouts)

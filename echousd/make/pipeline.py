@@ -1,4 +1,4 @@
-"""From a graph to a room: sample boxes, repair them, get shapes from a source, decide what shares an asset."""
+"""From a graph to a room: sample boxes, place them, get shapes from a source, decide what shares an asset."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ from echousd.make.owned import with_own_boxes, with_own_pieces
 from echousd.make.resting import settled
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
+from echousd.place.living import unusual_sizes
 from echousd.progress import StageTimer
-from echousd.repair.living import unusual_sizes
 from echousd.reproducible import one_thread
 from echousd.room import Provenance
 from echousd.settle import require_engine
@@ -138,7 +138,7 @@ def generate(
         whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
         return best_boxes(
             echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=asked.steps), drafts=drafts,
-            repair=asked.repair,
+            place=asked.place,
             drawn=drawn if whole else None, proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
 
@@ -163,12 +163,12 @@ def generate(
     layouts, sized = [boxes], with_sizes(graph, boxes)
     for number in range(1, asked.layouts):
         found, _ = best_boxes(
-            echo, sized, styles, Draws(seed, number, asked.steps), drafts=drafts, repair=asked.repair,
+            echo, sized, styles, Draws(seed, number, asked.steps), drafts=drafts, place=asked.place,
             sized=boxes, proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
         layouts.append(found)
     plan = plan_boxes(layouts)
-    if stated.room.extents is None:  # without repair, or with weights that know of no floor, furniture may stand beyond
+    if stated.room.extents is None:  # unplaced, or by weights that know of no floor, furniture may stand beyond
         graph = with_wider_floor(graph, footprints(*plan).reshape(-1, 2))
     if not stated.room.openings:
         graph = with_free_openings(graph, layouts, seed)
@@ -178,8 +178,8 @@ def generate(
     own = {name: made.geometry[owner] for name, owner in made.owners.items()}
     geometry = merged(own, asked.merge, asked.faces)
     outcomes = tuple(layout_outcome(graph, found) for found in layouts)
-    if asked.repair:
-        with timer.stage("repair"), one_thread():
+    if asked.place:
+        with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts([graph] * asked.layouts, layouts, geometry, floor, walls=asked.walls)
     made_room = Room(
         name=graph.room.type,

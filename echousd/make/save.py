@@ -23,7 +23,7 @@ from echousd.layers import paintings
 from echousd.layers.compose import LAYERS, room_files
 from echousd.naming import as_identifier
 from echousd.options import Look
-from echousd.repair.living import living_faults
+from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.retrieval import beside

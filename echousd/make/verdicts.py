@@ -11,9 +11,9 @@ from echomodel.objective.support import allowed_overlap
 from echomodel.rules import fronts, margins, verdicts
 from echomodel.rules.placements import placement_margins
 from echousd.graph import SceneGraph
-from echousd.repair.geometry import pair_indices, separation
-from echousd.repair.placements import stated_placements
-from echousd.repair.report import TOUCH, Collision
+from echousd.place.geometry import pair_indices, separation
+from echousd.place.placements import stated_placements
+from echousd.place.report import TOUCH, Collision
 from echousd.room import LayoutOutcome, RoomData, Verdict
 from echousd.tensors import floor_centre, graph_batch
 
@@ -26,7 +26,7 @@ class RoomWarning(UserWarning):
 
 
 def layout_outcome(graph: SceneGraph, boxes: Boxes) -> LayoutOutcome:
-    """What became of one layout, whether it was repaired or not."""
+    """What became of one layout, whether it was placed or not."""
     return LayoutOutcome(relation_verdicts(graph, boxes), colliding(graph, boxes))
 
 

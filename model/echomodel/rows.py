@@ -102,7 +102,7 @@ class Predicate:
         mirror_x, mirror_z: what it becomes where the room is mirrored along an axis, None = itself.
         emphasis, loss_weight: weight of its margin in guidance and in the training loss; what is rare and must hit a
             small spot needs more than one.
-        rests: the subject stands on the object: repair puts it onto the object's top.
+        rests: the subject stands on the object: placing puts it onto the object's top.
         follows: the subject goes along where the object is moved.
         unites: what the two objects have in common, of `style` and `shape`.
         aliases: other words for it.

@@ -155,7 +155,7 @@ class ReleasedEcho:
         """One sentence for every relation of the graph that SG-FRONT lacks; categories have classes, see `labels`."""
         words = vocabulary()
         return tuple(
-            f"the weights do not know the relation {words.predicates[number].name}: repaired and checked, not generated"
+            f"the weights do not know the relation {words.predicates[number].name}: placed and checked, not generated"
             for number in sorted({*graph.triplets[:, 1].tolist()} - words.sgfront_predicates.keys())
         )
 

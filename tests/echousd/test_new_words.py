@@ -26,7 +26,7 @@ from echousd.dressing.dress import placed
 from echousd.dressing.tabletops import TOPS
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph, load_graph, starting_graph
 from echousd.graph.picture import draw_graph, to_dot
-from echousd.repair import repair_boxes
+from echousd.place import place_boxes
 from echousd.shapes.finishes.slots import SLOTS
 from echousd.stage.foreign import foreign_graph
 
@@ -74,7 +74,7 @@ def stated() -> SceneGraph:
     return graph.replaced(relations=(*graph.relations, *told))
 
 
-def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
+def test_authored_generated_placed_checked_drawn_and_written(music, tmp_path):
     graph = stated()
     graph.to_stage(tmp_path / "graph.usda")
     graph = load_graph(tmp_path / "graph.usda")
@@ -89,7 +89,7 @@ def test_authored_generated_repaired_checked_drawn_and_written(music, tmp_path):
     assert {note for note in room.notes if "do not know" in note} == {
         "the weights do not know the category harp: generated as bookshelf",
         "the weights do not know the room type music_room: generated as living_room",
-        "the weights do not know the relation in_line_with: guided, repaired and checked, not generated",
+        "the weights do not know the relation in_line_with: guided, placed and checked, not generated",
     }
     apart = room.boxes.position[graph.names.index("stool")] - room.boxes.position[graph.names.index("harp")]
     assert abs(float(apart[0])) <= LEVEL
@@ -124,13 +124,13 @@ def test_the_command_line_speaks_them(music, tmp_path):
     assert load_graph(tmp_path / "g.usda").names == ("harp", "stool", "bookshelf")
 
 
-def test_repair_follows_the_rule_of_a_new_relation(music):
+def test_placing_follows_the_rule_of_a_new_relation(music):
     size, yaw = np.ones((2, 3)), np.zeros(2)
     position = np.array([[0.0, 0.0, -1.0], [0.6, 0.0, 1.0]])
     triplets = np.array([[0, music.predicate_id("in_line_with"), 1]])
     before = margins(Boxes(size, position, yaw), torch.from_numpy(triplets))
     assert float(before) == pytest.approx(LEVEL - 0.6)
-    done = repair_boxes(["harp", "armchair"], size, position, yaw, triplets)
+    done = place_boxes(["harp", "armchair"], size, position, yaw, triplets)
     assert done.verdict.tolist() == [1]
     assert abs(done.position[0, 0] - done.position[1, 0]) <= LEVEL
     np.testing.assert_allclose(done.size, size)

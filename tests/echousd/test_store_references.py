@@ -258,11 +258,11 @@ def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
     options = echousd.RoomOptions(crate=crate)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        made = echousd.generate(two(), model=None, shapes="boxes", drafts=1, steps=2, repair=False, options=options)
+        made = echousd.generate(two(), model=None, shapes="boxes", drafts=1, steps=2, place=False, options=options)
         root = made.save(tmp_path / "room", preview=False, store=store)
         states = [read_room(root).graph.names]
         for graph in (two(Node("chair", "chair")), two().remove_node("lamp")):
-            edit(root, graph, shapes="boxes", drafts=1, steps=2, repair=False).save(root.parent, preview=False)
+            edit(root, graph, shapes="boxes", drafts=1, steps=2, place=False).save(root.parent, preview=False)
             states.append(read_room(root).graph.names)
     unused = Store.open(store).put({"nobody": b""})
 
@@ -282,9 +282,9 @@ def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
 def test_what_an_interrupted_run_has_not_moved_yet_holds(tmp_path, monkeypatch, echousd_command):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        made = echousd.generate(two(), shapes="boxes", drafts=1, steps=2, repair=False)
+        made = echousd.generate(two(), shapes="boxes", drafts=1, steps=2, place=False)
         root = made.save(tmp_path / "room", preview=False, store=tmp_path / "store")
-        bigger = edit(root, two(Node("chair", "chair")), shapes="boxes", drafts=1, steps=2, repair=False)
+        bigger = edit(root, two(Node("chair", "chair")), shapes="boxes", drafts=1, steps=2, place=False)
         with monkeypatch.context() as patch:
             patch.setattr(folders, "finish", lambda folder: None)
             bigger.save(root.parent, preview=False)

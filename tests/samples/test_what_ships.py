@@ -17,7 +17,7 @@ SAMPLES = sorted((Path(__file__).parents[2] / "samples").glob("*.usda"))
 SEEDS = (0, 1, 2)
 # Floors, with what was measured when they were stated, over all samples and seeds:
 DRAWN = 0.9  # least share of the relations that the layout network alone keeps: 197 of 213
-DRAWN_COLLISIONS = 3.0  # most collisions a room that it leaves to repair: 37 in 15
+DRAWN_COLLISIONS = 3.0  # most collisions a room that it leaves to place: 37 in 15
 LIVING = 0.03  # most things a person would point at, per object of a finished room: 2 of 129
 FAULTLESS = 12 / 15  # least share of rooms in which there is no such thing: 13 of 15
 LOOSE = 0.02  # most pieces with a solid that touches nothing, of generated rooms: 0 of 123, 3 of 232 elsewhere
@@ -84,7 +84,7 @@ def test_the_network_alone_draws_most_of_what_the_graph_says():
     hits = []
     for sample in SAMPLES:
         for seed in SEEDS:
-            room = echousd.generate(sample, seed=seed, shapes="boxes", repair=False)
+            room = echousd.generate(sample, seed=seed, shapes="boxes", place=False)
             total += states(room)
             hits += room.outcomes[0].collisions
     assert total["kept"] / (total["kept"] + total["broken"]) >= DRAWN, total

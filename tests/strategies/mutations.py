@@ -100,8 +100,8 @@ COMMANDS: dict[str, Command] = {
     "usdz": lambda room, out: ["export", f"{room}", "-o", f"{out}.usdz", "--force"],
     "glb": lambda room, out: ["export", f"{room}", "-o", f"{out}.glb", "--force"],
     "usda": lambda room, out: ["export", f"{room}", "-o", f"{out}.usda", "--force"],
-    "generate": lambda room, out: ["generate", f"{room}", "-o", f"{out}_made", "--shapes", "boxes", "--no-repair"],
+    "generate": lambda room, out: ["generate", f"{room}", "-o", f"{out}_made", "--shapes", "boxes", "--no-place"],
     "edit": lambda room, out: [
-        "edit", f"{room}", "--add", "stool:nightstand", "-o", f"{out}_edited", "--shapes", "boxes", "--no-repair",
+        "edit", f"{room}", "--add", "stool:nightstand", "-o", f"{out}_edited", "--shapes", "boxes", "--no-place",
     ],
 }  # fmt: skip

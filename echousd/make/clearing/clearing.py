@@ -12,8 +12,8 @@ from echomodel.boxes import Boxes
 from echousd.graph import Placed, Relation, SceneGraph
 from echousd.make.clearing.scene import REACH, Scene, scene_of
 from echousd.make.verdicts import relation_verdicts
-from echousd.repair.living import living_faults
-from echousd.repair.report import Collision
+from echousd.place.living import living_faults
+from echousd.place.report import Collision
 from echousd.reproducible import rounded_boxes
 from echousd.room import LayoutOutcome
 from echousd.shapes.geometry import Geometry

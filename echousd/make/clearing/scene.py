@@ -16,7 +16,7 @@ from echomodel.objective.support import carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
 from echousd.graph import SceneGraph
-from echousd.repair.repair import DEFAULT_HEIGHT
+from echousd.place.placing import DEFAULT_HEIGHT
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.nofit import FLUSH, Solids, depth, forbidden_moves
 from echousd.shapes.surface import connected_pieces

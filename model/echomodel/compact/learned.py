@@ -75,7 +75,7 @@ def unlearned(graph: GraphBatch, config: CompactConfig) -> tuple[str, ...]:
         for row in (getattr(vocabulary(), kind)[number] for number in sorted(set(held.tolist()))):
             if row.name not in known:
                 becomes = (
-                    "guided, repaired and checked, not generated"
+                    "guided, placed and checked, not generated"
                     if kind == "predicates"
                     else f"generated as {_nearest(kind, row.name, known)}"
                 )

@@ -102,7 +102,7 @@ def evaluate_layout(
         sample: gives the N boxes of some scenes, in the order of their nodes.
         settings: rules, dropping, edits.
         progress: called with (scenes done, in all).
-        finish: what becomes of a draft of a room and the (e, 3) relations told of it, a repair for instance, and how
+        finish: what becomes of a draft of a room and the (e, 3) relations told of it, placing for instance, and how
             many faults that has, the worse ones first; rooms without any are drafted no further.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for repair and guidance."""
+"""Relation rules, defined once: verdicts for labels, checks and metrics, signed margins for placing and guidance."""
 
 from echomodel.rules.labels import aligned, centred, facing, label_relations, label_rooms, opposite  # registers them
 from echomodel.rules.margins import fronts, margins, measured, verdicts

@@ -1,6 +1,6 @@
 """Placements as rules: against a wall, in a corner, between two others, each with a margin in metres.
 
-As relations beyond SG-FRONT they are measured, guided to, repaired and checked; the networks do not know them.
+As relations beyond SG-FRONT they are measured, guided to, placed and checked; the networks do not know them.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from echomodel.training.rooms import LayoutBatch
 from echomodel.vocabulary import vocabulary
 
 SLACK = 0.03  # metres or radians that are asked for beyond what a rule does
-# Sizes are learned as they are; openings come as rows; what stands on a table is put there by repair.
+# Sizes are learned as they are; openings come as rows; what stands on a table is put there by placing.
 OTHERWISE = ("scale", "door_free", "window_free", "lamp_on_surface")
 STANDING = 0.3  # metres: what begins higher is in nobody's way
 HEADINGS = 4.0  # weight of the headings beside the rules, which forgive five degrees

@@ -109,10 +109,10 @@ def test_evaluation_with_few_relations(rooms_file, capsys):
     assert found["judge"]["here"] == 0.5  # true rooms against themselves
     assert run([*arguments, "--seeds", "2"]) == 2
     assert "--seeds and --drafts need several layouts of a room, the true one is one" in capsys.readouterr().err
-    assert run([*arguments, "--repair", "--json"]) == 0
-    repaired = json.loads(capsys.readouterr().out)
-    assert repaired["generation"]["total"] == 1.0
-    assert repaired["living"] != found["living"] or not found["living"]["rules"]
+    assert run([*arguments, "--place", "--json"]) == 0
+    placed = json.loads(capsys.readouterr().out)
+    assert placed["generation"]["total"] == 1.0
+    assert placed["living"] != found["living"] or not found["living"]["rules"]
     assert run(arguments) == 0
     text = capsys.readouterr().out
     assert "1 relations an object told, near pairs first" in text

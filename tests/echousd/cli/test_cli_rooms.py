@@ -42,7 +42,7 @@ def test_generate_render_and_export(graph, tmp_path, echousd_command):
 
 def test_flat_samples_z_up_and_boxes(graph, tmp_path, echousd_command):
     out = tmp_path / "room.usdc"
-    words = ("--flat", "--layouts", 2, "--up-axis", "z", "--shapes", "boxes", "--no-repair", "--walls")
+    words = ("--flat", "--layouts", 2, "--up-axis", "z", "--shapes", "boxes", "--no-place", "--walls")
     done = echousd_command("generate", graph, "-o", out, *words)
     assert done.code == 0, done.err
     stage = Usd.Stage.Open(str(out))
@@ -105,7 +105,7 @@ def test_older_crate_version_for_older_hosts(graph, tmp_path):
 
     code = (
         "import sys; from small_room import *; import echousd;"
-        "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', repair=False);"
+        "room = echousd.generate(small_graph(), model=StandIn(), shapes='boxes', place=False);"
         "room.save(sys.argv[1], preview=False)"
     )
     paths = os.pathsep.join(path for path in sys.path if path)

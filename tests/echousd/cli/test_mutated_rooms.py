@@ -48,7 +48,7 @@ class Hang(Exception):
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory) -> Path:
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return made.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 

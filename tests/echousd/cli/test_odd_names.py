@@ -26,7 +26,7 @@ def quick(monkeypatch):
 def make(echousd_command, folder, style="plain"):
     text = folder.parent / "graph.yaml"
     text.write_text(GRAPH.replace("STYLE", json.dumps(style)), "utf-8")
-    return echousd_command("generate", text, "-o", folder, "--shapes", "boxes", "--no-repair", "--dress", "none")
+    return echousd_command("generate", text, "-o", folder, "--shapes", "boxes", "--no-place", "--dress", "none")
 
 
 def materials(folder):
@@ -76,7 +76,7 @@ def test_styles_that_no_name_can_tell_apart_keep_their_own_materials(echousd_com
     text = tmp_path / "graph.yaml"
     text.write_text("room: {type: bedroom, size: [4, 3]}\nobjects:\n  a: {category: nightstand, style: x²}\n"
                     "  b: {category: wardrobe, style: x³}\n", "utf-8")  # fmt: skip
-    done = echousd_command("generate", text, "-o", tmp_path / "room", "--shapes", "boxes", "--no-repair")
+    done = echousd_command("generate", text, "-o", tmp_path / "room", "--shapes", "boxes", "--no-place")
     assert done.code in (0, 1), done.err
     assert {"x__wood", "x__2_wood"} <= materials(tmp_path / "room")
 

@@ -18,7 +18,7 @@ from echousd.options import RoomOptions
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -129,7 +129,7 @@ def test_light_is_smoothed_within_a_plane_only():
 
 def test_one_looks_out_of_windows_and_past_walls_that_are_away(tmp_path):
     data = echousd.generate(
-        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True, dress="none")
+        small_graph(), model=StandIn(), shapes="boxes", place=False, options=RoomOptions(walls=True, dress="none")
     )
     scenery = read_scenery(Usd.Stage.Open(str(data.save(tmp_path / "bedroom", preview=False))))
     windows = [opening for opening in data.graph.room.openings if opening.kind == "window"]
@@ -178,7 +178,7 @@ def test_nothing_to_draw_and_missing_embree(root, monkeypatch):
 
 def test_walls_in_front_of_the_camera_are_cut_away(tmp_path):
     options = RoomOptions(walls=True, dress="none")
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     scenery = read_scenery(stage)
     assert scenery.wall.max() == 3

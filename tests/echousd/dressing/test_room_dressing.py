@@ -189,7 +189,7 @@ def test_levels_of_a_shelf_have_air_and_what_stands_there_is_left_alone():
 def test_layouts_have_dressings_of_their_own(tmp_path):
     graph = small_graph()
     room = echousd.generate(
-        graph, seed=3, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(dress="some", walls=False)
+        graph, seed=3, model=StandIn(), place=False, shapes="boxes", options=RoomOptions(dress="some", walls=False)
     )
     moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
     room = replace(room, layouts=(room.boxes, moved))
@@ -214,7 +214,7 @@ def large_room(**options):
     """A large square room with little in it, and a window in one wall."""
     window = Opening("window", "window", 0, 2.2, 1.4, 1.3, 0.9)
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(6.4, 6.0), openings=(window,)))
-    made = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
+    made = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE)
     return replace(made, options=RoomOptions(walls=True, dress="some", **options))
 
 
@@ -253,7 +253,7 @@ def test_armchairs_around_a_table_share_a_rug():
     ]
     table = Node("table", "coffee_table", size=(0.9, 0.4, 0.6), position=(0.0, 0.0, 0.0), yaw=0.0)
     graph = SceneGraph(RoomSpec("living_room", size=(5.0, 4.4)), (*chairs, table))
-    made = echousd.generate(graph, shapes="boxes", repair=False, **BARE)
+    made = echousd.generate(graph, shapes="boxes", place=False, **BARE)
     rugs = [t for t in placed(replace(made, options=RoomOptions(walls=True, dress="some"))) if t.kind == "rug"]
     assert [rug.on for rug in rugs] == ["table"]
     assert rugs[0].size[0] > 1.6  # under the chairs' feet, too

@@ -16,7 +16,7 @@ from echousd.options import RoomOptions
 
 @pytest.fixture(scope="module")
 def room():
-    return echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    return echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_usdz_for_arkit_has_one_crate_without_whole_number_doubles(root, tmp_pat
 @pytest.mark.parametrize("physics", [None, True])
 def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, physics, tmp_path):
     options = RoomOptions(up_axis=up_axis, walls=False, dress="none")
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = Usd.Stage.Open(str(export(root, tmp_path / "room.usdz", arkit=True, physics=physics)))
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
@@ -88,7 +88,7 @@ def test_usdz_for_arkit_is_y_up_and_holds_nothing_of_ours_nor_lights(up_axis, ph
     assert not [name for name in types if name.startswith("Echo") or "Light" in name]
     assert not [name for prim in prims for name in prim.GetPropertyNames() if name.startswith("echo:")]
     assert {"Mesh", "Material", "Camera", "SemanticsLabelsAPI:category"} <= types
-    straight = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    straight = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     wanted = world_bounds(Usd.Stage.Open(str(straight.save(tmp_path / "straight", preview=False))))
     box = world_bounds(stage)
     np.testing.assert_allclose([box.GetMin(), box.GetMax()], [wanted.GetMin(), wanted.GetMax()], atol=1e-4)
@@ -188,7 +188,7 @@ def test_z_up_rooms_come_out_y_up_where_the_format_says_so(tmp_path):
         small_graph(),
         model=StandIn(),
         shapes="boxes",
-        repair=False,
+        place=False,
         options=RoomOptions(up_axis="Z", walls=False, dress="none"),
     )
     root = room.save(tmp_path / "bedroom", preview=False)

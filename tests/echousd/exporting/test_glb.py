@@ -31,7 +31,7 @@ def root(tmp_path_factory):
         (Relation("lamp", "standing_on", "dresser"), Relation("chair", "same_style_as", "other")),
     )
     options = RoomOptions(up_axis="Z", walls=True, dress="some")
-    made = echousd.generate(graph, seed=3, steps=2, repair=False, options=options)
+    made = echousd.generate(graph, seed=3, steps=2, place=False, options=options)
     return made.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -230,7 +230,7 @@ def test_a_foreign_stage_in_centimetres_with_mirrors_instances_and_a_metal(tmp_p
 
 
 def test_a_room_says_which_layout_it_is(tmp_path):
-    made = echousd.generate(small_graph(), model=StandIn(0.1), shapes="boxes", repair=False, layouts=2)
+    made = echousd.generate(small_graph(), model=StandIn(0.1), shapes="boxes", place=False, layouts=2)
     room = made.save(tmp_path / "bedroom", preview=False)
     said = read_gltf(export(room, tmp_path / "room.glb", layout=1)).tree["nodes"][0]["extras"]
     assert said["layout"] == "layout_1"

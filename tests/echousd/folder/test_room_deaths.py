@@ -125,7 +125,7 @@ def test_import_of_a_look(tmp_path, monkeypatch):
     graph = small_graph()
     for name in ("nightstand_left", "nightstand_right", "lamp", "pendant", "wardrobe"):
         graph = graph.remove_node(name)
-    made = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    made = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False)
     root = made.save(tmp_path / "made/bedroom", preview=False)
     export_job(root, tmp_path / "job", "generic", resolution=64)
     paint(tmp_path / "job")

@@ -20,13 +20,13 @@ MINE = b"#usda 1.0\n# mine\n"
 def change(root, graph):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        made = edit(root, graph, model=StandIn(0.5), shapes="boxes", repair=False)
+        made = edit(root, graph, model=StandIn(0.5), shapes="boxes", place=False)
         return made.save(root.parent, preview=False)
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    room = echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False)
+    room = echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", place=False)
     return room.save(tmp_path_factory.mktemp("made") / "bedroom", preview=False)
 
 
@@ -175,7 +175,7 @@ def test_remarks_in_a_root_layer_that_is_merged_are_kept_beside_it(root):
 
 
 def test_a_state_whose_assets_left_the_store_is_not_begun(tmp_path):
-    room = echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False)
+    room = echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", place=False)
     root = room.save(tmp_path / "bedroom", preview=False, store=tmp_path / "store")
     change(root, small_graph().remove_node("pendant"))
     store = Store.open(tmp_path / "store")

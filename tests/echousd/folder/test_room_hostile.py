@@ -17,7 +17,7 @@ OUTSIDE = "precious"
 
 
 def make(seed=0, graph=None):
-    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(0.5), shapes="boxes", repair=False, **BARE)
+    return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(0.5), shapes="boxes", place=False, **BARE)
 
 
 @pytest.fixture

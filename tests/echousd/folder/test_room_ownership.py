@@ -22,13 +22,11 @@ MINE = '#usda 1.0\n(\n    defaultPrim = "fern"\n)\ndef Sphere "fern" {}\n'
 
 def make(seed=0, graph=None, **more):
     model = StandIn(0.5)
-    return echousd.generate(
-        graph or small_graph(), seed=seed, model=model, shapes="boxes", repair=False, **more, **BARE
-    )
+    return echousd.generate(graph or small_graph(), seed=seed, model=model, shapes="boxes", place=False, **more, **BARE)
 
 
 def remade(root, graph):
-    return edit(root, graph, model=StandIn(0.5), shapes="boxes", repair=False)
+    return edit(root, graph, model=StandIn(0.5), shapes="boxes", place=False)
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from echousd.room import Provenance
 @pytest.fixture(scope="module")
 def room():
     return echousd.generate(
-        small_graph(), model=StandIn(), shapes="boxes", repair=False, options=RoomOptions(walls=True, dress="none")
+        small_graph(), model=StandIn(), shapes="boxes", place=False, options=RoomOptions(walls=True, dress="none")
     )
 
 

@@ -18,7 +18,7 @@ from echousd.options import RoomOptions
 
 def made(folder, **options):
     options = RoomOptions(walls=True, dress="some", **options)
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", options=options)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", options=options)
     return room.save(folder / "bedroom", preview=False)
 
 

@@ -12,7 +12,7 @@ from echousd.checks import check
 from echousd.layers.house import places
 from echousd.stage import write_graph
 
-QUICK = ("--shapes", "boxes", "--no-walls", "--no-repair", "--dress", "none", "--no-preview")
+QUICK = ("--shapes", "boxes", "--no-walls", "--no-place", "--dress", "none", "--no-preview")
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,7 @@ from echousd.stage import read_graph
 
 @pytest.fixture(scope="module")
 def room():
-    return echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, faces=800, **BARE)
+    return echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, faces=800, **BARE)
 
 
 @pytest.fixture(scope="module")
@@ -305,7 +305,7 @@ def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
         small_graph(),
         seed=3,
         model=StandIn(),
-        repair=False,
+        place=False,
         shapes="boxes",
         options=RoomOptions(up_axis="Z", walls=False, dress="none"),
     )
@@ -331,7 +331,7 @@ def test_z_up_room_is_turned_as_a_whole(room, tmp_path):
 def test_walls_stand_around_the_floor(tmp_path):
     graph = small_graph(size=None, floor_polygon=((-2, -2), (2, -2), (2, 2), (0, 2), (0, 1), (-2, 1)), height=3.0)
     room = echousd.generate(
-        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+        graph, model=StandIn(), place=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
     )
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     walls = [p for p in stage.GetPrimAtPath("/Room/Shell").GetChildren() if p.GetName().startswith("Wall_")]
@@ -347,7 +347,7 @@ def test_walls_stand_around_the_floor(tmp_path):
 
 def test_a_floor_that_nobody_stated_lies_under_all_furniture():
     graph = small_graph(size=None)
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", **BARE)
     corners = np.array(
         [room.pose(i) @ [x, 0, z, 1] for i, n in enumerate(room.names) for x, z in room.meshes[n].bounds[:, [0, 2]]]
     )

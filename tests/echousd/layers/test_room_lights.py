@@ -23,7 +23,7 @@ WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)  # in the wall at -z
 def stage(tmp_path_factory):
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
     room = echousd.generate(
-        graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
+        graph, model=StandIn(), place=False, shapes="boxes", options=RoomOptions(walls=True, dress="none")
     )
     return Usd.Stage.Open(str(room.save(tmp_path_factory.mktemp("lights") / "bedroom", preview=False)))
 
@@ -63,10 +63,10 @@ def test_there_is_a_sky_to_look_at_and_a_sun_that_blanks_no_wall(stage, tmp_path
     assert down[1] > down[2]
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW,)))
     options = RoomOptions(walls=True, ceiling=True, dress="none")
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+    room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=options)
     closed = Usd.Stage.Open(str(room.save(tmp_path / "closed", preview=False)))
     assert intensity(closed, "sun") > 2 * intensity(stage, "sun")  # through the window alone
-    bare = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", **BARE).save(
+    bare = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", **BARE).save(
         tmp_path / "bare", preview=False
     )
     assert not (bare.parent / "textures/sky.jpg").exists()  # nobody looks past walls that are not there
@@ -98,7 +98,7 @@ def test_lamps_shine_where_they_are(stage) -> None:
 
 
 def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
-    room = echousd.generate(small_graph(), model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), place=False, shapes="boxes", **BARE)
     moved = Boxes(room.boxes.size, room.boxes.position + 0.1, room.boxes.yaw)
     stage = Usd.Stage.Open(str(replace(room, layouts=(room.boxes, moved)).save(tmp_path / "two", preview=False)))
     layouts = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
@@ -115,7 +115,7 @@ def test_bulbs_are_where_their_lamps_are_in_every_layout(tmp_path) -> None:
 def test_openings_of_the_graph_point_to_what_they_became(tmp_path) -> None:
     door = Opening("door", "door", 1, 0.4, 0.9, 2.0)
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(WINDOW, door)))
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=RoomOptions(dress="none"))
+    room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=RoomOptions(dress="none"))
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     found = {}
     for name in ("window", "door"):

@@ -33,7 +33,7 @@ def test_records_name_prims_inside_a_room():
 
 @pytest.fixture
 def root(tmp_path):
-    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    made = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return made.save(tmp_path / "bedroom", preview=False)
 
 
@@ -44,7 +44,7 @@ def test_an_edit_leaves_a_room_that_opens(root, place):
     layer = Sdf.Layer.OpenAsAnonymous(str(root))
     layer.subLayerPaths = ["./looks/oil.usda", *layer.subLayerPaths]
     root.write_text(layer.ExportToString())
-    echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", repair=False, **BARE).save(
+    echousd.generate(small_graph(), model=StandIn(0.5), shapes="boxes", place=False, **BARE).save(
         root.parent, preview=False
     )
     assert open_stage(root).GetPrimAtPath("/Room/Objects/bed")

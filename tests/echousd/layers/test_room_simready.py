@@ -11,7 +11,7 @@ from echousd.layers.simready import FURNITURE, pack
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
     pytest.importorskip("embreex")
-    made = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    made = echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", **BARE)
     return made.save(tmp_path_factory.mktemp("room") / "bedroom", preview=False)
 
 

@@ -14,7 +14,7 @@ from echousd import check
 from echousd.graph import RoomSpec
 from echousd.make.adopting import adopted, seen_in_theirs
 from echousd.make.reading import read_room
-from echousd.repair.living import living_faults
+from echousd.place.living import living_faults
 from echousd.stage import open_stage
 
 

@@ -176,7 +176,7 @@ def test_owner_of_a_shared_asset_may_go(root):
 
 def test_another_category_gets_another_shape(root):
     before = hashes(root.parent)
-    edit(root, small_graph().relabel_node("wardrobe", "double_bed"), model=StandIn(), repair=False).save(
+    edit(root, small_graph().relabel_node("wardrobe", "double_bed"), model=StandIn(), place=False).save(
         root.parent, preview=False
     )
     after = hashes(root.parent)

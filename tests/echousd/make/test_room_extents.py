@@ -12,7 +12,7 @@ from echomodel.rooms import generate_rooms
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make.layouts import backlit, with_free_openings
 from echousd.make.verdicts import colliding
-from echousd.repair.living import living_faults
+from echousd.place.living import living_faults
 
 
 def graph_of(room):

@@ -71,7 +71,7 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
 def later(tmp_path_factory):
     """A room whose second layout is bad."""
     with pytest.warns(RoomWarning, match="layout_1: bed and wardrobe collide"):
-        room = echousd.generate(small_graph(), model=Piled(True), shapes="boxes", layouts=2, repair=False, **BARE)
+        room = echousd.generate(small_graph(), model=Piled(True), shapes="boxes", layouts=2, place=False, **BARE)
     assert [len(found.collisions) > 0 for found in room.outcomes] == [False, True]
     return room.save(tmp_path_factory.mktemp("rooms") / "room")
 

@@ -97,7 +97,7 @@ def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
 def test_what_the_graph_fixes_comes_back():
     graph = small_graph().update_node("wardrobe", size=(1.0, 2.0, 0.5), yaw=0.3)
     graph = graph.update_node("bed", size=(1.4, 0.9, 2.0), position=(0.2, 0.0, 0.1), yaw=0.5)
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE)
     at = room.names.index("wardrobe")
     np.testing.assert_allclose(room.boxes.size[at], (1.0, 2.0, 0.5))
     assert float(room.boxes.yaw[at]) == pytest.approx(0.3)
@@ -107,19 +107,19 @@ def test_what_the_graph_fixes_comes_back():
 def test_floor_away_from_the_origin_takes_the_furniture_along():
     corners = ((8.0, 3.0), (12.0, 3.0), (12.0, 7.0), (8.0, 7.0))
     room = echousd.generate(
-        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", repair=False, **BARE
+        small_graph(size=None, floor_polygon=corners), model=StandIn(), shapes="boxes", place=False, **BARE
     )
     np.testing.assert_allclose(room.boxes.position[0], (10.0, 0.0, 4.4), atol=1e-5)
 
 
-def test_repair_keeps_the_graph():
+def test_placing_keeps_the_graph():
     class Heap(StandIn):
         def sample_layout(self, graph, **kwargs):
             found = super().sample_layout(graph, **kwargs)
             return Boxes(found.size, found.position * torch.tensor([0.3, 1.0, 0.3]), found.yaw)
 
     graph = small_graph().relate("nightstand_left", "front", "bed")
-    heap = echousd.generate(graph, model=Heap(), shapes="boxes", repair=False, **BARE)
+    heap = echousd.generate(graph, model=Heap(), shapes="boxes", place=False, **BARE)
     assert any(v.state == "broken" for v in heap.verdicts)
     room = echousd.generate(graph, model=Heap(), shapes="boxes", **BARE)
     assert [v.state for v in room.verdicts if v.state != "unmeasured"] == ["kept"] * 5
@@ -128,7 +128,7 @@ def test_repair_keeps_the_graph():
 
 
 def test_verdicts_are_those_of_the_rules():
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     by = {(v.subject, v.predicate): v for v in room.verdicts}
     assert by["lamp", "standing_on"].state == "kept"
     assert by["nightstand_left", "same_style_as"].state == "unmeasured"
@@ -148,9 +148,9 @@ def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
     assert room.graph.replaced(room=small_graph().room) == small_graph()
     assert {opening.kind for opening in room.graph.room.openings} == {"door", "window"}
     assert room.provenance.source == "graph.usda"
-    assert {stage for stage, *_ in told} == {"read", "load", "layout", "repair", "meshes"} == set(room.timings)
+    assert {stage for stage, *_ in told} == {"read", "load", "layout", "place", "meshes"} == set(room.timings)
     assert ("meshes", 6, 6) in told
-    assert told[-1] == ("repair", 1, 1)  # moved apart by their solids
+    assert told[-1] == ("place", 1, 1)  # moved apart by their solids
 
 
 class NoShapes(StandIn):
@@ -227,26 +227,26 @@ def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
 
 def test_a_lock_of_the_last_generation_stays(tmp_path):
     """A source that says nothing of a place does not undo what an edit or an update has locked there."""
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     root = room.save(tmp_path / "room", preview=False)
     locked = room.graph.update_node("wardrobe", locked=True, position=(-1.2, 0.0, 0.5), yaw=0.5)
-    echousd.edit(root, locked, model=StandIn(), repair=False).save(root.parent, preview=False)
-    again = echousd.generate(small_graph(), seed=4, model=StandIn(), shapes="boxes", repair=False, earlier=root.parent)
+    echousd.edit(root, locked, model=StandIn(), place=False).save(root.parent, preview=False)
+    again = echousd.generate(small_graph(), seed=4, model=StandIn(), shapes="boxes", place=False, earlier=root.parent)
     assert again.graph.node("wardrobe").locked
     assert again.boxes.position[again.names.index("wardrobe")].tolist() == pytest.approx([-1.2, 0.0, 0.5], abs=1e-3)
     assert any(note.startswith("wardrobe stays locked as in the room that is there") for note in again.notes)
     moved = small_graph().update_node("wardrobe", position=(1.0, 0.0, 1.0))
-    again = echousd.generate(moved, model=StandIn(), shapes="boxes", repair=False, earlier=root.parent)
+    again = echousd.generate(moved, model=StandIn(), shapes="boxes", place=False, earlier=root.parent)
     assert not again.graph.node("wardrobe").locked
 
 
 def test_windows_are_proposed_beside_a_stated_door():
     door = Opening("door", "door", 3, 0.3, 0.9, 2.0, 0.0)
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(door,)))
-    room = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False)
+    room = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False)
     assert room.graph.room.openings[0] == door
     assert {opening.kind for opening in room.graph.room.openings[1:]} == {"window"}
-    again = echousd.generate(room.graph, model=StandIn(), shapes="boxes", repair=False)
+    again = echousd.generate(room.graph, model=StandIn(), shapes="boxes", place=False)
     assert again.graph.room.openings == room.graph.room.openings
 
 
@@ -270,6 +270,6 @@ def test_a_room_says_which_conventions_of_its_stage_it_does_not_keep(tmp_path, m
         if value is not None:
             layer.pseudoRoot.SetInfo(key, value)
     layer.Save()
-    room = echousd.generate(tmp_path / "flat.usda", model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(tmp_path / "flat.usda", model=StandIn(), shapes="boxes", place=False, **BARE)
     found = [note for note in room.notes if note.startswith("flat.usda")]
     assert found == ([f"flat.usda has {said}; the room has metres, Y up (up_axis), at /Room"] if said else [])

@@ -109,7 +109,7 @@ def test_networks_run_on_one_thread(shapes, monkeypatch):
     before = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
-        echousd.generate(small_graph(), model=echo, shapes=shapes, steps=1, drafts=1, faces=100, repair=False, **BARE)
+        echousd.generate(small_graph(), model=echo, shapes=shapes, steps=1, drafts=1, faces=100, place=False, **BARE)
     finally:
         torch.set_num_threads(before)
     assert seen == [("sample_layout", 1), ("sample_furniture" if shapes == "parts" else "sample_shapes", 1)]

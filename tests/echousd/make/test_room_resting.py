@@ -16,7 +16,7 @@ from echousd.options import RoomOptions
 pytestmark = pytest.mark.skipif("not __import__('importlib.util').util.find_spec('mujoco')", reason="extra sim")
 
 
-PLAIN = RoomOptions(shapes="boxes", repair=False, walls=False, dress="none", preview=False)
+PLAIN = RoomOptions(shapes="boxes", place=False, walls=False, dress="none", preview=False)
 
 
 class High(StandIn):
@@ -106,7 +106,7 @@ def test_the_command_writes_poses_at_rest_and_names_what_falls(tmp_path, echousd
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: High()))
     small_graph().to_stage(tmp_path / "graph.usda")
     name = small_graph().names[0]
-    options = ("--shapes", "boxes", "--no-repair", "--no-walls", "--dress", "none", "--settle")
+    options = ("--shapes", "boxes", "--no-place", "--no-walls", "--dress", "none", "--settle")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *options)
     assert f"note     {name} stands where it comes to rest" in done.out
     manifest = json.loads((tmp_path / "room" / "room.json").read_text())

@@ -21,7 +21,7 @@ from echousd.pending import STAGING
 
 
 def make(seed=0, shift=0.5, graph=None, **more):
-    more = {"repair": False, "shapes": "boxes", **more}
+    more = {"place": False, "shapes": "boxes", **more}
     return echousd.generate(graph or small_graph(), seed=seed, model=StandIn(shift), **{**BARE, **more})
 
 
@@ -141,7 +141,7 @@ def test_killed_while_saving_leaves_a_room_that_opens(tmp_path):
         from dataclasses import replace
         from small_room import StandIn, small_graph
         import echousd
-        options = {"model": StandIn(0.5), "shapes": "boxes", "repair": False}
+        options = {"model": StandIn(0.5), "shapes": "boxes", "place": False}
         rooms = [echousd.generate(small_graph(), seed=seed, **options) for seed in (1, 2)]
         rooms[0].save(sys.argv[1], preview=False)
         print("go", flush=True)

@@ -20,7 +20,7 @@ simulated = pytest.mark.skipif("not __import__('importlib.util').util.find_spec(
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -40,7 +40,7 @@ def moved(stage, name, by):
     ],
 )
 def test_a_room_that_stands_rests(options, tmp_path):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, options=options)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=options)
     report = settle(room.save(tmp_path / "bedroom", preview=False))
     assert report.ok, report.restless
     assert {motion.name for motion in report.motions} == set(room.names) - {"pendant"}

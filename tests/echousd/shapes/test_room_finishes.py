@@ -73,7 +73,7 @@ def test_fibres_run_along_the_longer_side_of_a_board():
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", **BARE)
     room = replace(room, options=RoomOptions(dress="full", walls=True))
     return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
@@ -106,7 +106,7 @@ def test_images_are_there_and_small(root):
 
 def test_materialx_stands_beside_preview_surfaces(root, tmp_path):
     plain = Usd.Stage.Open(str(root))
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), repair=False, shapes="boxes", **BARE)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), place=False, shapes="boxes", **BARE)
     room = replace(room, options=RoomOptions(dress="full", walls=True, materialx=True))
     made = room.save(tmp_path / "bedroom", preview=False)
     assert json.loads(made.with_suffix(".json").read_text())["materialx"] is True

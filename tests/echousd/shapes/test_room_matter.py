@@ -12,7 +12,7 @@ from echomodel.vocabulary import vocabulary
 from echousd.shapes.matter import MATTER, PARTS, weighed
 
 ROWS = vocabulary().categories
-PIECES = 12  # of each category; some of those draws are larger than anything that repair leaves in a room
+PIECES = 12  # of each category; some of those draws are larger than anything that placing leaves in a room
 
 
 def piece(mesh: trimesh.Trimesh, material: str = "wood", role: str = "") -> Piece:

@@ -73,7 +73,7 @@ def test_prims_of_the_shell(tmp_path) -> None:
     spec = RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW))
     graph = small_graph().replaced(room=spec)
     options = RoomOptions(walls=True, ceiling=True, dress="none")
-    room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+    room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=options)
     stage = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
     shell = stage.GetPrimAtPath("/Room/Shell")
     pieces = [prim for prim in shell.GetChildren() if prim.IsA(UsdGeom.Xformable)]
@@ -119,7 +119,7 @@ def test_doors_articulate(tmp_path) -> None:
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
     for up in ("Y", "Z"):
         options = RoomOptions(up_axis=up, walls=True, dress="none")
-        room = echousd.generate(graph, model=StandIn(), repair=False, shapes="boxes", options=options)
+        room = echousd.generate(graph, model=StandIn(), place=False, shapes="boxes", options=options)
         stage = Usd.Stage.Open(str(room.save(tmp_path / up, preview=False)))
         door = stage.GetPrimAtPath("/Room/Shell/Wall_3/Wall_3_door")
         leaf = stage.GetPrimAtPath(f"{door.GetPath()}/Wall_3_door_hinge")

@@ -60,7 +60,7 @@ def slabs(monkeypatch):
 
 
 def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
-    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", repair=False, **BARE)
+    room = echousd.generate(small_graph(), seed=3, model=StandIn(), shapes="slabs", place=False, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = open_stage(root)
     bed = "/Room/Objects/bed/geo"

@@ -125,7 +125,7 @@ def test_check_measures_solids_in_the_place_of_meshes(tmp_path):
 
 
 def test_rooms_of_ours_look_as_before(tmp_path):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     names = [d.path for d in read_drawables(room.stage)]
     assert "/Room/Objects/bed/geo/bed_mesh" in names
     assert len(names) == len(set(names))

@@ -17,7 +17,7 @@ from echousd.stage.read import StatedTwice
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -93,13 +93,13 @@ def test_a_fact_stated_under_another_name_is_one_fact_with_the_stronger_confiden
 
 
 def test_a_relation_of_any_name_survives_regeneration(root, tmp_path):
-    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     root = room.save(tmp_path / "bedroom", preview=False)
     stage = stronger(root)
     state(stage, "my_edge", "wardrobe", "right", "bed")
     stage.Save()
     graph = read_graph(stage)
-    echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE).save(root.parent, preview=False)
+    echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE).save(root.parent, preview=False)
     stage.Reload()
     with pytest.warns(StatedTwice):
         assert read_graph(stage).replaced(room=graph.room) == graph

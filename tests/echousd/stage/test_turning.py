@@ -26,7 +26,7 @@ def roots(tmp_path_factory):
     found = {}
     for up in ("Y", "Z"):
         options = RoomOptions(up_axis=up, walls=True, dress="some")
-        room = echousd.generate(graph, seed=3, model=StandIn(), repair=False, shapes="boxes", options=options)
+        room = echousd.generate(graph, seed=3, model=StandIn(), place=False, shapes="boxes", options=options)
         found[up] = room.save(tmp_path_factory.mktemp(up) / "bedroom", preview=False)
     return found
 

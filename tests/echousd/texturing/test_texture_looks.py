@@ -32,7 +32,7 @@ SIZE = 128
 def made(tmp_path_factory):
     """A room and its painted job."""
     top = tmp_path_factory.mktemp("rooms")
-    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     root = data.save(top / "bedroom", preview=False)
     export_job(root, top / "job", "generic", resolution=SIZE)
     paint(top / "job")
@@ -60,7 +60,7 @@ def material(root, name):
 
 
 def generated(root, graph):
-    data = echousd.generate(graph, model=StandIn(), shapes="boxes", repair=False, **BARE)
+    data = echousd.generate(graph, model=StandIn(), shapes="boxes", place=False, **BARE)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         data.save(root.parent, preview=False)
@@ -92,7 +92,7 @@ def test_a_persons_files_where_a_look_would_lie_are_left(room):
 def test_an_edit_of_a_room_whose_root_was_edited_is_taken_back_after_an_import(room):
     room.write_text(room.read_text().rstrip()[:-1] + '    def Cube "Toy"\n    {\n    }\n}\n')
     fewer = small_graph().remove_node("pendant")
-    edit(room, fewer, model=StandIn(), shapes="boxes", repair=False).save(room.parent, preview=False)
+    edit(room, fewer, model=StandIn(), shapes="boxes", place=False).save(room.parent, preview=False)
     import_look(room, job_of(room), name="oil", skip=("pendant",), preview=False)
     after = room.read_bytes()
     undo(room)
@@ -145,7 +145,7 @@ def test_edits_mute_what_they_change(room):
     saved = read_room(room)
     graph = saved.graph.relabel_node("pendant", "wardrobe")
     with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
-        edit(room, graph, model=StandIn(), shapes="boxes", repair=False).save(room.parent, preview=False)
+        edit(room, graph, model=StandIn(), shapes="boxes", place=False).save(room.parent, preview=False)
     assert material(room, "pendant") != "oil_pendant"
     assert material(room, "wardrobe") == "oil_wardrobe"
     assert not check(room).errors
@@ -163,7 +163,7 @@ def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
     import_look(room, job_of(room), name="oil", preview=False)
     before = {path: path.read_bytes() for path in room.parent.rglob("*") if path.is_file()}
     graph = read_room(room).graph.relabel_node("pendant", "wardrobe")
-    made = edit(room, graph, model=StandIn(), shapes="boxes", repair=False)
+    made = edit(room, graph, model=StandIn(), shapes="boxes", place=False)
     with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
         other = made.save(tmp_path / "far/away", preview=False)
     assert {path: path.read_bytes() for path in before} == before

@@ -33,7 +33,7 @@ def room(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
-    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", repair=False, **BARE)
+    data = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
     return data.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
@@ -228,7 +228,7 @@ def test_rooms_with_z_up_are_painted_alike(tmp_path):
         small_graph(),
         model=StandIn(),
         shapes="boxes",
-        repair=False,
+        place=False,
         options=RoomOptions(up_axis="Z", walls=True, dress="none"),
     )
     root = data.save(tmp_path / "bedroom", preview=False)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echousd.repair.geometry import COLUMNS, axes
+from echousd.place.geometry import COLUMNS, axes
 
 FIRST, SECOND = 0, 1
 PLAN = [0, 2]  # columns of x and z

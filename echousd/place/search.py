@@ -17,10 +17,10 @@ from scipy.optimize import linear_sum_assignment
 from echomodel.objective import TERMS, Plan, Term, unreached
 from echomodel.objective.copies import copies_of
 from echomodel.objective.found import Found
-from echousd.repair.overlaps import beyond, depths
-from echousd.repair.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
-from echousd.repair.relations import margins_at
-from echousd.repair.setting import Setting
+from echousd.place.overlaps import beyond, depths
+from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
+from echousd.place.relations import margins_at
+from echousd.place.setting import Setting
 
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time

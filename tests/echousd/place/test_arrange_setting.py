@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from echousd.repair import repair_boxes
-from echousd.repair.geometry import axes, depth_inside
-from echousd.repair.problem import pose
-from echousd.repair.proposals import proposals, slots_at
-from echousd.repair.search import Search, State
-from echousd.repair.setting import Setting, setting_of
+from echousd.place import place_boxes
+from echousd.place.geometry import axes, depth_inside
+from echousd.place.problem import pose
+from echousd.place.proposals import proposals, slots_at
+from echousd.place.search import Search, State
+from echousd.place.setting import Setting, setting_of
 
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
 
@@ -41,7 +41,7 @@ def test_a_nightstand_comes_close_to_a_fixed_bed_that_is_flush_with_its_wall(wid
     drawn, still = [(0.0, 0.0, -0.95), (1.6, 0.0, 0.8)], [True, False]
     found = setting(["double_bed", "nightstand"], size, drawn, [0.0, 0.0], (0,))
     assert found.behind[0] == pytest.approx(0.0, abs=1e-9)
-    done = repair_boxes(
+    done = place_boxes(
         ["double_bed", "nightstand"], np.array(size), np.array(drawn), np.zeros(2), np.zeros((0, 3), int),
         floor_polygon=FLOOR, height=2.7, fixed=np.array(still), rigid=np.array(still),
     )  # fmt: skip
@@ -78,7 +78,7 @@ def test_a_full_room_is_not_arranged_again_where_nothing_may_shrink(monkeypatch,
     monkeypatch.setattr(Search, "run", lambda search: calls.append(search) or run(search))
     size = np.array([(2.0, 1.0, 2.2), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6), (1.8, 2.2, 0.6)])
     small = FLOOR * (0.46, 0.6)
-    repair_boxes(
+    place_boxes(
         ["double_bed", *["wardrobe"] * 3], size, np.zeros((4, 3)), np.zeros(4), np.zeros((0, 3), int),
         floor_polygon=small, height=2.7, rigid=np.full(4, rigid),
     )  # fmt: skip

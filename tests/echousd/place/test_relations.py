@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair.relations import margins_at, relation_margins
+from echousd.place.relations import margins_at, relation_margins
 
 
 def test_facing_is_the_same_without_gradients():

@@ -14,9 +14,9 @@ from echomodel.objective import Plan, plan_of
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
-from echousd.repair.distances import BEHIND, kept_behind
-from echousd.repair.geometry import Floor
-from echousd.repair.problem import Posed, Problem, wall_gaps
+from echousd.place.distances import BEHIND, kept_behind
+from echousd.place.geometry import Floor
+from echousd.place.problem import Posed, Problem, wall_gaps
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Walls

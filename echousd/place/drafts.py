@@ -1,4 +1,4 @@
-"""The repair of `generate` for rooms as boxes, so that evaluations score what a room would get."""
+"""The placing of `generate` for rooms as boxes, so that evaluations score what a room would get."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from torch import Tensor
 from echomodel.metrics.layout_evaluation import Finish
 from echomodel.objective import faults
 from echomodel.roomboxes import RoomBoxes
-from echousd.repair.repair import repair_boxes
+from echousd.place.placing import place_boxes
 
 
-def repaired(rules: str) -> Finish:
-    """The repair of `generate`, for rooms as boxes; how much is broken or collides, and the living faults."""
+def placed(rules: str) -> Finish:
+    """The placing of `generate`, for rooms as boxes; how much is broken or collides, and the living faults."""
 
     def finish(room: RoomBoxes, triplets: Tensor) -> tuple[RoomBoxes, tuple[int, ...]]:
         floor = room.floor_polygon if len(room.floor_polygon) else None
-        done = repair_boxes(
+        done = place_boxes(
             room.categories, room.size, room.position, room.yaw, triplets.numpy(),
             floor_polygon=floor, height=room.height, rules=rules, openings=room.openings,
         )  # fmt: skip

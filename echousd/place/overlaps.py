@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from echomodel.roomboxes import footprints
-from echousd.repair.geometry import Floor, axes, depth_inside
+from echousd.place.geometry import Floor, axes, depth_inside
 
 
 def depths(

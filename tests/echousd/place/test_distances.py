@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from echomodel.vocabulary import vocabulary
-from echousd.repair import RepairConfig, repair_boxes
-from echousd.repair.distances import APART, kept_behind, over_bed, score, seen_from
+from echousd.place import PlaceConfig, place_boxes
+from echousd.place.distances import APART, kept_behind, over_bed, score, seen_from
 
 FLOOR = np.array([(-3.0, -2.5), (3.0, -2.5), (3.0, 2.5), (-3.0, 2.5)])
 CLOSE = next(p.id for p in vocabulary().predicates if p.name == "close_by")
@@ -23,10 +23,10 @@ def laid(gap: float) -> np.ndarray:
 
 
 def chairs_apart(gap: float, long: float = 1.6) -> np.ndarray:
-    """(4,) float: metres between a table and its chairs after repair."""
+    """(4,) float: metres between a table and its chairs after placing."""
     size = np.array([(long, *TABLE[1:])] + [CHAIR] * 4)
     told = np.array([(k, CLOSE, 0) for k in range(1, 5)])
-    done = repair_boxes(
+    done = place_boxes(
         ["dining_table"] + ["dining_chair"] * 4, size, laid(gap), np.array([0.0, 0.0, 0.0, np.pi, np.pi]), told,
         floor_polygon=FLOOR, height=2.7,
     )  # fmt: skip
@@ -89,9 +89,9 @@ def test_backs_keep_the_distance_to_their_wall_that_was_drawn_or_get_one_that_is
     position = np.array([[0.3, 0.0, -2.5 + 0.3 + drawn]])
     (usual,) = kept_behind(["wardrobe"], size, np.array([np.nan]))
     for arrange in (True, False):
-        done = repair_boxes(
+        done = place_boxes(
             ["wardrobe"], size, position, np.zeros(1), np.zeros((0, 3)), floor_polygon=FLOOR, height=2.7,
-            rigid=np.ones(1, bool), config=RepairConfig(arrange=arrange),
+            rigid=np.ones(1, bool), config=PlaceConfig(arrange=arrange),
         )  # fmt: skip
         wished = usual if arrange or kept is None else kept
         assert done.position[0, 2] - 0.3 + 2.5 == pytest.approx(wished, abs=0.012)  # a wall gives way a little

@@ -1,4 +1,4 @@
-"""A room to be repaired: what is fixed, what stands on what, which wall each piece leans on, who may overlap whom."""
+"""a room to be placed: what is fixed, what stands on what, which wall each piece leans on, who may overlap whom."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, carriers
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.repair.distances import kept_behind
-from echousd.repair.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
+from echousd.place.distances import kept_behind
+from echousd.place.geometry import Floor, axes, floor_from_polygon, pair_gaps, pair_indices
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Stated, Walls
@@ -114,7 +114,7 @@ def pose(
 
     Arguments:
         turned: (n,) bool, boxes that must keep their yaw.
-        The others as `echousd.repair.repair_boxes`.
+        The others as `echousd.place.place_boxes`.
     """
     from echomodel.rules import measured
 

@@ -1,4 +1,4 @@
-"""Repair on small rooms whose right answer is known, and on noisy rooms whose relations are known."""
+"""Placing on small rooms whose right answer is known, and on noisy rooms whose relations are known."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from echomodel.boxes import Boxes
 from echomodel.rules import margins, verdicts
 from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
-from echousd.repair import RepairConfig, allowed_overlap, repair, repair_boxes
-from echousd.repair.geometry import depth_inside, floor_from_polygon, inside, separation, spread
-from echousd.repair.relations import relation_margins
-from echousd.repair.repair import RepairedBoxes
+from echousd.place import PlaceConfig, allowed_overlap, place, place_boxes
+from echousd.place.geometry import depth_inside, floor_from_polygon, inside, separation, spread
+from echousd.place.placing import PlacedBoxes
+from echousd.place.relations import relation_margins
 
 FLOOR = np.array([(-2.0, -1.8), (2.0, -1.8), (2.0, 1.8), (-2.0, 1.8)])
 
@@ -66,7 +66,7 @@ def bedroom() -> tuple[SceneGraph, np.ndarray, np.ndarray, np.ndarray]:
 
 def test_everything_that_was_asked_for_holds_afterwards() -> None:
     graph, size, position, yaw = bedroom()
-    result = repair(graph, boxes(size, position, yaw))
+    result = place(graph, boxes(size, position, yaw))
     assert not result.broken
     assert not result.conflicts
     assert not result.collisions
@@ -89,8 +89,8 @@ def test_everything_that_was_asked_for_holds_afterwards() -> None:
 
 def test_a_good_room_stays_as_it_is() -> None:
     graph, size, position, yaw = bedroom()
-    once = repair(graph, boxes(size, position, yaw))
-    again = repair(graph, once.boxes)
+    once = place(graph, boxes(size, position, yaw))
+    again = place(graph, once.boxes)
     assert max(again.moved.values()) < 0.01
     assert max(again.resized.values()) < 0.01
 
@@ -98,7 +98,7 @@ def test_a_good_room_stays_as_it_is() -> None:
 def test_locked_and_known_objects_never_move() -> None:
     graph, size, position, yaw = bedroom()
     graph = graph.lock("bed").update_node("wardrobe", position=tuple(position[3]), size=(1.2, 2.2, 0.6))
-    result = repair(graph, boxes(size, position, yaw))
+    result = place(graph, boxes(size, position, yaw))
     for number in (0, 3):
         assert torch.equal(result.boxes.position[number], torch.tensor(position[number], dtype=torch.float32))
         assert torch.equal(result.boxes.size[number], torch.tensor(size[number], dtype=torch.float32))
@@ -108,7 +108,7 @@ def test_locked_and_known_objects_never_move() -> None:
 
 def test_the_same_boxes_give_the_same_room() -> None:
     graph, size, position, yaw = bedroom()
-    first, second = (repair(graph, boxes(size, position, yaw)) for _ in range(2))
+    first, second = (place(graph, boxes(size, position, yaw)) for _ in range(2))
     assert torch.equal(first.boxes.position, second.boxes.position)
     assert torch.equal(first.boxes.size, second.boxes.size)
 
@@ -120,7 +120,7 @@ def test_relations_in_conflict_are_named() -> None:
          Node("c", "ottoman"), Node("d", "wardrobe")),
         (Relation("c", "close_by", "a"), Relation("c", "close_by", "b"), Relation("d", "taller_than", "c")),
     )  # fmt: skip
-    result = repair(
+    result = place(
         graph,
         boxes(
             [[0.4, 1, 0.4], [0.4, 1, 0.4], [0.5, 0.4, 0.5], [1, 2, 0.6]],
@@ -137,7 +137,7 @@ def test_too_much_furniture_is_reported_not_hidden() -> None:
         RoomSpec("bedroom", size=(2.0, 2.0)),
         tuple(Node(f"bed_{i}", "double_bed", size=(1.6, 0.5, 1.9)) for i in range(3)),
     )
-    result = repair(graph, boxes([[1.6, 0.5, 1.9]] * 3, [[0, 0, 0], [0.1, 0, 0], [-0.1, 0, 0.1]], [0.0] * 3))
+    result = place(graph, boxes([[1.6, 0.5, 1.9]] * 3, [[0, 0, 0], [0.1, 0, 0], [-0.1, 0, 0.1]], [0.0] * 3))
     assert result.collisions or result.outside
     assert result.conflicts
     assert "apart" in " ".join(result.conflicts)
@@ -146,7 +146,7 @@ def test_too_much_furniture_is_reported_not_hidden() -> None:
 def test_chairs_may_be_under_the_table_but_not_in_one_another() -> None:
     size = np.array([[1.6, 0.75, 0.9], [0.5, 0.9, 0.5], [0.5, 0.9, 0.5]])
     position = np.array([[0.0, 0, 0], [0.3, 0, 0.5], [0.35, 0, 0.55]])
-    done = repair_boxes(
+    done = place_boxes(
         ["dining_table", "dining_chair", "dining_chair"], size, position, np.zeros(3), np.zeros((0, 3), int)
     )
     assert not done.collisions
@@ -174,7 +174,7 @@ def test_noisy_rooms_get_their_relations_back() -> None:
         triplets = triplets[margins(clean, triplets) >= 1e-3]
         floor = np.array([(-3, -3), (3, -3), (3, 3), (-3, 3.0)])
         start = position + rng.normal(0, 0.3, position.shape) * (1, 0.3, 1)
-        done = repair_boxes(
+        done = place_boxes(
             categories, size * np.exp(rng.normal(0, 0.1, size.shape)), start, np.zeros(n), triplets.numpy(),
             floor_polygon=floor, height=2.6,
         )  # fmt: skip
@@ -196,13 +196,13 @@ def test_very_many_boxes_end_where_few_would(monkeypatch) -> None:
     close_by = vocabulary().predicate_id("close_by")
     triplets = np.array([(4 * k + 1, close_by, 4 * k) for k in range(count // 4)])
 
-    def ends() -> RepairedBoxes:
-        config = RepairConfig(arrange=False)
-        return repair_boxes(words, size, position, np.zeros(count), triplets, floor_polygon=floor, config=config)
+    def ends() -> PlacedBoxes:
+        config = PlaceConfig(arrange=False)
+        return place_boxes(words, size, position, np.zeros(count), triplets, floor_polygon=floor, config=config)
 
     few = ends()
-    monkeypatch.setattr("echousd.repair.constraints.MANY", 8)
-    monkeypatch.setattr("echousd.repair.solver.MANY", 8)
+    monkeypatch.setattr("echousd.place.constraints.MANY", 8)
+    monkeypatch.setattr("echousd.place.solver.MANY", 8)
     many = ends()
     np.testing.assert_allclose(many.position, few.position, atol=1e-5)
     np.testing.assert_allclose(many.size, few.size, atol=1e-5)
@@ -240,7 +240,7 @@ def test_margins_and_gradients_are_those_of_the_rules(rules: str, square: bool, 
 
 def test_verdicts_are_those_of_the_returned_boxes() -> None:
     graph, size, position, yaw = bedroom()
-    result = repair(graph, boxes(size, position, yaw), config=RepairConfig(rounds=0, arrange=False))
+    result = place(graph, boxes(size, position, yaw), config=PlaceConfig(rounds=0, arrange=False))
     index = {name: i for i, name in enumerate(graph.names)}
     triplets = torch.tensor(
         [(index[r.subject], vocabulary().predicate_id(r.predicate), index[r.object]) for r in graph.relations]
@@ -261,12 +261,12 @@ def test_inside_of_a_floor_with_a_notch() -> None:
 def test_bad_input_is_named() -> None:
     graph, size, position, yaw = bedroom()
     with pytest.raises(ValueError, match=r"6 boxes for a graph of 7 objects"):
-        repair(graph, boxes(size[:6], position[:6], yaw[:6]))
+        place(graph, boxes(size[:6], position[:6], yaw[:6]))
     position[2, 0] = np.nan
     with pytest.raises(ValueError, match=r"box 2 \(nightstand\) is not finite"):
-        repair(graph, boxes(size, position, yaw))
+        place(graph, boxes(size, position, yaw))
     with pytest.raises(ValueError, match="not a floor"):
-        repair_boxes(
+        place_boxes(
             ["bed"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3)), floor_polygon=np.zeros((4, 2))
         )
 
@@ -279,7 +279,7 @@ def test_fixed_boxes_without_relations_stay_where_they_are() -> None:
     for count in (1, 2):
         graph = SceneGraph(RoomSpec("bedroom"), nodes[:count])
         fixed = boxes(*([getattr(n, field) for n in nodes[:count]] for field in ("size", "position", "yaw")))
-        found = repair(graph, fixed)
+        found = place(graph, fixed)
         assert torch.equal(found.boxes.position, fixed.position)
         assert torch.equal(found.boxes.size, fixed.size)
 
@@ -287,7 +287,7 @@ def test_fixed_boxes_without_relations_stay_where_they_are() -> None:
 def test_a_category_that_the_vocabulary_does_not_hold_is_refused():
     """Formerly it silently stood on the floor like a cabinet."""
     with pytest.raises(UnknownWord, match="unknown category 'wardrob': did you mean wardrobe"):
-        repair_boxes(["wardrob"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3), int))
+        place_boxes(["wardrob"], np.ones((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((0, 3), int))
 
 
 def test_who_may_reach_into_whom():
@@ -308,8 +308,8 @@ def test_two_beds_that_mirror_each_other_are_turned_alike() -> None:
         (Node("a", "single_bed"), Node("b", "single_bed")),
         (Relation("a", "symmetrical_to", "b"),),
     )
-    place = [(-1.1, 0, -1.2), (-1.1, 0, 1.2)]
-    done = repair(graph, boxes([(1.0, 0.5, 2.0)] * 2, place, [np.pi / 2, 0.0]))
+    stand = [(-1.1, 0, -1.2), (-1.1, 0, 1.2)]
+    done = place(graph, boxes([(1.0, 0.5, 2.0)] * 2, stand, [np.pi / 2, 0.0]))
     assert not done.broken
     turn = done.boxes.yaw.numpy()
     images = (-turn[0], np.pi - turn[0])
@@ -332,9 +332,9 @@ def test_the_depth_of_points_is_their_distance_to_the_border(corners: np.ndarray
 
 def test_a_nightstand_touches_its_bed_at_most() -> None:
     size, position = np.array([[1.8, 1.0, 2.1], [0.5, 0.5, 0.4]]), np.array([[0, 0, -0.7], [1.12, 0, -1.55]], float)
-    done = repair_boxes(
+    done = place_boxes(
         ["double_bed", "nightstand"], size, position, np.zeros(2), np.zeros((0, 3)), floor_polygon=FLOOR, height=2.7,
-        config=RepairConfig(arrange=False),
+        config=PlaceConfig(arrange=False),
     )  # fmt: skip
     assert separation(done.size, done.position, done.yaw, np.array([(0, 1)]))[0] > -0.001
 
@@ -346,6 +346,6 @@ def test_what_cannot_be_met_never_leaves_the_room(word):
     position = np.array([(0.0, 0.0, 0.0), (0.2, 2.0, 0.3)])
     floor = np.array([(-2, -2), (2, -2), (2, 2), (-2, 2.0)])
     told = np.array([(0, ids["above"], 1)])  # the bed above the lamp
-    done = repair_boxes(["double_bed", word], size, position, np.zeros(2), told, floor_polygon=floor, height=2.6)
+    done = place_boxes(["double_bed", word], size, position, np.zeros(2), told, floor_polygon=floor, height=2.6)
     assert (done.position[:, 1] >= 0).all()
     assert (done.position[:, 1] + done.size[:, 1] <= 2.6 + 1e-6).all()

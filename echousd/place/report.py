@@ -1,4 +1,4 @@
-"""What a repaired room still gets wrong: collisions, objects outside, and the demands that contradict each other."""
+"""What a placed room still gets wrong: collisions, objects outside, and the demands that contradict each other."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from echomodel.objective.support import allowed_overlap
-from echousd.repair.constraints import COLLISION, FLOOR, RELATION
-from echousd.repair.geometry import floor_rows, separation
-from echousd.repair.problem import Problem
-from echousd.repair.solver import Solution
+from echousd.place.constraints import COLLISION, FLOOR, RELATION
+from echousd.place.geometry import floor_rows, separation
+from echousd.place.problem import Problem
+from echousd.place.solver import Solution
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph

@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.objective.plan import kind_of
 from echomodel.vocabulary import vocabulary
-from echousd.repair.distances import BED_LIT
+from echousd.place.distances import BED_LIT
 
 OVER = 0.15  # metres between the middles of a lamp and of the table that it hangs over
 

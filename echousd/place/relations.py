@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.vocabulary import Predicate, vocabulary
-from echousd.repair.footprints import (
+from echousd.place.footprints import (
     FIRST,
     PLAN,
     SECOND,
@@ -28,7 +28,7 @@ from echousd.repair.footprints import (
     pairs_of,
     penetration,
 )
-from echousd.repair.geometry import COLUMNS, axes
+from echousd.place.geometry import COLUMNS, axes
 
 if TYPE_CHECKING:
     from echomodel.rules.sets import RuleSet

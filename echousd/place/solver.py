@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
-from echousd.repair.constraints import (
+from echousd.place.constraints import (
     CEILING,
     COLLISION,
     FLOOR,
@@ -30,12 +30,12 @@ from echousd.repair.constraints import (
     linearise,
     stacked_rows,
 )
-from echousd.repair.geometry import COLUMNS
-from echousd.repair.problem import Posed
+from echousd.place.geometry import COLUMNS
+from echousd.place.problem import Posed
 
 
 @dataclass(frozen=True)
-class RepairConfig:
+class PlaceConfig:
     """How far and how hard boxes are pushed.
 
     Arguments:
@@ -92,7 +92,7 @@ class Solution:
     rounds: int
 
 
-def solve(start: Posed, config: RepairConfig) -> Solution:
+def solve(start: Posed, config: PlaceConfig) -> Solution:
     """Move and size boxes until the constraints hold; the best attempt where they cannot all hold."""
     handicap = start.problem.handicap.copy()
     best: Solution | None = None
@@ -116,7 +116,7 @@ def solve(start: Posed, config: RepairConfig) -> Solution:
     return best
 
 
-def _descend(start: Posed, handicap: np.ndarray, through: int, config: RepairConfig) -> Solution:
+def _descend(start: Posed, handicap: np.ndarray, through: int, config: PlaceConfig) -> Solution:
     problem, n = start.problem, len(start.size)
     free = np.stack([~problem.fixed] * 3 + [~problem.rigid] * 3, 1).ravel()
     weight = np.tile([config.move**-2] * 3 + [config.stretch**-2] * 3, n)[free]

@@ -1,4 +1,4 @@
-"""What a graph says of the places of single objects, as constraints of the repair and as the cost of a pose."""
+"""What a graph says of the places of single objects, as constraints of placing and as the cost of a pose."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echousd.graph import SceneGraph
-from echousd.repair.geometry import COLUMNS
+from echousd.place.geometry import COLUMNS
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Spread, Stated, Walls

@@ -1,10 +1,10 @@
-"""Repair of noisy rooms: relations kept, pairs colliding, time per room.
+"""Noisy rooms placed: relations kept, pairs colliding, time per room.
 
-    python benchmarks/repair.py ROOMS.json [--noise 0.1 0.2 0.4] [--drop 0.5] [--limit N] [--rules strict] [--seed 0]
+    python benchmarks/shaken.py ROOMS.json [--noise 0.1 0.2 0.4] [--drop 0.5] [--limit N] [--rules strict] [--seed 0]
 
 ROOMS.json is any rooms file (`echousd data build`, or one of your own in the same form). Every room is labelled by the
 rules as it is, then its boxes get Gaussian noise (metres on positions, 10 % on sizes, 3 degrees on yaw) and are
-repaired. `clean` is the labelled room itself, by the same measures. Times are CPU times on one core.
+placed. `clean` is the labelled room itself, by the same measures. Times are CPU times on one core.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_relations, margins
 from echomodel.vocabulary import vocabulary
-from echousd.repair import repair_boxes
-from echousd.repair.geometry import separation
+from echousd.place import place_boxes
+from echousd.place.geometry import separation
 
 
 def noisy(room: RoomBoxes, noise: float, rng: np.random.Generator) -> RoomBoxes:
@@ -63,12 +63,12 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
         triplets = label_relations(room, rules=arguments.rules, drop=arguments.drop, rng=rng)
         start = noisy(room, noise, rng)
         begun = time.process_time()
-        done = repair_boxes(
+        done = place_boxes(
             room.categories, start.size, start.position, start.yaw, triplets,
             floor_polygon=room.floor_polygon, height=room.height, rules=arguments.rules,
         )  # fmt: skip
         seconds.append(time.process_time() - begun)
-        clean = repair_collisions(room)
+        clean = collisions_of(room)
         judged = done.verdict >= 0
         begun = time.process_time()
         tensors = (torch.as_tensor(v, dtype=torch.float32) for v in (start.size, start.position, start.yaw))
@@ -93,11 +93,11 @@ def report(rooms: list[RoomBoxes], noise: float, arguments: argparse.Namespace) 
     )
 
 
-def repair_collisions(room: RoomBoxes) -> int:
-    """Pairs that collide in a room as it is, by the repair's own measure."""
+def collisions_of(room: RoomBoxes) -> int:
+    """Pairs that collide in a room as it is, by placing's own measure."""
     from echomodel.objective.support import allowed_overlap
-    from echousd.repair.problem import pose
-    from echousd.repair.report import TOUCH
+    from echousd.place.problem import pose
+    from echousd.place.report import TOUCH
 
     none = np.zeros(len(room), bool)
     problem = pose(

@@ -1,4 +1,4 @@
-"""Repair: move and size sampled boxes as little as possible until the room keeps its graph and nothing collides."""
+"""Placing: move and size sampled boxes as little as possible until the room keeps its graph and nothing collides."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from echomodel.objective.sizes import (
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
-from echousd.repair.overhead import lamps_along
-from echousd.repair.placements import stated_placements
-from echousd.repair.problem import Posed, pose, stacked
-from echousd.repair.relations import relation_margins
-from echousd.repair.report import Conflict, collisions, conflicts, outside, sentence
-from echousd.repair.search import Arranged, Search
-from echousd.repair.setting import setting_of
-from echousd.repair.solver import RepairConfig, solve, violation
+from echousd.place.overhead import lamps_along
+from echousd.place.placements import stated_placements
+from echousd.place.problem import Posed, pose, stacked
+from echousd.place.relations import relation_margins
+from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
+from echousd.place.search import Arranged, Search
+from echousd.place.setting import setting_of
+from echousd.place.solver import PlaceConfig, solve, violation
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
@@ -46,7 +46,7 @@ DEFAULT_HEIGHT = 2.8
 
 
 @dataclass(frozen=True, eq=False)
-class RepairedBoxes:
+class PlacedBoxes:
     """What became of the boxes of one room.
 
     Arguments:
@@ -71,8 +71,8 @@ class RepairedBoxes:
 
 
 @dataclass(frozen=True, eq=False)
-class RepairResult:
-    """The repaired room in the words of its graph.
+class PlaceResult:
+    """The placed room in the words of its graph.
 
     Arguments:
         boxes: N boxes in the order of the graph's nodes.
@@ -95,10 +95,8 @@ class RepairResult:
     seconds: float
 
 
-def repair(
-    graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: RepairConfig | None = None
-) -> RepairResult:
-    """Repair the sampled boxes of a graph: see `repair_boxes`.
+def place(graph: SceneGraph, boxes: Boxes, *, rules: str = "strict", config: PlaceConfig | None = None) -> PlaceResult:
+    """Place the sampled boxes of a graph: see `place_boxes`.
 
     Nodes that are locked or have a position stay where they are, nodes with a size keep it, nodes with a yaw keep it.
 
@@ -108,7 +106,7 @@ def repair(
         rules: `strict` or `sgfront`.
 
     Raises:
-        ValueError: as `repair_boxes`, or another number of boxes than nodes.
+        ValueError: as `place_boxes`, or another number of boxes than nodes.
     """
     import torch
 
@@ -121,7 +119,7 @@ def repair(
     triplets = np.array(
         [(index[r.subject], words.predicate_id(r.predicate), index[r.object]) for r in graph.relations], int
     ).reshape(-1, 3)
-    done = repair_boxes(
+    done = place_boxes(
         [node.category for node in nodes],
         np.asarray(boxes.size, float),
         np.asarray(boxes.position, float),
@@ -141,7 +139,7 @@ def repair(
     by_verdict = {
         v: tuple(r for r, found in zip(graph.relations, done.verdict, strict=True) if found == v) for v in (1, 0, -1)
     }
-    return RepairResult(
+    return PlaceResult(
         boxes=Boxes(
             torch.as_tensor(done.size, dtype=torch.float32),
             torch.as_tensor(done.position, dtype=torch.float32),
@@ -169,7 +167,7 @@ def floor_of_room(room: RoomSpec) -> np.ndarray | None:
     return np.array([(-x, -z), (x, -z), (x, z), (-x, z)])
 
 
-def repair_boxes(
+def place_boxes(
     categories: Sequence[str],
     size: np.ndarray,
     position: np.ndarray,
@@ -184,8 +182,8 @@ def repair_boxes(
     openings: Sequence[Opening] = (),
     stated: tuple[Stated, ...] = (),
     rules: str = "strict",
-    config: RepairConfig | None = None,
-) -> RepairedBoxes:
+    config: PlaceConfig | None = None,
+) -> PlacedBoxes:
     """Move and size boxes as little as possible until relations, collisions, floor, walls and support are right.
 
     Arguments:
@@ -218,7 +216,7 @@ def repair_boxes(
     triplets = np.asarray(triplets, int).reshape(-1, 3)
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
-    config = config or RepairConfig()
+    config = config or PlaceConfig()
 
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
@@ -283,7 +281,7 @@ def repair_boxes(
         {pair for pair, _ in hit},
         {number for number, _ in beyond},
     )
-    return RepairedBoxes(
+    return PlacedBoxes(
         size=size_end,
         position=end,
         yaw=turn,

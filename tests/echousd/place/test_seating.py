@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from echousd.repair import repair_boxes
+from echousd.place import place_boxes
 
 FLOOR = np.array([(-2.5, -2.5), (2.5, -2.5), (2.5, 2.5), (-2.5, 2.5)])
 CLOSE, FACING = 5, 16
 
 
 def laid(kinds, *, seed=0, told=()):
-    """A dining table with seats that were drawn anywhere, repaired; positions relative to the table's, turned to it."""
+    """A dining table with seats that were drawn anywhere, placed; positions relative to the table's, turned to it."""
     rng = np.random.default_rng(seed)
     size = np.array([(1.6, 0.75, 0.9), *((1.2, 0.45, 0.4) if k == "bench" else (0.5, 0.9, 0.5) for k in kinds)])
     position = np.array([(0.0, 0.0, 0.0), *((x, 0.0, z) for x, z in rng.uniform(-1.5, 1.5, (len(kinds), 2)))])
-    done = repair_boxes(
+    done = place_boxes(
         ["dining_table", *kinds], size, position, np.zeros(len(size)), np.array(told, int).reshape(-1, 3),
         floor_polygon=FLOOR, height=2.6,
     )  # fmt: skip

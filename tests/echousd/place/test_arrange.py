@@ -1,4 +1,4 @@
-"""The discrete stage of the repair: rooms that no least movement would put right."""
+"""The discrete stage of the place: rooms that no least movement would put right."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from echomodel.boxes import Boxes
 from echomodel.objective import faults
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
-from echousd.repair import RepairConfig, repair_boxes
-from echousd.repair.overhead import lamps_along
+from echousd.place import PlaceConfig, place_boxes
+from echousd.place.overhead import lamps_along
 
 FLOOR = np.array([(-2.2, -1.9), (2.2, -1.9), (2.2, 1.9), (-2.2, 1.9)])
 ID = {p.name: p.id for p in vocabulary().predicates}
@@ -30,12 +30,12 @@ def found(done, openings=()):
 
 
 def bedroom(**options):
-    """The shaken bedroom, repaired."""
-    return repair_boxes(BEDROOM, SIZE, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7, **options)
+    """The shaken bedroom, placed."""
+    return place_boxes(BEDROOM, SIZE, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7, **options)
 
 
-def test_no_layout_leaves_repair_with_a_crooked_wardrobe():
-    shaken = bedroom(config=RepairConfig(arrange=False))
+def test_no_layout_leaves_placing_with_a_crooked_wardrobe():
+    shaken = bedroom(config=PlaceConfig(arrange=False))
     assert {"parallel", "nightstand_at_head"} & set(found(shaken))
     done = bedroom()
     assert found(done) == []
@@ -71,22 +71,22 @@ def test_what_is_fixed_or_turned_by_hand_stays():
 
 def test_the_graph_comes_before_what_is_usual():
     stated = np.concatenate([TOLD[2:], [(1, ID["front"], 0), (2, ID["behind"], 0), (3, ID["left"], 0)]])
-    done = repair_boxes(BEDROOM, SIZE, POSITION, YAW, stated, floor_polygon=FLOOR, height=2.7)
+    done = place_boxes(BEDROOM, SIZE, POSITION, YAW, stated, floor_polygon=FLOOR, height=2.7)
     assert (done.verdict == 1).all()
 
 
 def test_sizes_that_no_such_furniture_has_are_mended():
     huge = SIZE.copy()
     huge[0], huge[4] = (2.9, 1.0, 3.1), (1.8, 1.4, 1.8)
-    done = repair_boxes(BEDROOM, huge, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7)
+    done = place_boxes(BEDROOM, huge, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7)
     assert done.size[0].max() < 2.6
     assert done.size[4].max() < 1.3
-    rigid = repair_boxes(BEDROOM, huge, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7, rigid=np.ones(6, bool))
+    rigid = place_boxes(BEDROOM, huge, POSITION, YAW, TOLD, floor_polygon=FLOOR, height=2.7, rigid=np.ones(6, bool))
     assert np.array_equal(rigid.size, huge)
 
 
 def test_a_piece_whose_places_are_all_far_fetched() -> None:
-    """An L-shaped sofa with its pendant told, from a room that once stopped the repair."""
+    """An L-shaped sofa with its pendant told, from a room that once stopped placing."""
     words = [
         "l_shaped_sofa",
         "coffee_table",
@@ -107,18 +107,16 @@ def test_a_piece_whose_places_are_all_far_fetched() -> None:
     yaw = [0.0, 0.0, 0.0, 1.57, -1.57, 1.57, -1.57]
     floor = np.array([[-3.25, 1.95], [3.25, 1.95], [3.25, -1.95], [-3.25, -1.95]])
     told = np.array([[4, 3, 5], [2, 6, 0], [1, 9, 0], [5, 8, 3]])
-    done = repair_boxes(words, np.array(size), np.array(position), np.array(yaw), told, floor_polygon=floor, height=2.7)
+    done = place_boxes(words, np.array(size), np.array(position), np.array(yaw), told, floor_polygon=floor, height=2.7)
     assert (done.verdict != 0).all()
 
 
 def arranged(words, size, position, yaw, told=(), half=2.4, **options):
-    """Position and yaw of each piece of a square room after repair."""
+    """Position and yaw of each piece of a square room after placing."""
     floor = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     triplets = np.array(told, int).reshape(-1, 3)
     sizes, places = np.array(size, float), np.array(position, float)
-    done = repair_boxes(
-        words, sizes, places, np.array(yaw, float), triplets, floor_polygon=floor, height=2.7, **options
-    )
+    done = place_boxes(words, sizes, places, np.array(yaw, float), triplets, floor_polygon=floor, height=2.7, **options)
     return done.position, done.yaw
 
 
@@ -164,11 +162,11 @@ def test_in_a_room_that_is_too_full_furniture_is_smaller():
     drawn = [(-0.3, 0, 0.2), (-1.4, 0, -1.2), (0.8, 0, -1.2), (1.3, 0, 1.2), (-1.0, 0, 1.4), (1.2, 0, -0.4)]
     floor = np.array([(-1.8, -1.7), (1.8, -1.7), (1.8, 1.7), (-1.8, 1.7)])
     none = np.zeros((0, 3), int)
-    done = repair_boxes(words, np.array(size, float), np.array(drawn, float), np.zeros(6), none, floor_polygon=floor)
+    done = place_boxes(words, np.array(size, float), np.array(drawn, float), np.zeros(6), none, floor_polygon=floor)
     assert (done.size[:, [0, 2]] <= np.array(size)[:, [0, 2]] + 0.01).all()
     assert done.size[4, 0] < 2.2
     assert not done.collisions
-    stated = repair_boxes(
+    stated = place_boxes(
         words, np.array(size, float), np.array(drawn, float), np.zeros(6), none, floor_polygon=floor,
         rigid=np.ones(6, bool),
     )  # fmt: skip
@@ -188,9 +186,9 @@ def test_no_lamp_is_wider_than_what_it_hangs_over():
     words, size = ["side_table", "pendant_lamp"], np.array([(0.45, 0.5, 0.5), (1.06, 0.9, 0.8)])
     drawn = np.array([(0.3, 0, -1.2), (0.3, 1.7, -1.2)]), np.zeros(2)
     told = np.array([(1, ID["above"], 0)])
-    done = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7)
+    done = place_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7)
     assert done.size[1, 0] == done.size[1, 2] == pytest.approx(0.45, abs=0.01)
-    kept = repair_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7, rigid=np.ones(2, bool))
+    kept = place_boxes(words, size, *drawn, told, floor_polygon=FLOOR, height=2.7, rigid=np.ones(2, bool))
     assert kept.size[1, 0] == 1.06
 
 
@@ -204,10 +202,10 @@ def test_a_second_sofa_leaves_the_view_to_the_screen_that_the_first_is_told_to_w
 
 
 def hall(words, size, position, yaw, told):
-    """Furniture of a hall of 9 by 7 metres, repaired, and its living faults."""
+    """Furniture of a hall of 9 by 7 metres, placed, and its living faults."""
     floor = np.array([(-4.5, -3.5), (4.5, -3.5), (4.5, 3.5), (-4.5, 3.5)])
     triplets = np.array([(a, ID[word], b) for a, word, b in told])
-    done = repair_boxes(words, np.array(size), np.array(position), np.array(yaw), triplets, floor_polygon=floor)
+    done = place_boxes(words, np.array(size), np.array(position), np.array(yaw), triplets, floor_polygon=floor)
     return done, [fault.rule for fault in faults(done, words, floor, (), triplets)]
 
 
@@ -264,7 +262,7 @@ def test_a_screen_stands_on_its_carrier_as_that_does(carrier, turn):
     kinds = ["double_bed", carrier, "tv"]
     size = np.array([(1.7, 1.0, 2.1), (0.9, 0.8, 0.42), (1.2, 0.9, 0.1)])
     position = np.array([(-0.5, 0, 0.2), (1.2, 0, 0.9), (1.5, 0.8, 0.4)])
-    done = repair_boxes(
+    done = place_boxes(
         kinds, size, position, np.array([1.4, 2.7, turn]), np.array([(2, ID["standing_on"], 1)]), floor_polygon=FLOOR,
         height=2.7,
     )  # fmt: skip

@@ -12,10 +12,10 @@ from echomodel.objective.sight import WATCHED_FROM
 from echomodel.objective.support import ON_CEILING
 from echomodel.objective.walls import PASSAGE
 from echomodel.vocabulary import vocabulary
-from echousd.repair.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
-from echousd.repair.geometry import Floor, depth_inside
-from echousd.repair.setting import Setting
-from echousd.repair.slots import INNER, STANDS
+from echousd.place.distances import APART, MOST_UNDER, kept_apart, over_bed, seen_from, spread_at_walls
+from echousd.place.geometry import Floor, depth_inside
+from echousd.place.setting import Setting
+from echousd.place.slots import INNER, STANDS
 
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall

@@ -13,10 +13,10 @@ from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
-from echousd.repair import repair_boxes
-from echousd.repair.problem import pose
-from echousd.repair.search import PRICE, Search, State, price
-from echousd.repair.setting import setting_of
+from echousd.place import place_boxes
+from echousd.place.problem import pose
+from echousd.place.search import PRICE, Search, State, price
+from echousd.place.setting import setting_of
 
 ID = {row.name: row.id for row in vocabulary().predicates}
 FLOOR = np.array([(-2.5, -2.0), (2.5, -2.0), (2.5, 2.0), (-2.5, 2.0)])
@@ -152,7 +152,7 @@ def test_a_lamp_that_is_told_the_impossible_stays_in_the_room():
     words = ["coffee_table", "pendant_lamp"]
     size, drawn = np.array([(1.0, 0.4, 0.6), (0.5, 0.9, 0.5)]), np.array([(0.0, 0, 0), (0.2, 0.2, 0.1)])
     told = np.array([(1, ID["shorter_than"], 0), (1, ID["close_by"], 0)])
-    done = repair_boxes(words, size, drawn, np.zeros(2), told, floor_polygon=FLOOR, height=2.7)
+    done = place_boxes(words, size, drawn, np.zeros(2), told, floor_polygon=FLOOR, height=2.7)
     assert done.position[:, 1].min() >= 0.0
     assert (done.position[:, 1] + done.size[:, 1]).max() <= 2.7 + 1e-6
 

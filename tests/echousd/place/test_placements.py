@@ -1,4 +1,4 @@
-"""Placements that a graph states are kept by the repair and judged by verdicts and check."""
+"""Placements that a graph states are kept by placing and judged by verdicts and check."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from echomodel.boxes import Boxes
 from echousd.checks import check
 from echousd.graph import Node, Relation, RoomSpec, SceneGraph
 from echousd.make.verdicts import relation_verdicts
-from echousd.repair import repair
-from echousd.repair.placements import placement_rows, stated_placements
+from echousd.place import place
+from echousd.place.placements import placement_rows, stated_placements
 
 ROOM = RoomSpec("living_room", size=(4.6, 4.0), height=2.7)
 KINDS = {"sofa": "sofa", "armchair": "armchair", "table": "side_table", "plant": "plant", "board": "dining_table"}
@@ -32,16 +32,16 @@ def drawn(seed: int) -> Boxes:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_repair_puts_things_where_the_graph_says(seed):
+def test_placing_puts_things_where_the_graph_says(seed):
     graph = graph_of(
         plant={"place": "in_corner"}, board={"place": "against_wall"}, table={"between": ("sofa", "armchair")}
     )
-    states = [verdict.state for verdict in relation_verdicts(graph, repair(graph, drawn(seed)).boxes)]
+    states = [verdict.state for verdict in relation_verdicts(graph, place(graph, drawn(seed)).boxes)]
     assert states == ["kept"] * 4
 
 
 def test_without_placements_nothing_changes():
-    one, other = (repair(graph, drawn(0)).boxes for graph in (graph_of(), graph_of(plant={"title": "Farn"})))
+    one, other = (place(graph, drawn(0)).boxes for graph in (graph_of(), graph_of(plant={"title": "Farn"})))
     assert torch.equal(one.position, other.position)
 
 
@@ -77,8 +77,8 @@ def test_check_measures_placements(tmp_path):
     graph = graph_of(plant={"place": "in_corner"}, table={"between": ("sofa", "armchair")})
     boxes = drawn(1)
     for good in (True, False):
-        placed = repair(graph, boxes).boxes if good else boxes
-        room = echousd.generate(graph, shapes="boxes", boxes=placed, repair=False, walls=False, dress="none")
+        placed = place(graph, boxes).boxes if good else boxes
+        room = echousd.generate(graph, shapes="boxes", boxes=placed, place=False, walls=False, dress="none")
         root = room.save(tmp_path / str(good))
         found = {str(each.relation): each.kept for each in check(root).relations}
         assert found["plant in_corner"] is good

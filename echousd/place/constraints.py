@@ -10,10 +10,10 @@ import numpy as np
 from scipy import sparse
 
 from echomodel.objective.support import ON_CEILING, ON_FLOOR, allowed_overlap
-from echousd.repair.geometry import COLUMNS, Rows, axes, floor_rows, separation_rows, spread, spread_sparsely
-from echousd.repair.placements import placement_rows
-from echousd.repair.problem import Problem, wall_gaps
-from echousd.repair.relations import relation_margins
+from echousd.place.geometry import COLUMNS, Rows, axes, floor_rows, separation_rows, spread, spread_sparsely
+from echousd.place.placements import placement_rows
+from echousd.place.problem import Problem, wall_gaps
+from echousd.place.relations import relation_margins
 
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
 MANY = 60  # boxes beyond which constraints are sparse, and pairs far apart are none
