@@ -29,7 +29,7 @@ import yaml
 
 OBJECTS, ROOMS = 12, 64
 TYPES = ("bedroom", "living_room", "dining_room", "living_dining_room", "study")
-PARTS = ("start of Python", "imports", "load", "drafts", "denoising", "arranging", "solving", "judging", "rest")
+PARTS = ("start of Python", "imports", "load", "denoising", "arranging", "solving", "judging", "rest")
 LAYOUT = PARTS[3:]  # of a layout; the others are what any run needs
 
 
@@ -59,7 +59,7 @@ def parted() -> Iterator[dict[str, float]]:
         return call
 
     places = (
-        (sampling, "drafted", "drafts"), (sampling, "_denoised", "denoising"), (search.Search, "run", "arranging"),
+        (sampling, "sample_boxes", "denoising"), (search.Search, "run", "arranging"),
         (placing, "solve", "solving"), (living, "living_faults", "judging"), (layouts, "layout_outcome", "judging"),
     )  # fmt: skip
     kept = [(module, name, getattr(module, name)) for module, name, _ in places]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from echomodel.vocabulary import vocabulary
 
@@ -13,7 +13,7 @@ Prediction = Literal["output", "sample"]
 Sampler = Literal["ddim", "ancestral", "dpm2m"]
 DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
 RANGES = {  # of what costs no tensors, but time
-    "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100), "start": (0, 1),
+    "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100),
     "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "levels": (0, 1024), "patch": (1, 64),
 }  # fmt: skip
 C = TypeVar("C")
@@ -47,7 +47,6 @@ class LayoutConfig:
         sampler: default sampler.
         guidance: default step length of the relation guidance, 0 = off (see `echomodel.guidance`).
         guidance_rounds: its steps per call of the denoiser.
-        start: default level of noise at which sampling begins, on an arrangement by the room generator; 1 = on noise.
     """
 
     width: int = 192
@@ -60,7 +59,7 @@ class LayoutConfig:
     sampler: Sampler = "ancestral"
     guidance: float = 0.1
     guidance_rounds: int = 4
-    start: float = 1.0
+    GONE: ClassVar = ("start",)  # files of before name it: sampling could begin on an arrangement
 
 
 @dataclass(frozen=True)
@@ -207,7 +206,7 @@ def from_json(kind: type[C], text: str) -> C:
 
 
 def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
-    """A configuration from nested plain values; fields left out keep their defaults.
+    """A configuration from nested plain values; fields left out keep their defaults, those that are `GONE` say nothing.
 
     Raises:
         ValueError: a field is not known or its value has the wrong type.
@@ -218,6 +217,8 @@ def from_dict(kind: type[C], raw: dict[str, Any], where: str = "") -> C:
     values: dict[str, Any] = {}
     for name, value in raw.items():
         path = f"{where}.{name}" if where else name
+        if name in getattr(kind, "GONE", ()):
+            continue
         if name not in names:
             raise ValueError(f"unknown field {path!r}, allowed: {', '.join(names)}")
         values[name] = _typed(hints[name], value, path)

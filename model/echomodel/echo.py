@@ -113,7 +113,6 @@ class EchoModel:
         guidance: float = 1.0,
         relation_guidance: float | None = None,
         noise: Tensor | None = None,
-        start: float | None = None,
         progress: StepListener | None = None,
     ) -> Boxes:
         """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`.
@@ -129,10 +128,6 @@ class EchoModel:
             relation_guidance: strength of the pull of the rules' margins on the denoised boxes at every step, 0 = off,
                 None = the config's.
             noise: (N, 8) starting noise in place of the generator's.
-            start: level of noise at which sampling begins, on the room generator's arrangement of the same furniture
-                (`echomodel.drafts`), 0 = that arrangement, 1 = on noise alone, None = the config's. Sampling begins on
-                noise the more often the less of what is told the arrangement keeps, and where many relations are told,
-                boxes are known, or the floor is not.
             progress: called with (steps done, steps).
 
         Returns:
@@ -144,7 +139,7 @@ class EchoModel:
         graph = self._checked(graph)
         known, known_mask = known_values(graph, known, known_mask, self.device)
         by = Sampling(generator, steps, sampler, None, known_mask, guidance, progress)
-        how = LayoutSampling(by, rules, known, edit, relation_guidance, noise, start)
+        how = LayoutSampling(by, rules, known, edit, relation_guidance, noise)
         return sample_boxes(self.model, self.graph_latent, graph, how)
 
     @torch.no_grad()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import torch
 from torch import Tensor
@@ -26,15 +27,10 @@ class SceneGenerators:
             raise ValueError(f"{len(self.each)} generators for {len(self.nodes)} scenes, expected one each")
 
     @property
-    def shared(self) -> list[tuple[torch.Generator, int, int]]:
-        """Every generator with its scenes in a row and their nodes, as (generator, scenes, nodes)."""
-        out: list[tuple[torch.Generator, int, int]] = []
-        for generator, nodes in zip(self.each, self.nodes, strict=True):
-            if out and out[-1][0] is generator:
-                out[-1] = (generator, out[-1][1] + 1, out[-1][2] + nodes)
-            else:
-                out.append((generator, 1, nodes))
-        return out
+    def shared(self) -> list[tuple[torch.Generator, int]]:
+        """Every generator with the nodes of its scenes in a row."""
+        rows = groupby(zip(self.each, self.nodes, strict=True), key=lambda row: id(row[0]))
+        return [(scenes[0][0], sum(nodes for _, nodes in scenes)) for scenes in (list(row) for _, row in rows)]
 
 
 Randomness = torch.Generator | SceneGenerators
@@ -57,29 +53,6 @@ def normal(
         raise ValueError(f"noise for {shape[0]} rows, expected a multiple of the pack's {total} nodes")
     drawn = [
         normal((draws * count, *rest), generator, device, dtype).reshape(draws, count, *rest)
-        for generator, _, count in source.shared
+        for generator, count in source.shared
     ]
     return torch.cat(drawn, dim=1).reshape(shape[0], *rest)
-
-
-def for_scenes(source: Randomness, chosen: Tensor) -> Randomness:
-    """The generators of the scenes where `chosen` (S,) bool is true; a single generator serves all."""
-    if isinstance(source, torch.Generator):
-        return source
-    kept = [number for number, wanted in enumerate(chosen.tolist()) if wanted]
-    return SceneGenerators([source.each[k] for k in kept], [source.nodes[k] for k in kept])
-
-
-def uniform(scenes: int, source: Randomness) -> Tensor:
-    """(S,) float32 in [0, 1), one for each scene."""
-    if isinstance(source, torch.Generator):
-        return torch.rand(scenes, generator=source)
-    return torch.cat([torch.rand(count, generator=generator) for generator, count, _ in source.shared])
-
-
-def whole_numbers(source: Randomness, scenes: int) -> list[tuple[int, int]]:
-    """A seed for each scene: its number within the draw of its generator, and that draw of up to 2^62."""
-    if isinstance(source, torch.Generator):
-        seed = int(torch.randint(2**62, (1,), generator=source))
-        return [(seed, number) for number in range(scenes)]
-    return [pair for generator, count, _ in source.shared for pair in whole_numbers(generator, count)]

@@ -14,11 +14,10 @@ import torch
 from torch import Tensor
 
 from echomodel.config import Objective, Sampler
-from echomodel.objectives import add_noise, alpha_sigma, expand, sampling_levels
+from echomodel.objectives import alpha_sigma, expand, sampling_levels
 from echomodel.progress import StepListener
 from echomodel.randomness import Randomness, normal
 
-FEWEST = 4  # steps from a draft
 Predict = Callable[[Tensor, Tensor], Tensor]
 Step = Callable[[Tensor, Tensor, float, float], Tensor]
 
@@ -85,32 +84,21 @@ def sample(
     known_mask: Tensor | None = None,
     generator: Randomness | None = None,
     progress: StepListener | None = None,
-    draft: Tensor | None = None,
-    start: float = 1.0,
 ) -> Tensor:
     """Run a sampler by name.
 
     Arguments:
         x: (N, ...) start, standard normal noise.
-        draft, start: (N, ...) samples to begin with in place of nothing, and the level up to which they are drowned in
-            the noise (SDEdit, Meng et al. 2022); of the steps the share `start` is taken.
         known, known_mask: (N, ...) values and (N,) bool, nodes that keep their values from first to last.
         generator: source of the noise that `ancestral` adds.
         progress: called with (steps done, steps) after every step.
 
     Raises:
-        ValueError: the sampler is not known, steps < 1, or `start` is not in [0, 1].
+        ValueError: the sampler is not known, or steps < 1.
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
-    if not 0 <= start <= 1:
-        raise ValueError(f"start is {start}, allowed: 0 to 1")
     levels = sampling_levels(steps)
-    if draft is not None and start == 0:
-        return draft
-    if draft is not None and start < 1:
-        levels = sampling_levels(max(FEWEST, round(steps * start))) * start
-        x = add_noise(draft, x, torch.full((len(x),), start, dtype=x.dtype, device=x.device), objective)
     return _march(SAMPLERS[sampler](objective, generator), predict, x, levels, known, known_mask, progress)
 
 

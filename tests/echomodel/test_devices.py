@@ -90,7 +90,7 @@ def sampled(model: CompactModel, rooms, device) -> list[torch.Tensor]:
     boxes = echo.sample_layout(
         graph, generator=torch.Generator().manual_seed(1), known=Boxes.from_room(rooms[0]), known_mask=known, **told
     )
-    free = echo.sample_layout(graph, generator=torch.Generator().manual_seed(2), start=0.5)
+    free = echo.sample_layout(graph, generator=torch.Generator().manual_seed(2))
     grids = echo.sample_shapes(graph, boxes, generator=torch.Generator().manual_seed(3), **told)
     pieces = echo.sample_furniture(
         graph, boxes, generator=torch.Generator().manual_seed(4), known=torch.zeros(graph.num_nodes, WIDTH),

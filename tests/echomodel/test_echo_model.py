@@ -58,31 +58,6 @@ def boxes(count: int = 3) -> Boxes:
     return Boxes(torch.ones(count, 3), torch.zeros(count, 3), torch.zeros(count))
 
 
-def test_layouts_begin_on_a_draft_where_one_helps(model: EchoModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    dense = GraphBatch.single(
-        [14, 23, 23], [[i, p, j] for i in range(3) for j in range(3) if i != j for p in (1, 3, 8)], floor=(4.0, 3.0)
-    )
-    plain, unknown = bedroom(), GraphBatch.single([14, 23])
-    packed = GraphBatch.pack([plain, dense, plain])
-    asked: list[int] = []
-
-    def draft(graph: GraphBatch, generator: torch.Generator, *, rules: str) -> tuple[Boxes, Tensor]:
-        asked.append(graph.num_scenes)
-        return boxes(graph.num_nodes), torch.tensor([1.0, 0.0])[: graph.num_scenes]
-
-    monkeypatch.setattr("echomodel.drafts.drafted", draft)
-    found = model.sample_layout(packed, generator=seeded(), start=0.0)
-    assert asked == [2]  # the dense graph is not drafted
-    assert torch.equal(found.position[:3], torch.zeros(3, 3))  # start 0: the draft itself
-    assert (found.position[6:] != 0).any()  # a draft that keeps nothing of what is told is left
-    noise = model.sample_layout(dense, generator=seeded(), start=1.0)
-    assert torch.equal(model.sample_layout(dense, generator=seeded(), start=0.1).position, noise.position)
-    model.sample_layout(unknown, generator=seeded(), start=0.1)
-    mask = torch.tensor([True, False, False])
-    model.sample_layout(plain, generator=seeded(), start=0.1, known=boxes(), known_mask=mask)
-    assert asked == [2]
-
-
 def test_equal_seeds_give_equal_bits(model: EchoModel) -> None:
     runs = [model.sample_layout(bedroom(), generator=seeded(seed)) for seed in (1, 1, 2)]
     assert torch.equal(runs[0].position, runs[1].position)

@@ -11,7 +11,9 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
+from echomodel.config import CompactConfig, from_dict
 from echomodel.echo import EchoModel
+from echomodel.training.recipe import Recipe
 from echoscene.weights import load_released
 
 
@@ -82,3 +84,14 @@ def test_converted_weights_that_ask_for_more_than_they_hold(tmp_path, part, fiel
     )  # fmt: skip
     with pytest.raises(ValueError, match=r"bent\.safetensors: "):
         load_released(tmp_path / "bent.safetensors")
+
+
+def test_settings_that_are_gone_are_passed_over(layout, tmp_path):
+    metadata, tensors = layout
+    config = json.loads(metadata["config"])
+    config["layout"]["start"] = 0.05  # sampling could begin on an arrangement
+    save_file(tensors, tmp_path / "before.safetensors", metadata={**metadata, "config": json.dumps(config)})
+    assert EchoModel.load(tmp_path / "before.safetensors").config.layout == EchoModel.load().config.layout
+    assert from_dict(Recipe, {"stage": "layout", "steps": 1, "model": {"layout": {"start": 0.05}}}).model.layout
+    with pytest.raises(ValueError, match=r"unknown field 'layout\.begin'"):
+        from_dict(CompactConfig, {"layout": {"begin": 0.05}})

@@ -8,9 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from echomodel.boxes import Boxes
+from echomodel.openingrows import ROW, clearances, opening_rows
 from echomodel.openings import (
     Opening,
     check_openings,
@@ -165,3 +168,16 @@ def test_openings_of_rooms_come_back(tmp_path) -> None:
     write_rooms(tmp_path / "rooms.json", [room])
     assert read_rooms(tmp_path / "rooms.json")[0].openings == room.openings
     assert "openings" not in replace(room, openings=()).to_json()
+
+
+def test_clearances_know_doors_and_windows():
+    rows = opening_rows((door(offset=2.0), window()), ROOM)
+    assert rows.shape == (2, ROW)
+    middle, inward = (rows[0, :2] + rows[0, 2:4]) / 2, rows[0, 4:6]
+    places = torch.stack([middle + inward * away for away in (0.3, 2.5)])
+    position = torch.stack([places[:, 0], torch.zeros(2), places[:, 1]], 1)
+    boxes = Boxes(torch.full((2, 3), 0.3), position, torch.zeros(2))
+    clear = clearances(boxes, rows[None, :1].expand(2, -1, -1))
+    assert clear[0, 5] < 0 < clear[1, 5]
+    assert (clear[:, 10:] == 0).all()  # no window was told
+    assert (clearances(boxes, torch.zeros(2, 0, ROW)) == 0).all()

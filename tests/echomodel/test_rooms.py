@@ -7,12 +7,9 @@ from shapely.geometry import Polygon, box
 
 from echomodel.metrics.layout_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures
-from echomodel.openingrows import ROW
 from echomodel.rooms import generate_room, generate_rooms
-from echomodel.rooms.arranging import arranged
 from echomodel.rooms.builder import Item, overlaps
 from echomodel.rooms.floor import sample_floor
-from echomodel.rooms.outline import floor_of
 from echomodel.rooms.recipes import SOFA_KINDS
 from echomodel.rooms.statistics import room_requests, room_statistics, room_type_statistics
 from echomodel.sizes import size_score
@@ -181,10 +178,3 @@ def test_a_share_of_halls_leaves_the_other_rooms_alone():
     plain, mixed = generate_rooms(40, 2), generate_rooms(40, 2, halls=0.2)
     same = [a.to_json() == b.to_json() for a, b in zip(plain, mixed, strict=True)]
     assert 0.5 < np.mean(same) < 1.0
-
-
-def test_two_beds_get_their_own_nightstands():
-    floor = floor_of(np.array([(-4, -3), (4, -3), (4, 3), (-4, 3)]), np.zeros((0, ROW)))
-    words = ("double_bed", "single_bed", "nightstand", "nightstand", "nightstand", "nightstand")
-    found = [arranged(words, "bedroom", floor, np.random.default_rng(seed)) for seed in range(6)]
-    assert np.mean([placed.mean() for *_, placed in found]) > 0.8

@@ -13,8 +13,10 @@ from shapely.geometry import Polygon, box
 
 from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
+from echomodel.rules.telling import told_relations
 from echomodel.vocabulary import vocabulary
 
 FIXTURE = Path(__file__).parent / "fixtures" / "metrics_constraints.safetensors"
@@ -261,3 +263,14 @@ def test_rigid_margins_pull_at_sizes_for_sizes_alone(rules):
     assert pull(found[~of_size], boxes.size) == 0
     assert pull(found[of_size], boxes.size) > 0
     assert pull(found[~of_size], boxes.position) > 0
+
+
+def test_what_is_told_is_near_and_grows():
+    for room in generate_rooms(8, seed=71):
+        edges = torch.from_numpy(label_relations(room))
+        few, many = (told_relations(edges, room, per, torch.Generator().manual_seed(0)) for per in (0.5, 2.0))
+        assert len(few) == round(0.5 * len(room))
+        assert len(few) <= len(many) <= 2 * len(room)
+        assert {tuple(row) for row in few.tolist()} <= {tuple(row) for row in edges.tolist()}
+        pairs = {frozenset(row[::2]) for row in few.tolist()}
+        assert len(pairs) == len(few)  # one relation for each pair

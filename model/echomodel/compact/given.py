@@ -43,20 +43,11 @@ class Sampling:
     guidance: float = 1.0
     progress: StepListener | None = None
 
-    def denoised(
-        self,
-        predict: Predict,
-        noise: Tensor,
-        settings: SamplerSettings,
-        *,
-        draft: Tensor | None = None,
-        start: float = 1.0,
-    ) -> Tensor:
+    def denoised(self, predict: Predict, noise: Tensor, settings: SamplerSettings) -> Tensor:
         """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
         return sample(
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
             known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
-            draft=draft, start=start,
         )  # fmt: skip
 
 

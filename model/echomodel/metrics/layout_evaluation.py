@@ -13,7 +13,6 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable, seen_from, wall_features
-from echomodel.drafts import drafted
 from echomodel.floors import centred
 from echomodel.graph import GraphBatch
 from echomodel.metrics.room_figures import room_figures, with_known_words
@@ -68,7 +67,7 @@ class LayoutEvaluation:
         complete: also score with half of the true boxes given.
         contradictions: keep what contradicts a changed relation, as the published evaluation does.
         scenes: scenes in a batch.
-        judge: also let a judge tell the layouts, and the room generator's, from the true ones.
+        judge: also let a judge tell the layouts from the true ones.
         drafts: layouts of each room that are finished at most, of which the best is kept.
         seeds: of `VARIED` rooms, spread over all of them, layouts to compare with one another; 0 = none.
     """
@@ -110,7 +109,7 @@ def evaluate_layout(
         predicate and group, for edits also of the triplets that touch an edited (or free) node and of the others;
         `sizes`: rows per class and axis; `figures` and `real_figures`: collisions, outside floor, pairs, walls, in the
         form of `room_statistics.json`; with `told` also `living` and `real_living` (`living_evaluation.living_scores`);
-        `judge`: how often it is right about the layouts and about the generator's; `variety`, see `variety_scores`.
+        `judge`: how often it is right about the layouts; `variety`, see `variety_scores`.
     """
     rooms = [room for room in with_known_words(rooms) if len(room) > 1]
     if not rooms:
@@ -148,9 +147,7 @@ def evaluate_layout(
         told = [graph.triplets.numpy() for graph in graphs]
         out["living"], out["real_living"] = living_scores(drawn, told), living_scores(rooms, told)
     if settings.judge:
-        bare = GraphBatch.pack([graph.with_triplets(graph.triplets[:0]) for graph in graphs])
-        arranged, _ = drafted(bare, torch.Generator().manual_seed(settings.seed), rules=settings.rules)
-        out["judge"] = {"here": judged(rooms, drawn), "generator": judged(rooms, _rooms_of(rooms, bare, arranged))}
+        out["judge"] = {"here": judged(rooms, drawn)}
     if settings.seeds:
 
         def boxes_of(graph: GraphBatch) -> Boxes:
@@ -158,7 +155,7 @@ def evaluate_layout(
             return sample(EditedGraph(graph, None, none, none))
 
         some = [graphs[number * len(graphs) // VARIED] for number in range(VARIED)] if len(graphs) > VARIED else graphs
-        out["variety"] = variety_scores(some, boxes_of, settings.seeds, settings.rules)
+        out["variety"] = variety_scores(some, boxes_of, settings.seeds)
     return out
 
 
@@ -281,28 +278,17 @@ def _distributions(drawn: Sequence[RoomBoxes], rooms: Sequence[RoomBoxes]) -> di
     }
 
 
-def variety_scores(graphs: Sequence[GraphBatch], sample: Callable[[GraphBatch], Boxes], seeds: int, rules: str) -> dict:
-    """Mean distance between layouts of one graph (`layout_distance`), and of arrangements that are told nothing.
+def variety_scores(graphs: Sequence[GraphBatch], sample: Callable[[GraphBatch], Boxes], seeds: int) -> dict:
+    """Mean distance between layouts of one graph (`layout_distance`).
 
     Arguments:
         graphs: of one scene each. sample: boxes of packed scenes. seeds: layouts of each graph.
-        rules: the rule set that the relations are meant in.
 
     Returns:
-        `here`, `generator`: metres; `ratio` of the two; `rooms` (those with a floor), `seeds`: how many.
+        `here`: metres; `rooms`, `seeds`: how many.
     """
-    here, generator = [], []
-    luck = torch.Generator().manual_seed(0)
-    for graph in graphs:
-        if not bool(torch.isfinite(graph.floor[0, 0]).all()):
-            continue
-        here.append(variety(sample(GraphBatch.pack([graph] * seeds)), graph, seeds))
-        bare = GraphBatch.pack([graph.with_triplets(graph.triplets[:0])] * seeds)
-        generator.append(variety(drafted(bare, luck, rules=rules, draws=1)[0], graph, seeds))
-    if not here:
-        return {"rooms": 0, "seeds": seeds}
-    means = float(np.mean(here)), float(np.mean(generator))
-    return {"here": means[0], "generator": means[1], "ratio": means[0] / means[1], "rooms": len(here), "seeds": seeds}
+    here = [variety(sample(GraphBatch.pack([graph] * seeds)), graph, seeds) for graph in graphs]
+    return {"here": float(np.mean(here)), "rooms": len(here), "seeds": seeds}
 
 
 def variety(boxes: Boxes, graph: GraphBatch, count: int) -> float:

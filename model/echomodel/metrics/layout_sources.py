@@ -25,8 +25,8 @@ def model_layouts(
     extra: dict[str, Any] = {}
     if isinstance(model, EchoModel):
         extra = {"rules": rules, **asked}
-    elif asked != {"guidance": 1.0, "relation_guidance": None, "start": None}:
-        raise ValueError(f"--guidance, --relation-guidance and --start are for compact weights, found: {model.preset}")
+    elif asked != {"guidance": 1.0, "relation_guidance": None}:
+        raise ValueError(f"--guidance and --relation-guidance are for compact weights, found: {model.preset}")
     generator = torch.Generator().manual_seed(seed)
 
     def sample(edited: EditedGraph) -> Boxes:
