@@ -33,7 +33,9 @@ def measure(tree: Path) -> None:
     from echoscene.config import UNetConfig
     from echoscene.layout import LayoutNet
     from echousd.graph import load_graph
-    from echousd.stage import graph_layer, read_graph, save_layer
+    from echousd.stage.files import save_layer
+    from echousd.stage.graphs import read_graph
+    from echousd.stage.write import graph_layer
 
     try:
         from echoscene.compiled_layout import CompiledLayout

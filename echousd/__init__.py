@@ -21,7 +21,10 @@ if TYPE_CHECKING:
     from echousd.make.finished import Room
     from echousd.make.pipeline import generate
     from echousd.options import RoomOptions
-    from echousd.stage import read_dressing, read_graph, read_rooms, relations_from_boxes, update_graph, write_graph
+    from echousd.stage.boxes import read_dressing, relations_from_boxes
+    from echousd.stage.graphs import read_graph, write_graph
+    from echousd.stage.read import read_rooms
+    from echousd.stage.update import update_graph
     from echousd.texturing import export_job as export_texture_job
     from echousd.texturing import import_look
 
@@ -35,12 +38,12 @@ _HOME = {
     "Relation": "echousd.graph",
     "RoomSpec": "echousd.graph",
     "SceneGraph": "echousd.graph",
-    "read_dressing": "echousd.stage",
-    "read_graph": "echousd.stage",
-    "read_rooms": "echousd.stage",
-    "relations_from_boxes": "echousd.stage",
-    "update_graph": "echousd.stage",
-    "write_graph": "echousd.stage",
+    "read_dressing": "echousd.stage.boxes",
+    "read_graph": "echousd.stage.graphs",
+    "read_rooms": "echousd.stage.read",
+    "relations_from_boxes": "echousd.stage.boxes",
+    "update_graph": "echousd.stage.update",
+    "write_graph": "echousd.stage.graphs",
     "Room": "echousd.make.finished",
     "batch": "echousd.batches.batch",
     "generate": "echousd.make.pipeline",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from echousd.assets.colors import dominant
 from echousd.assets.licences import UNKNOWN, spdx
 from echousd.assets.measure import measure
 from echousd.assets.measured import Measured
-from echousd.assets.model_file import ModelFile
+from echousd.assets.model_file import ModelFile, relative
 from echousd.assets.naming import category_of, likely_unit
 from echousd.assets.record import UPRIGHT, Z_UP, AssetRecord, vector
 from echousd.assets.shape import sampled, supports, thumbnail
@@ -146,15 +145,6 @@ def stamp(path: Path) -> str:
     except OSError:
         return ""
     return f"{found.st_size}:{found.st_mtime_ns}"
-
-
-def relative(path: Path, library: Path) -> str:
-    """A path as it is stored: relative to the index's folder where that can be said, with forward slashes."""
-    here = library.absolute().parent
-    try:
-        return Path(os.path.relpath(path.absolute(), here)).as_posix()
-    except ValueError:  # on another drive
-        return path.absolute().as_posix()
 
 
 SAMPLES = 4000

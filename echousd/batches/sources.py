@@ -54,12 +54,11 @@ def _anchored(found: Found, folder: Path, outside: Sequence[str]) -> Found:
     """What was found with the files of its models as absolute paths, or why they may not be read."""
     if '"asset"' not in found.text:
         return found
-    from echousd.assets.choose import AssetWishes
     from echousd.shapes.sources.retrieval import anchored, check_files
 
     graph = anchored(SceneGraph.from_json(found.text), folder)
     try:
-        check_files(graph, folder, AssetWishes(outside=tuple(map(Path, outside))), found.origin)
+        check_files(graph, folder, outside, found.origin)
     except ValueError as error:
         return replace(found, text="", error=str(error))
     return replace(found, text=graph.to_json())

@@ -33,8 +33,6 @@ batch_app = typer.Typer(cls=_RunByDefault, no_args_is_help=True)
 
 def register(app: typer.Typer) -> None:
     """Add the topic."""
-    example = "echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
-    add_room_command(batch_app, run, example, batch=True)
     app.add_typer(batch_app, name="batch", help="Many rooms: a plan, workers, a journal, a manifest.")
 
 
@@ -106,6 +104,10 @@ def run(
         say(f"stopped  {result.stopped}", err=json)
     if result.failed or result.stopped:
         raise typer.Exit(1)
+
+
+_EXAMPLE = "echousd batch run samples/*.yaml -o out/night --workers 4 (`run` may be left out)"
+add_room_command(batch_app, run, _EXAMPLE, batch=True)
 
 
 @batch_app.command("status", epilog="Example: echousd batch status out/night")

@@ -1,4 +1,4 @@
-"""`echousd data`: make data sets, look at rooms, compare them with real ones, convert them."""
+"""`echousd data`: make data sets, look at rooms and furniture, compare them with real ones, convert them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,16 @@ import typer
 from echousd.cli.output import say_json
 
 if TYPE_CHECKING:
+    import numpy as np
+    import trimesh
+
     from echomodel.metrics.report import Row
+    from echomodel.roomboxes import RoomBoxes
 
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 
+PACKAGE = "sweethome3d-furniture"  # as `echomodel.data.meshes` has it, which need not be loaded for --help
+USD_FILES = (".usd", ".usda", ".usdc", ".usdz")
 Seed = Annotated[int, typer.Option(help="Seed of the world; equal seeds give equal bytes.")]
 Rooms = Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")]
 
@@ -144,3 +150,183 @@ def _print_rows(rows: list[Row], shown: list[Row], means: dict[str, float], sile
     for line in silent:
         console.print(f"left out   {line}")
     console.print("mean distance: " + ", ".join(f"{name} {value:.3f}" for name, value in means.items()))
+
+
+@data_app.command("meshes")
+def meshes(
+    sources: Annotated[
+        list[Path] | None, typer.Argument(help="Libraries (.sh3f), a .deb that holds them, folders of OBJ, GLB or USD.")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the set.")] = Path("meshes"),
+    debian: Annotated[bool, typer.Option(help=f"Fetch the Debian package {PACKAGE} with apt.")] = False,
+    table_only: Annotated[bool, typer.Option(help="Write OUT/table.csv for review and stop.")] = False,
+    copies: Annotated[int, typer.Option(min=1, help="Stored shapes per training mesh: 1 as it is, 2 with mirror.")] = 2,
+) -> None:
+    """Make a shape set from real meshes: classes by name, metric size, flood-filled distances, thumbnails, attribution.
+
+    OUT/table.csv is written first and read again when it exists: correct `class`, `use` and `yaw` there and run again.
+
+    Example: echousd data meshes --debian -o data/meshes
+    """
+    from rich.progress import Progress
+
+    from echomodel.data.meshes import build_meshes, draft_table, entries_of, fetched_package, read_table, write_table
+    from echousd.cli.terminal import Terminal
+    from echousd.stage.meshes import stage_mesh
+
+    console = Terminal(stderr=True)
+    out.mkdir(parents=True, exist_ok=True)
+    paths = list(sources or [])
+    if debian:
+        paths.append(fetched_package(out))
+    if not paths:
+        raise ValueError("no source given: name libraries or folders, or use --debian")
+    entries = [entry for path in paths for entry in entries_of(path, out, USD_FILES)]
+    table = out / "table.csv"
+    if not table.exists():
+        write_table(table, draft_table(entries))
+    rows = read_table(table)
+    used = sum(row.use for row in rows)
+    console.print(f"{table}: {len(rows)} models, {used} of them used")
+    if table_only:
+        return
+    loaders = dict.fromkeys(USD_FILES, stage_mesh)
+    with Progress(console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("meshes", total=used)
+
+        def progress(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+            if not console.is_terminal and done % 50 == 0:
+                console.print(f"meshes {done}/{total}")
+
+        shapes = build_meshes(
+            out, entries, rows, copies=copies, loaders=loaders, progress=progress,
+            skipped=lambda line: console.print(f"skipped: {line}"),
+        )  # fmt: skip
+    console.print(f"{out}: {len(shapes)} shapes, {int(shapes.held_out.sum())} held out")
+
+
+@data_app.command("sheet")
+def sheet(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture file.")],
+    categories: Annotated[list[str] | None, typer.Argument(help="Categories; default all.")] = None,
+    count: Annotated[int, typer.Option(help="Samples per category.")] = 12,
+    seed: Annotated[int, typer.Option(help="Seed of the world.")] = 0,
+    shapes: Annotated[Path | None, typer.Option("--set", help="Draw the shapes of this set instead.")] = None,
+    pixels: Annotated[int, typer.Option(help="Side of one picture.")] = 120,
+) -> None:
+    """Draw samples of every category in a grid: parametric pieces of styles 0, 1, ... or the shapes of a set.
+
+    Example: echousd data sheet chair dining_table -o chairs.png
+    """
+    from echomodel.data.shapeset import ShapeSet, piece
+    from echomodel.data.sheet import contact_sheet
+    from echomodel.files import write_picture
+    from echomodel.furniture import mesh_of
+    from echomodel.tsdf import mesh_from_tsdf
+    from echomodel.vocabulary import vocabulary
+
+    words = vocabulary()
+    names = [words.category(word).name for word in categories] if categories else [c.name for c in words.categories]
+    rows: list[tuple[str, list[trimesh.Trimesh]]] = []
+    stored = ShapeSet(shapes) if shapes else None
+    for name in names:
+        if stored is None:
+            pieces = [piece(seed, style, name) for style in range(count)]
+            rows.append((name, [mesh_of(parts, size) for _, size, parts in pieces]))
+            continue
+        found = [i for i in range(len(stored)) if stored.category[i] == words.category_id(name)][:count]
+        drawn = [mesh_from_tsdf(stored[i]) for i in found]
+        for mesh, i in zip(drawn, found, strict=True):
+            mesh.apply_scale(stored.size[i])
+        if drawn:
+            rows.append((f"{name} ({len(drawn)})", drawn))
+    write_picture(out, contact_sheet(rows, pixels))
+
+
+@data_app.command("to-usd")
+def to_usd(
+    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the stages, one per room.")],
+    limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
+    rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
+    known: Annotated[bool, typer.Option(help="Leave out objects that the vocabulary does not hold.")] = True,
+) -> None:
+    """Write rooms of any source as USD stages with their scene graphs.
+
+    Example: echousd data to-usd rooms.json -o stages --limit 10
+    """
+    from echomodel.data.roomset import load_rooms
+    from echomodel.metrics.room_figures import with_known_words
+    from echousd.stage.boxes import write_stages
+
+    found = load_rooms(rooms, limit)
+    given = [room.relations for room in found]
+    if known:
+        kept = with_known_words(found)
+        # Relations speak of places in the list: they stay valid only where nothing was left out.
+        found = [
+            room if len(room) < len(old) else _with_relations(room, edges)
+            for room, old, edges in zip(kept, found, given, strict=True)
+        ]
+    write_stages(found, out, None if rules == "none" else rules)
+
+
+def _with_relations(room: RoomBoxes, relations: np.ndarray | None) -> RoomBoxes:
+    from dataclasses import replace
+
+    return replace(room, relations=relations)
+
+
+@data_app.command("from-usd")
+def from_usd(
+    stages: Annotated[list[Path], typer.Argument(help="Stages, or folders of stages.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
+) -> None:
+    """Read the rooms of USD stages, whose objects all have boxes, into a rooms file.
+
+    Example: echousd data from-usd stages -o rooms.json
+    """
+    from echomodel.roomboxes import write_rooms
+    from echousd.stage.boxes import read_stages
+
+    found = read_stages(stages)
+    if not found:
+        raise ValueError(f"{', '.join(map(str, stages))}: no room found")
+    write_rooms(out, found)
+
+
+@data_app.command("to-sgfront")
+def to_sgfront(
+    rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the files.")],
+    split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
+    drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,
+    seed: Annotated[int, typer.Option(help="Seed of the dropping.")] = 0,
+) -> None:
+    """Write rooms in the files of SG-FRONT, labelled by its rules.
+
+    Example: echousd data to-sgfront rooms.json -o sgfront
+    """
+    from echomodel.data.roomset import load_rooms
+    from echomodel.data.sgfront_writer import write_sgfront
+    from echomodel.metrics.room_figures import with_known_words
+
+    write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)
+
+
+@data_app.command("from-sgfront")
+def from_sgfront(
+    folder: Annotated[Path, typer.Argument(help="Folder with the files of SG-FRONT.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
+    room: Annotated[str, typer.Option(help="bedroom, livingroom, diningroom, library or all.")] = "all",
+    split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
+) -> None:
+    """Read SG-FRONT into a rooms file, with its relations.
+
+    Example: echousd data from-sgfront 3D-FRONT --split test -o test.json
+    """
+    from echomodel.data.sgfront import SGFront
+    from echomodel.roomboxes import write_rooms
+
+    write_rooms(out, SGFront(folder, room, split).rooms())

@@ -200,7 +200,7 @@ def graph(
     else:
         shown = {"": load_graph(source, room)}
     if relations is not None:
-        from echousd.stage import relations_from_boxes
+        from echousd.stage.boxes import relations_from_boxes
 
         shown = {prim: relations_from_boxes(each, per_object=relations) for prim, each in shown.items()}
     only = next(iter(shown.values()))
@@ -231,7 +231,9 @@ def graph(
 
 def _rooms(source: Path, *, names: bool) -> dict[str, SceneGraph]:
     """All rooms of a stage by prim path; a single one goes without."""
-    from echousd.stage import foreign_rooms, open_stage, read_rooms
+    from echousd.stage.files import open_stage
+    from echousd.stage.foreign import foreign_rooms
+    from echousd.stage.read import read_rooms
 
     stage = open_stage(source)
     rooms = read_rooms(stage) or foreign_rooms(stage, names=names)

@@ -18,36 +18,29 @@ from echousd.cli.numbers import bound_numbers
 from echousd.cli.output import one_line, safe
 from echousd.cli.quiet import add_help_all, add_quiet
 
-app = typer.Typer(
-    name="echousd",
-    help="Author indoor scenes in USD from semantic scene graphs.",
-    epilog="Exit codes: 0 done, 1 a check failed, 2 bad input, 70 a fault of echousd itself.",
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-)
-
-# Each topic's module defines `register(app)`; it must not import torch or pxr at module level (start-up time).
-TOPICS: tuple[str, ...] = (
-    "graph",
-    "generate",
-    "batch",
-    "store",
-    "edit",
-    "render",
-    "export",
-    "texture",
-    "assets",
-    "adopt",
-    "check",
-    "train",
-    "convert",
-    "doctor",
-    "data",
-    "data_stage",
-    "data_meshes",
-    "eval",
-    "eval_shapes",
-)
+# Command -> the module of its topic, which defines `register(app)`. A module is imported when its command is called, or
+# for the help on all; it must not import torch or pxr at module level (start-up time).
+TOPICS = {
+    "new": "graph",
+    "graph": "graph",
+    "generate": "generate",
+    "batch": "batch",
+    "store": "store",
+    "edit": "edit",
+    "update": "edit",
+    "render": "render",
+    "export": "export",
+    "texture": "texture",
+    "assets": "assets",
+    "adopt": "adopt",
+    "check": "check",
+    "train": "train",
+    "convert": "convert",
+    "plugin-path": "doctor",
+    "doctor": "doctor",
+    "data": "data",
+    "eval": "eval",
+}
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
 MOST_PARTS = 500
@@ -61,7 +54,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _options(
     version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version."),
     debug: bool = typer.Option(False, "--debug", help="Show the traceback of an error; may stand anywhere."),
@@ -86,7 +78,9 @@ def run(arguments: Sequence[str]) -> int:
     arguments = [word for word in own if word != "--debug"] + arguments[len(own) :]
     try:
         _check_depth(arguments)
-        result = command().main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
+        topic = TOPICS.get(next((word for word in arguments if not word.startswith("-")), ""))
+        root = command(topic) if topic else command()
+        result = root.main(args=arguments or ["--help"], prog_name="echousd", standalone_mode=False)
         sys.stdout.flush()
         if result == INTERRUPTED:  # typer's way to pass on Ctrl-C
             return _complain("interrupted", INTERRUPTED, debug)
@@ -118,9 +112,17 @@ def _check_depth(arguments: Sequence[str]) -> None:
 
 
 @cache
-def command() -> Any:
-    """The root command (a click group) with the commands of all topics."""
-    for topic in TOPICS:
+def command(*topics: str) -> Any:
+    """The root command (a click group) with the commands of some topics, of all where none is named."""
+    app = typer.Typer(
+        name="echousd",
+        help="Author indoor scenes in USD from semantic scene graphs.",
+        epilog="Exit codes: 0 done, 1 a check failed, 2 bad input, 70 a fault of echousd itself.",
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+    )
+    app.callback()(_options)
+    for topic in topics or dict.fromkeys(TOPICS.values()):
         importlib.import_module(f"echousd.cli.{topic}").register(app)
     root = typer.main.get_command(app)
     bound_numbers(root)

@@ -36,7 +36,7 @@ def render(
 
     Raises ValueError where it cannot be opened, or has no such layout.
     """
-    from echousd.stage import open_stage
+    from echousd.stage.files import open_stage
     from echousd.stage.layouts import showing_layout
 
     stage = open_stage(path)
@@ -51,7 +51,7 @@ def render_cameras(
 
     Raises ValueError as `render` does, and where the stage holds no camera.
     """
-    from echousd.stage import open_stage
+    from echousd.stage.files import open_stage
     from echousd.stage.layouts import showing_layout
 
     stage = open_stage(path)
@@ -104,7 +104,7 @@ def render_turn(
 
     Raises ValueError as `render` does, and for a number of frames outside `FRAMES`.
     """
-    from echousd.stage import open_stage
+    from echousd.stage.files import open_stage
     from echousd.stage.layouts import showing_layout
 
     if not FRAMES[0] <= frames <= FRAMES[1]:

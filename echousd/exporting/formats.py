@@ -13,8 +13,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils
 from echousd.exporting.flattening import flat_layer, strip
 from echousd.exporting.glb import glb
 from echousd.exporting.packing import Package, Reach, images_beside, without_clock
-from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_all
+from echousd.stage.files import layer_bytes, open_stage, write_all
 from echousd.stage.layouts import selected_layout, showing_layout
 from echousd.stage.values import reading
 

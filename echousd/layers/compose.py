@@ -26,7 +26,6 @@ from echousd.shapes import joints, looks
 from echousd.shapes.geometry import LICENCE, Geometry, Origin
 from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import surface
-from echousd.stage import graph_layer as write_graph_layer
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes, new_stage
 from echousd.stage.paths import (
@@ -41,6 +40,7 @@ from echousd.stage.paths import (
 )
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.turning import turn_up
+from echousd.stage.write import graph_layer as write_graph_layer
 
 FILE = "ATTRIBUTION.md"
 

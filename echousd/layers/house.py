@@ -13,8 +13,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom
 import echousd
 from echousd.graph.files import STAGE_FORMS
 from echousd.naming import HOUSE as MARK
-from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_whole
+from echousd.stage.files import layer_bytes, open_stage, write_whole
 from echousd.stage.read import find_rooms
 from echousd.stage.turning import turn_up
 from echousd.stage.units import metres_per_unit, up_axis

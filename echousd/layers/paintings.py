@@ -16,12 +16,12 @@ from echousd.draw.surfaces import DRESSING, Surfaces, read_surfaces
 from echousd.folder.within import inside
 from echousd.stage.encoding import StageError
 from echousd.stage.files import layer_bytes, open_stage
+from echousd.stage.paths import UNFIT
 
 FOLDER = "looks"
 VARIANTS, MADE = "looks", "made"  # the variant set of the room, and its variant without paint
 RECORD = "echousd_look"  # in customLayerData: which objects a look was painted for
 LONGEST = 64  # characters of a look's name
-UNFIT = "layers/unfit.usda"  # our layer that mutes what of a look fits no longer
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from echomodel.vocabulary import vocabulary
+from echousd.assets.model_file import joined
 from echousd.graph import GraphError, Node, SceneGraph
 from echousd.graph.sentences import stating
 from echousd.place.living import living_faults
 from echousd.room import RoomData
-from echousd.shapes.originals.loading import joined
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 from echousd.stage.foreign import foreign_pieces
 from echousd.stage.read import find_rooms
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -83,12 +84,12 @@ def edit(
     manifest = saved.manifest
     look = {name: manifest[name] for name in Look.model_fields}
     asked = RoomOptions(**{**look, **given})
-    wishes, shapes, model = asked.wishes(outside), asked.shapes, asked.weights if model is None else model
+    wishes, shapes, model = partial(asked.wishes, outside), asked.shapes, asked.weights if model is None else model
     check_objects(graph, str(root))
     beside = Path(root).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph)
-    check_files(graph, beside, wishes, str(root), fresh)
+    check_files(graph, beside, outside, str(root), fresh)
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
@@ -101,7 +102,7 @@ def edit(
             _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
         if fresh:
             made_of = saved.manifest["shapes"]
-            again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and wishes.library is not None)
+            again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
             shapes = shapes or (made_of if again else default_source(model_used))
             check_sources([shapes, *(source_of(graph.node(name), shapes) for name in fresh)], model_used)
             own = given_pieces(graph, shapes, wishes, fresh)

@@ -15,8 +15,7 @@ from echousd.layers.materials import LOOKS
 from echousd.make.save import save_layers
 from echousd.room import RoomData
 from echousd.stage import encoding as usd
-from echousd.stage import open_stage
-from echousd.stage.files import layer_bytes, write_all
+from echousd.stage.files import layer_bytes, open_stage, write_all
 from echousd.stage.layouts import VARIANTS, layout_names, showing_layout
 from echousd.stage.paths import DRESSING, OBJECTS, ROOM
 

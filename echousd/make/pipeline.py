@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,22 +31,20 @@ from echousd.make.layouts import (
 )
 from echousd.make.locking import with_earlier_locks, with_locked_places
 from echousd.make.owned import with_own_boxes, with_own_pieces
-from echousd.make.resting import settled
 from echousd.make.verdicts import layout_outcome, warn_of_faults
 from echousd.options import RoomOptions, takes_options
 from echousd.place.living import unusual_sizes
 from echousd.progress import StageTimer
 from echousd.reproducible import one_thread
 from echousd.room import Provenance
-from echousd.settle import require_engine
 from echousd.shapes.merging import merged
 from echousd.shapes.sources import default_source
-from echousd.shapes.sources.guided import shape_nearness
 from echousd.shapes.sources.mixing import check_sources, mixed_shapes, sources_of
 from echousd.shapes.sources.retrieval import anchored, check_files, given_pieces, retrieved, with_given_sizes
 from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
-from echousd.stage import open_stage, read_graph
+from echousd.stage.files import open_stage
+from echousd.stage.graphs import read_graph
 from echousd.stage.paths import ROOM
 from echousd.stage.read import find_rooms
 from echousd.stage.units import unlike
@@ -102,8 +101,12 @@ def generate(
     asked = (options or RoomOptions()).replaced(**given)
     timer = StageTimer(progress)
     file, beside, other = "", Path.cwd(), ""
-    wishes, seed, drafts = asked.wishes(outside), asked.seed, asked.drafts
-    if asked.settle:  # what is absent is told before any long work
+    seed, drafts, wishes = asked.seed, asked.drafts, partial(asked.wishes, outside)
+    if asked.assets:  # what is absent is told before any long work
+        wishes()
+    if asked.settle:
+        from echousd.settle import require_engine
+
         require_engine()
     if not isinstance(graph, SceneGraph):
         file, beside = Path(graph).name, Path(graph).parent
@@ -117,7 +120,7 @@ def generate(
         graph, homeless = with_locked_places(graph, earlier)
     graph = anchored(without_openings(graph) if asked.openings == "drawn" else graph, beside)
     if file:  # a graph that was read may come from anybody; one in memory is the caller's own
-        check_files(graph, beside, wishes, file)
+        check_files(graph, beside, outside, file)
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
     with timer.stage("load"), one_thread():
@@ -150,7 +153,11 @@ def generate(
 
     graph, boxes, notes, more = laid_out(graph)
     left_out = (*left_out, *more)
-    near = shape_nearness(graph, boxes, shapes, wishes, seed, echo, asked.steps, timer)
+    near = None
+    if "guided" in sources_of(graph, shapes).values():
+        from echousd.shapes.sources.guided import shape_nearness
+
+        near = shape_nearness(graph, boxes, shapes, wishes(), seed, echo, asked.steps, timer)
     models = retrieved(
         graph, boxes, style_groups(graph), shapes, wishes, seed, pieces, near, palette=asked.palette, timer=timer
     )
@@ -196,6 +203,8 @@ def generate(
         timings=timer.seconds,
     )
     if asked.settle:
+        from echousd.make.resting import settled
+
         with timer.stage("settle"):
             made_room = settled(made_room)
     warn_of_faults(made_room)

@@ -20,16 +20,16 @@ from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.graph import SceneGraph
 from echousd.layers.component import MODEL, PLACES
-from echousd.shapes.colliders import approximation
+from echousd.shapes.colliders import approximation, hull_of
 from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.masses import read_mass
-from echousd.shapes.originals.loading import hull_of
 from echousd.shapes.originals.original import Original
 from echousd.shapes.upright import as_y_up, stands_z_up
-from echousd.stage import open_stage, read_graph
 from echousd.stage.contents import Z_TO_Y, triangulated
+from echousd.stage.files import open_stage
 from echousd.stage.forms import forms
+from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
 from echousd.stage.values import matrix, reading
 

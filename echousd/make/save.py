@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from echousd.folder.history import remembered, undone
 from echousd.folder.manifest import MANIFEST_KEY
 from echousd.folder.stored import Shelf, shelf_of
 from echousd.graph import SceneGraph
-from echousd.layers import paintings
 from echousd.layers.compose import LAYERS, room_files
 from echousd.naming import as_identifier
 from echousd.options import Look
@@ -27,10 +26,9 @@ from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.retrieval import beside
-from echousd.stage import open_stage
-from echousd.stage.files import write_whole
+from echousd.stage.files import open_stage, write_whole
 from echousd.stage.layouts import layout_names
-from echousd.stage.paths import layer_file
+from echousd.stage.paths import UNFIT, layer_file
 from echousd.store import Store
 
 
@@ -74,7 +72,12 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     files = room_files(room, shelf, folder)
     root, manifest = f"{room.name}.usda", f"{room.name}.json"
     current = ownership.read(folder, root)
-    painted, unfit = paintings.refitted(folder, root, files, current, room.edited)
+    painted: Mapping[str, bytes] = {}
+    unfit: Sequence[str] = ()
+    if current is not None or room.edited is not None:
+        from echousd.layers.paintings import refitted
+
+        painted, unfit = refitted(folder, root, files, current, room.edited)
     owned = {path: folders.digest(content) for path, content in files.items()}
     remarks = []
     if current is not None and root in recorded and folders.digest(current) not in (recorded[root], owned[root]):
@@ -108,7 +111,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     stale = [path for path in gone if path not in needed and _digest(folder, path) == recorded[path]]
     # What is referenced comes before what refers to it, so that a room opens between any two renames.
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
-    last = [*layers, paintings.UNFIT, root, manifest]
+    last = [*layers, UNFIT, root, manifest]
     drawn = ownership.pictures(folder, room.name)
     changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder), *drawn])
     for path, name in kept.items():

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from echousd.folder.output import writing
-from echousd.layers.house import Place, check_house, write_house
 from echousd.make.finished import Room
-from echousd.make.flat import save_flat
 from echousd.make.save import save_layers, write_preview, write_sheet
 from echousd.progress import StageTimer
+
+if TYPE_CHECKING:
+    from echousd.layers.house import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +35,12 @@ def write_room(
 ) -> Written:
     """Write a room as layers with pictures, or as one flat file without; raises ValueError, see `Room.save`."""
     with timer.stage("write"):
-        root = save_flat(room, output, force=force) if flat else save_layers(room, output, force=force, store=store)
-    if flat or not room.options.preview:
+        if flat:
+            from echousd.make.flat import save_flat
+
+            return Written(room, save_flat(room, output, force=force))
+        root = save_layers(room, output, force=force, store=store)
+    if not room.options.preview:
         return Written(room, root)
     with timer.stage("preview"):
         preview = write_preview(root)
@@ -54,6 +60,8 @@ def write_rooms(
 
     Returns: the house's layer, and the rooms.
     """
+    from echousd.layers.house import check_house, write_house
+
     root = output / f"{output.name}.usda"
     check_house(root, force=force)
     made = []

@@ -137,3 +137,14 @@ def _reduced(mesh: trimesh.Trimesh, faces: int) -> trimesh.Trimesh:
     out.update_faces(out.nondegenerate_faces())
     out.remove_unreferenced_vertices()
     return out
+
+
+def hull_of(mesh: trimesh.Trimesh, category: str) -> Collider:
+    """What an object collides with, whatever its mesh is like."""
+    try:
+        return collider(mesh, category)
+    except Exception:  # qhull and the simplifier fail on flat and broken meshes in their own ways
+        low, high = mesh.bounds
+        box = trimesh.creation.box(np.maximum(high - low, 1e-3))
+        box.apply_translation((low + high) / 2)
+        return Collider("collider", box, "convexHull")

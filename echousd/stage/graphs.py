@@ -9,9 +9,7 @@ from pxr import Sdf, Usd
 from echousd.graph import SceneGraph
 from echousd.stage import values
 from echousd.stage.files import opened
-from echousd.stage.foreign import foreign_graph, foreign_rooms
 from echousd.stage.read import find_rooms, room_graph, the_room
-from echousd.stage.update import update_graph
 from echousd.stage.write import author, prim_path
 
 
@@ -24,13 +22,15 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
     stage = opened(stage)
     with values.reading(stage):
         rooms = find_rooms(stage)
-        if not rooms and room is not None:
+        if not rooms:
+            from echousd.stage.foreign import foreign_graph, foreign_rooms
+
+            if room is None:
+                return foreign_graph(stage)
             found = foreign_rooms(stage)
             if room in found:
                 return found[room]
-        if rooms or room is not None:
-            return room_graph(the_room(stage, room, rooms))
-        return foreign_graph(stage)
+        return room_graph(the_room(stage, room, rooms))
 
 
 def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/Room") -> None:
@@ -41,6 +41,8 @@ def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/
     """
     path = prim_path(root)
     if _holds_graph(target, path):
+        from echousd.stage.update import update_graph
+
         update_graph(target, graph, room=root)
     elif isinstance(target, Usd.Stage):
         edit_target = target.GetEditTarget()

@@ -7,6 +7,7 @@ OBJECTS = "/Room/Objects"
 SHELL = "/Room/Shell"
 OPENINGS = "/Room/SceneGraph/Openings"
 DRESSING = "/Room/Dressing"
+UNFIT = "layers/unfit.usda"  # the layer of ours that mutes what of a painted look fits no longer
 CLASSES = "_class_"  # the prim that an asset's class stands below
 GEO, MTL = "geo", "mtl"  # scopes of an asset: what is seen and what collides, and what it is made of
 DESCRIPTION = "echo:description"  # attribute of an asset's root: what the furniture branch said of it

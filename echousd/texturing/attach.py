@@ -20,6 +20,7 @@ from echousd.layers import paintings
 from echousd.layers.paintings import FOLDER, MADE, RECORD, VARIANTS, primvar
 from echousd.make.save import write_preview
 from echousd.stage.files import layer_bytes, open_stage
+from echousd.stage.paths import UNFIT
 from echousd.stage.units import set_units
 from echousd.stage.values import reading
 from echousd.texturing.job import Job, read_job
@@ -103,7 +104,7 @@ def import_look(
             raise ValueError(f"{top / taken[0]}: exists; choose another --name or use --force")
         shared = {path for thing in surfaces.objects for piece in thing.pieces for path in piece.instances}
         files |= _attached(room, layer, shared)
-        order = [f"{paintings.FOLDER}/{name}/st.usdc", layer, paintings.UNFIT, room.name, f"{room.stem}.json"]
+        order = [f"{paintings.FOLDER}/{name}/st.usdc", layer, UNFIT, room.name, f"{room.stem}.json"]
         drawn = ownership.pictures(top, room.stem)
         changed = folders.write_together(top, files, last=[path for path in order if path in files], remove=drawn)
         for loaded in filter(None, (Sdf.Layer.Find(str(top / path)) for path in changed)):
@@ -164,10 +165,10 @@ def _attached(room: Path, layer: str, shared: set[str]) -> dict[str, bytes]:
         owned = dict(manifest["files"])
         if owned.get(room.name) == folders.digest(current):
             owned[room.name] = folders.digest(fresh)
-        unfit = ownership.read(top, paintings.UNFIT)
-        if unfit is not None and owned.get(paintings.UNFIT) == folders.digest(unfit):
-            out[paintings.UNFIT] = _fitting_again(unfit, layer)
-            owned[paintings.UNFIT] = folders.digest(out[paintings.UNFIT])
+        unfit = ownership.read(top, UNFIT)
+        if unfit is not None and owned.get(UNFIT) == folders.digest(unfit):
+            out[UNFIT] = _fitting_again(unfit, layer)
+            owned[UNFIT] = folders.digest(out[UNFIT])
         content = json.loads((top / listing).read_bytes())
         last = content["history"][-1] if content.get("history") else {}
         if last.get("leaves", {}).get(room.name) == folders.digest(current):

@@ -143,7 +143,7 @@ def test_the_arrangement_lies_inside_the_room_and_nothing_collides(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_sample_stage_holds_one_room(name):
-    from echousd.stage import read_rooms
+    from echousd.stage.read import read_rooms
 
     rooms = read_rooms(SAMPLES / f"{name}.usda")
     assert list(rooms) == ["/Room"]

@@ -78,7 +78,7 @@ def errors_in_texels(room: Path, job: Job, samples: int = 400) -> np.ndarray:
     What eight bits cannot tell is taken off.
     """
     from echousd.draw.drawables import paint_image, read_drawables
-    from echousd.stage import open_stage
+    from echousd.stage.files import open_stage
 
     rng = np.random.default_rng(0)
     paths = {thing.path for thing in job.objects}

@@ -16,32 +16,16 @@ from echousd.assets.catalogues.entry import Entry
 from echousd.assets.describe import described, digest_of
 from echousd.assets.measure import measure
 from echousd.assets.measured import Measured
-from echousd.assets.model_file import MODELS, STAGES, ModelFile, check_reach
+from echousd.assets.model_file import STAGES, ModelFile, check_reach, joined, split
 from echousd.assets.record import AssetRecord, Vector
 from echousd.assets.table import Library
 from echousd.exporting.packing import PACKED, LeftOut, asset_paths
-from echousd.shapes.colliders import collider
-from echousd.shapes.geometry import Collider, Geometry, Origin, Part
+from echousd.shapes.colliders import hull_of
+from echousd.shapes.geometry import Geometry, Origin, Part
 from echousd.shapes.originals.conversion import ROOT, converted
 from echousd.shapes.originals.original import CONVERTED, Original
 from echousd.stage.files import said
 from echousd.textures import READABLE
-
-
-def is_file(asset: str) -> bool:
-    """Whether a node's `asset` is the file of a model, and not the id of one in a library."""
-    return Path(split(asset)[0]).suffix.lower() in MODELS
-
-
-def split(asset: str) -> tuple[str, str]:
-    """(file, prim path) of `kitchen.usda</World/Sofa>`, the path empty where none is told."""
-    file, angle, prim = asset.partition("<")
-    return (file, prim.removesuffix(">")) if angle and prim.endswith(">") else (asset, "")
-
-
-def joined(file: str, prim: str) -> str:
-    """The inverse of `split`."""
-    return f"{file}<{prim}>" if prim else file
 
 
 def own_file(asset: str) -> ModelFile:
@@ -99,17 +83,6 @@ def _original(model: ModelFile, found: Measured, pose: np.ndarray, collect: bool
     main, files = collected(model) if collect else (CONVERTED, {})
     layer = None if collect else model.path.absolute()
     return Original(pose @ found.above, found.prim, layer, files, main, found.bodies, found.colliders)
-
-
-def hull_of(mesh: trimesh.Trimesh, category: str) -> Collider:
-    """What an object collides with, whatever its mesh is like."""
-    try:
-        return collider(mesh, category)
-    except Exception:  # qhull and the simplifier fail on flat and broken meshes in their own ways
-        low, high = mesh.bounds
-        box = trimesh.creation.box(np.maximum(high - low, 1e-3))
-        box.apply_translation((low + high) / 2)
-        return Collider("collider", box, "convexHull")
 
 
 TAKEN = (*STAGES, *PACKED, *READABLE, ".mdl", ".mtlx", ".hdr")

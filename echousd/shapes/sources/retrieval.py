@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echomodel.vocabulary import vocabulary
-from echousd.assets.choose import Asked, AssetWishes, choose, fits
-from echousd.assets.describe import relative
-from echousd.assets.model_file import ModelFile, check_reach
+from echousd.assets.model_file import ModelFile, check_reach, is_file, joined, relative, split
 from echousd.assets.record import AssetRecord, Vector
 from echousd.graph import SceneGraph
 from echousd.progress import StageTimer
 from echousd.shapes.finishes.harmonies import HARMONIES, linear
 from echousd.shapes.looks import palette_of_room
-from echousd.shapes.originals.loading import is_file, joined, library_file, own_file, own_record, split
 from echousd.shapes.styles import ALIKE, ROOM_STYLE
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
+    from echousd.assets.choose import Asked, AssetWishes
     from echousd.graph import Node
+
+    Wanted = Callable[[], AssetWishes]  # what is asked of a library, made where it is needed
 
 RETRIEVED = ("library", "guided")
 TOGETHER = ("at", "head", "beside")  # stances of things that come in pairs and sets
@@ -67,17 +67,18 @@ def anchored(graph: SceneGraph, folder: Path) -> SceneGraph:
 
 
 def check_files(
-    graph: SceneGraph, folder: Path, wishes: AssetWishes, file: str, among: Container[str] | None = None
+    graph: SceneGraph, folder: Path, outside: Sequence[str | Path], file: str, among: Container[str] | None = None
 ) -> None:
     """Raises ValueError for an asset of a graph that was read whose file lies elsewhere than the graph's own.
 
     Arguments:
-        graph: as `anchored` gives it. folder: of the graph's file. wishes: which folders are allowed besides.
+        graph: as `anchored` gives it. folder: of the graph's file. outside: folders that are allowed besides.
         file: what the error calls the graph. among: names of the objects that are looked at, None = all.
     """
     for node in graph.nodes:
         if node.asset is not None and is_file(node.asset) and (among is None or node.name in among):
-            check_reach(Path(split(node.asset)[0]), folder, wishes.outside, f"{file}: object {node.name!r}: asset")
+            path, allowed = Path(split(node.asset)[0]), [*map(Path, outside)]
+            check_reach(path, folder, allowed, f"{file}: object {node.name!r}: asset")
 
 
 def beside(graph: SceneGraph, folder: Path) -> SceneGraph:
@@ -101,7 +102,7 @@ def _moved(graph: SceneGraph, change: Callable[[str], str]) -> SceneGraph:
 def given_pieces(
     graph: SceneGraph,
     shapes: str,
-    wishes: AssetWishes,
+    wishes: Wanted,
     among: Container[str] | None = None,
     timer: StageTimer | None = None,
 ) -> Retrieved:
@@ -116,17 +117,20 @@ def given_pieces(
         return Retrieved()
     chosen: dict[str, AssetRecord] = {}
     files: dict[str, ModelFile] = {}
+    asked = wishes()
     with (timer or StageTimer()).stage("assets"):
         for node in named:
             try:
-                chosen[node.name], files[node.name] = _given(node, wishes)
+                chosen[node.name], files[node.name] = _given(node, asked)
             except (ValueError, ImportError) as error:
                 raise ValueError(f"object {node.name!r}: {error}") from None
     sizes = {node.name: chosen[node.name].dims for node in named if node.size is None}
-    return Retrieved(chosen, files, sizes, collect=wishes.collect)
+    return Retrieved(chosen, files, sizes, collect=asked.collect)
 
 
 def _given(node: Node, wishes: AssetWishes) -> tuple[AssetRecord, ModelFile]:
+    from echousd.shapes.originals.loading import library_file, own_file, own_record
+
     assert node.asset is not None
     if is_file(node.asset):
         return own_record(node.asset, node.category), own_file(node.asset)
@@ -144,7 +148,7 @@ def retrieved(
     boxes: Boxes,
     styles: Mapping[str, str],
     shapes: str,
-    wishes: AssetWishes,
+    wishes: Wanted,
     seed: int,
     given: Retrieved,
     nearness: Mapping[str, Mapping[str, float]] | None = None,
@@ -166,11 +170,15 @@ def retrieved(
     ]
     if not wanted:
         return given
+    from echousd.assets.choose import choose, fits
+    from echousd.shapes.originals.loading import library_file
+
+    asked = wishes()
     size = np.asarray(boxes.size, float)
     with (timer or StageTimer()).stage("assets"):
         tones = np.array([linear(color) for color in HARMONIES[palette or palette_of_room(seed)]])
         found = choose(
-            wishes, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
+            asked, _asked(graph, wanted, size, styles), seed, kept=given.chosen, nearness=nearness, palette=tones
         )
         files, sizes = dict(given.files), dict(given.sizes)
         for i in wanted:
@@ -178,15 +186,17 @@ def retrieved(
             record = found.chosen.get(node.name)
             if record is None or node.name in given.chosen:
                 continue
-            assert wishes.library is not None
-            files[node.name] = library_file(wishes.library, record)
-            if not fits(record, size[i], wishes.stretch) and node.size is None:
+            assert asked.library is not None
+            files[node.name] = library_file(asked.library, record)
+            if not fits(record, size[i], asked.stretch) and node.size is None:
                 sizes[node.name] = record.dims
-    return Retrieved(found.chosen, files, sizes, tuple(found.missing), wishes.collect)
+    return Retrieved(found.chosen, files, sizes, tuple(found.missing), asked.collect)
 
 
 def _asked(graph: SceneGraph, rows: list[int], size: np.ndarray, styles: Mapping[str, str]) -> list[Asked]:
     """The objects with who shares a model with whom: those of one category and style group, and sets."""
+    from echousd.assets.choose import Asked
+
     heads: list[tuple[int, str]] = []
     out = []
     for i in rows:

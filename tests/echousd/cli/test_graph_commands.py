@@ -194,7 +194,7 @@ def test_graph_shows_what_a_stronger_layer_adds(echousd_command, tmp_path):
 def test_graph_of_several_rooms(echousd_command, tmp_path):
     from pxr import Sdf
 
-    from echousd.stage import write_graph
+    from echousd.stage.graphs import write_graph
 
     layer = Sdf.Layer.CreateNew(str(tmp_path / "house.usda"))
     Sdf.PrimSpec(layer, "House", Sdf.SpecifierDef, "Xform")

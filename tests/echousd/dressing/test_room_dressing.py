@@ -26,7 +26,7 @@ from echousd.options import RoomOptions
 from echousd.shapes.geometry import Collider, Geometry, Origin, Part
 from echousd.shapes.sources.boxes import ORIGIN, solid_geometry
 from echousd.shapes.walls import walls
-from echousd.stage import read_graph
+from echousd.stage.graphs import read_graph
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,8 @@ from echousd.dressing.dress import setting_of
 from echousd.layers.compose import room_files
 from echousd.make.flat import save_flat
 from echousd.options import RoomOptions
-from echousd.stage import StageError, read_graph
+from echousd.stage.encoding import StageError
+from echousd.stage.graphs import read_graph
 
 DRESSED = RoomOptions(walls=True, dress="full", dress_graph=True)
 

@@ -26,7 +26,7 @@ from echousd.folder.journal import DONE
 from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room
 from echousd.pending import STAGING
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 from echousd.texturing import attach, export_job, import_look
 
 OLD, NEW = ["bed", "lamp"], ["bed", "desk"]

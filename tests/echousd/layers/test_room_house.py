@@ -10,7 +10,7 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.checks import check
 from echousd.layers.house import places
-from echousd.stage import write_graph
+from echousd.stage.graphs import write_graph
 
 QUICK = ("--shapes", "boxes", "--no-walls", "--no-place", "--dress", "none", "--no-preview")
 

@@ -10,7 +10,7 @@ import echousd
 from echousd.draw.sight import Furniture
 from echousd.draw.views import perspective_view
 from echousd.options import RoomOptions
-from echousd.stage import read_graph
+from echousd.stage.graphs import read_graph
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.layers.paintings import RECORD, read_look
 from echousd.make.reading import read_room
-from echousd.stage import StageError, open_stage
+from echousd.stage.encoding import StageError
+from echousd.stage.files import open_stage
 
 PLACES = ("/", ".", "../x", "/Room", "/Room/a.b", "/Room/a{v=x}b", "/Room/a[/b].c", "a b", "")
 

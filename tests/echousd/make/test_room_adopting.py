@@ -15,7 +15,7 @@ from echousd.graph import RoomSpec
 from echousd.make.adopting import adopted, seen_in_theirs
 from echousd.make.reading import read_room
 from echousd.place.living import living_faults
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 
 
 @pytest.fixture

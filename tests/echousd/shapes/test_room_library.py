@@ -17,7 +17,7 @@ from echousd.exporting import export
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.shapes.originals.loading import collected
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 from echousd.store import Store
 
 

@@ -10,7 +10,7 @@ from echousd.assets.index import index
 from echousd.assets.model_file import ModelFile
 from echousd.assets.table import read_library
 from echousd.shapes.originals.conversion import CONVERTED, converted, outward
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 
 
 def test_pieces_that_are_inside_out_are_turned_and_others_left():

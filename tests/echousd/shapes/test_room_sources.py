@@ -17,7 +17,7 @@ from echousd.shapes.meshing import mesh_from_shape
 from echousd.shapes.sources.boxes import solid_geometry
 from echousd.shapes.sources.sdf import within_budget
 from echousd.shapes.sources.source import Shapes, per_asset
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 
 ORIGIN = Origin("slabs", "CC-BY-4.0", "A. Joiner")
 

@@ -10,8 +10,11 @@ import pytest
 from pxr import Sdf, Usd
 
 from echousd.graph import Node, Relation, SceneGraph
-from echousd.stage import StageError, graph_layer, open_stage, read_graph, read_rooms, save_layer, write_graph
-from echousd.stage.files import READABLE
+from echousd.stage.encoding import StageError
+from echousd.stage.files import READABLE, open_stage, save_layer
+from echousd.stage.graphs import read_graph, write_graph
+from echousd.stage.read import read_rooms
+from echousd.stage.write import graph_layer
 
 GRAPH = SceneGraph(
     "bedroom",

@@ -9,9 +9,11 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics
 
 from echousd.graph import Node, Relation, SceneGraph
-from echousd.stage import StageError, foreign_graph, graph_layer, read_graph, relations_from_boxes
-from echousd.stage.boxes import room_boxes
-from echousd.stage.foreign import SkippedPrims
+from echousd.stage.boxes import relations_from_boxes, room_boxes
+from echousd.stage.encoding import StageError
+from echousd.stage.foreign import SkippedPrims, foreign_graph
+from echousd.stage.graphs import read_graph
+from echousd.stage.write import graph_layer
 
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 

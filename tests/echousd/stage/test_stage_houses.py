@@ -7,9 +7,11 @@ import echousd
 from echousd.checks import check
 from echousd.graph import SceneGraph
 from echousd.options import RoomOptions
-from echousd.stage import StageError, foreign_graph, foreign_rooms, open_stage, read_graph, relations_from_boxes
-from echousd.stage.files import MissingMaterials
-from echousd.stage.foreign import SkippedPrims
+from echousd.stage.boxes import relations_from_boxes
+from echousd.stage.encoding import StageError
+from echousd.stage.files import MissingMaterials, open_stage
+from echousd.stage.foreign import SkippedPrims, foreign_graph, foreign_rooms
+from echousd.stage.graphs import read_graph
 from echousd.stage.labels import spaced
 
 

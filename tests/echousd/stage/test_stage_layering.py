@@ -11,8 +11,9 @@ import echousd
 from echousd.checks import check
 from echousd.draw.drawables import read_drawables
 from echousd.exporting import export
-from echousd.stage import read_graph, update_graph
+from echousd.stage.graphs import read_graph
 from echousd.stage.read import StatedTwice
+from echousd.stage.update import update_graph
 
 
 @pytest.fixture(scope="module")

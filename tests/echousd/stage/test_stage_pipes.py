@@ -6,7 +6,8 @@ import os
 
 import pytest
 
-from echousd.stage import StageError, open_stage
+from echousd.stage.encoding import StageError
+from echousd.stage.files import open_stage
 
 WAYS = {
     "reference": 'def "A" (references=@./pipe.usda@) {}\n',

@@ -8,7 +8,11 @@ from hypothesis import given, settings
 from pxr import Gf, Sdf, Usd, UsdGeom
 
 from echousd.graph import Node, Relation, SceneGraph
-from echousd.stage import StageError, graph_layer, read_graph, save_layer, update_graph, write_graph
+from echousd.stage.encoding import StageError
+from echousd.stage.files import save_layer
+from echousd.stage.graphs import read_graph, write_graph
+from echousd.stage.update import update_graph
+from echousd.stage.write import graph_layer
 
 SOME = settings(max_examples=40, deadline=None)
 

@@ -16,7 +16,10 @@ assert [w.category for w in caught] == [echousd.plugin.PluginNotActive], caught
 assert not echousd.plugin.is_active()
 
 from echousd.graph import SceneGraph  # noqa: E402
-from echousd.stage import graph_layer, read_graph, save_layer, update_graph  # noqa: E402
+from echousd.stage.files import save_layer  # noqa: E402
+from echousd.stage.graphs import read_graph  # noqa: E402
+from echousd.stage.update import update_graph  # noqa: E402
+from echousd.stage.write import graph_layer  # noqa: E402
 
 
 def check(first: SceneGraph, second: SceneGraph, given: str, made: str) -> None:

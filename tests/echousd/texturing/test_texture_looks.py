@@ -18,7 +18,8 @@ from echousd.checks import check
 from echousd.folder.history import redo, undo
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
-from echousd.stage import open_stage, read_graph
+from echousd.stage.files import open_stage
+from echousd.stage.graphs import read_graph
 from echousd.texturing import atlas, export_job, import_look
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.glb import glb_bytes

@@ -16,7 +16,7 @@ from echousd.checks import check
 from echousd.exporting import export
 from echousd.layers.paintings import primvar
 from echousd.options import RoomOptions
-from echousd.stage import open_stage
+from echousd.stage.files import open_stage
 from echousd.texturing import export as texturing_export
 from echousd.texturing import export_job, import_look, scenetex
 from echousd.texturing.atlas import Unwrapped, texel_faces
