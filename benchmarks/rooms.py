@@ -21,7 +21,7 @@ from echomodel.boxes import BoxStatistics
 from echomodel.compact.model import CompactModel
 from echomodel.config import CompactConfig
 from echomodel.data.roomset import RoomSet, build_rooms
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.training.layout_stage import LayoutStage
 from echomodel.training.rooms import PackedRooms

@@ -74,8 +74,7 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rooms import generate_room
-    from echomodel.rooms.generator import drawn_shares
+    from echomodel.rooms.generator import drawn_shares, generate_room
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
     from echomodel.vocabulary import vocabulary

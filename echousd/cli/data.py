@@ -75,7 +75,7 @@ def rooms_command(
     Example: echousd data rooms --count 50 --room bedroom -o bedrooms.json
     """
     from echomodel.roomboxes import write_rooms
-    from echomodel.rooms import generate_rooms
+    from echomodel.rooms.generator import generate_rooms
     from echomodel.vocabulary import vocabulary
 
     kind = None if room is None else vocabulary().room_type(room).name
@@ -122,7 +122,7 @@ def report(
     """
     from echomodel.data.roomset import load_rooms
     from echomodel.metrics.report import compare, left_out, section_means
-    from echomodel.rooms import generate_rooms
+    from echomodel.rooms.generator import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
     others = None if real is None else load_rooms(real)

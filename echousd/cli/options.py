@@ -78,10 +78,12 @@ def click_options(*flags: Parameter) -> list[Any]:
 
 
 def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
-    from echousd.batches.options import BatchOptions
     from echousd.options import GROUPS, OF_NEW, RoomOptions
 
-    rows: dict[str, Any] = dict((BatchOptions if batch else RoomOptions).model_fields)
+    table = RoomOptions
+    if batch:
+        from echousd.batches.options import BatchOptions as table
+    rows: dict[str, Any] = dict(table.model_fields)
     chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
     return [_flag(name, rows[name]) for name in ordered]

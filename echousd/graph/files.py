@@ -11,7 +11,6 @@ from typing import Literal
 from echomodel.files import whole_file, within_memory
 from echousd.graph.consistency import GraphError
 from echousd.graph.scene import SceneGraph
-from echousd.graph.text import graph_from_text
 
 TEXT_FORMS: dict[str, Literal["yaml", "json"]] = {".yaml": "yaml", ".yml": "yaml", ".json": "json"}
 STAGE_FORMS = (".usda", ".usdc", ".usd", ".usdz")
@@ -42,6 +41,8 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
             size = math.ceil(found.st_size / 2**20 * 10) / 10  # up, so that it never says what is allowed
             raise GraphError(f"{path}: {size:g} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
         with within_memory(path):
+            from echousd.graph.text import graph_from_text
+
             return graph_from_text(SceneGraph, path.read_text("utf-8-sig"), TEXT_FORMS[path.suffix.lower()], str(path))
     except UnicodeDecodeError as error:
         raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None

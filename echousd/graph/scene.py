@@ -9,7 +9,6 @@ from collections import Counter
 from functools import cached_property
 from typing import Any
 
-import yaml
 from pydantic import model_validator
 
 from echomodel.openings import Opening
@@ -19,8 +18,6 @@ from echousd.graph.consistency import GraphError, listed, name_faults, raise_all
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import Node, Placed, PlainModel, Relation, RoomSpec
 from echousd.graph.openings import stated
-from echousd.graph.syntax import Dumper
-from echousd.graph.text import graph_from_text
 from echousd.graph.titles import name_of
 
 
@@ -166,6 +163,8 @@ class SceneGraph(PlainModel):
     @classmethod
     def from_json(cls, text: str) -> SceneGraph:
         """Read the canonical JSON form (or the short form, as JSON); raises `GraphError` with the line at fault."""
+        from echousd.graph.text import graph_from_text
+
         return graph_from_text(cls, text, "json")
 
     def to_json(self) -> str:
@@ -175,6 +174,8 @@ class SceneGraph(PlainModel):
     @classmethod
     def from_yaml(cls, text: str) -> SceneGraph:
         """Read the short YAML form (or the canonical form, as YAML); raises `GraphError` with the line at fault."""
+        from echousd.graph.text import graph_from_text
+
         return graph_from_text(cls, text, "yaml")
 
     def to_yaml(self) -> str:
@@ -255,5 +256,9 @@ def graph_to_yaml(graph: SceneGraph) -> str:
 
 def _flow(value: Any) -> str:
     """`value` on one line of YAML."""
+    import yaml
+
+    from echousd.graph.syntax import Dumper
+
     text = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=10**9, sort_keys=False, allow_unicode=True)
     return text.removesuffix("\n").removesuffix("\n...").strip()

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
@@ -16,8 +16,7 @@ from echomodel.dressing import KINDS
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
 from echousd.dressing import Dressing, dress
-from echousd.folder.stored import Shelf
-from echousd.layers import assets, cameras, component, coverings, lights, materials, materialx, physics, structure
+from echousd.layers import assets, cameras, component, coverings, lights, materials, physics, structure
 from echousd.layers.cameras import room_points, room_volume
 from echousd.layers.dressing import dressing_layer
 from echousd.naming import free_name
@@ -41,6 +40,9 @@ from echousd.stage.paths import (
 from echousd.stage.taxonomy import ade20k, word_of
 from echousd.stage.turning import turn_up
 from echousd.stage.write import graph_layer as write_graph_layer
+
+if TYPE_CHECKING:
+    from echousd.folder.stored import Shelf
 
 FILE = "ATTRIBUTION.md"
 
@@ -255,6 +257,8 @@ def materials_layer(
         assets.as_class(stage, asset)
     materials.write_palettes(stage, harmony, tables)
     if room.options.materialx:
+        from echousd.layers import materialx
+
         materialx.write_networks(stage, harmony, tables)
     return stage.GetRootLayer()
 

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pxr import Sdf
 
@@ -17,7 +17,6 @@ from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.history import remembered, undone
 from echousd.folder.manifest import MANIFEST_KEY
-from echousd.folder.stored import Shelf, shelf_of
 from echousd.graph import SceneGraph
 from echousd.layers.compose import LAYERS, room_files
 from echousd.naming import as_identifier
@@ -29,7 +28,9 @@ from echousd.shapes.sources.retrieval import beside
 from echousd.stage.files import open_stage, write_whole
 from echousd.stage.layouts import layout_names
 from echousd.stage.paths import UNFIT, layer_file
-from echousd.store import Store
+
+if TYPE_CHECKING:
+    from echousd.folder.stored import Shelf
 
 
 def save_room(
@@ -59,7 +60,12 @@ def save_layers(room: RoomData, folder: Path, *, force: bool = False, store: str
         raise ValueError(f"{folder}: is a file, the output must be a folder")
     with folders.held(folder):
         old = folders.claim(folder, force=force, root=room.name)
-        shelf = shelf_of(old, folder) if store is None else Shelf(Store.create(store), folder) if store else None
+        shelf = None
+        if store or (store is None and old.get("store")):
+            from echousd.folder.stored import Shelf, shelf_of
+            from echousd.store import Store
+
+            shelf = Shelf(Store.create(store), folder) if store else shelf_of(old, folder)
         return _save_layers(room, folder, old, replace(shelf, keys={}) if shelf else None)
 
 

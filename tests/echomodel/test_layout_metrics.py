@@ -20,7 +20,7 @@ from echomodel.metrics.layout_evaluation import (
 from echomodel.metrics.report import compare, section_means
 from echomodel.metrics.room_figures import ray_lengths, room_figures, with_known_words
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from shapely.geometry import Polygon, box
 
 from echomodel.metrics.layout_evaluation import living_scores
 from echomodel.metrics.room_figures import room_figures
-from echomodel.rooms import generate_room, generate_rooms
 from echomodel.rooms.builder import Item, overlaps
 from echomodel.rooms.floor import sample_floor
+from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.recipes import SOFA_KINDS
 from echomodel.rooms.statistics import room_requests, room_statistics, room_type_statistics
 from echomodel.sizes import size_score

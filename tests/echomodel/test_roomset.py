@@ -8,7 +8,7 @@ from echomodel.data import roomset
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.floors import centred
-from echomodel.rooms import generate_rooms, untidied
+from echomodel.rooms.generator import generate_rooms, untidied
 from echomodel.rules import label_relations, verdicts
 
 

@@ -13,7 +13,7 @@ from shapely.geometry import Polygon, box
 
 from echomodel.boxes import Boxes
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import fronts, label_relations, label_rooms, margins, measured, rule_set, verdicts
 from echomodel.rules.geometry import pairs
 from echomodel.rules.telling import told_relations

@@ -8,7 +8,7 @@ import pytest
 from echomodel.data.sgfront import SGFront, SGFrontError
 from echomodel.data.sgfront_writer import write_sgfront
 from echomodel.graph import GraphBatch
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations, verdicts
 from echomodel.vocabulary import vocabulary
 

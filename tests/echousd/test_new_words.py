@@ -13,7 +13,7 @@ from small_room import BARE
 
 import echousd
 from echomodel.boxes import Boxes
-from echomodel.furniture import decor
+from echomodel.furniture import PROGRAMS, decor
 from echomodel.furniture.carpentry import box
 from echomodel.rooms.generator import drawn_shares, generate_rooms
 from echomodel.rows import Habit
@@ -147,12 +147,13 @@ def test_outside_the_block_they_are_unknown():
 
 
 def test_made_of_parts_dressed_weighed_and_made_in_batches(music, tmp_path, monkeypatch):
-    def spinet(size, style, choices):  # a furniture program is a function of its name
+    def spinet(size, style, choices):  # a furniture program is a function of its name and a word of PROGRAMS
         w, h, d = size
         sides = [box((x, 0, -d / 2), (x + 0.05, 0.5 * h, d / 2)) for x in (-w / 2, w / 2 - 0.05)]
         return [*sides, box((-w / 2, 0.5 * h, -d / 2), (w / 2, h, d / 2))]
 
     monkeypatch.setattr(decor, "spinet", spinet, raising=False)
+    monkeypatch.setitem(PROGRAMS, "decor", (*PROGRAMS["decor"], "spinet"))
     graph = starting_graph("music room", {"spinet": 1})  # of no stated size: its floor is that of its like
     graph = graph.replaced(relations=(*graph.relations, Relation("stool", "in_line_with", "harp")))
     options = {"shapes": "parts", "dress": "full", "walls": True}

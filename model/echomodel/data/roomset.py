@@ -19,7 +19,7 @@ from echomodel.files import read_json, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes, read_rooms
-from echomodel.rooms import generate_rooms, untidied
+from echomodel.rooms.generator import generate_rooms, untidied
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 

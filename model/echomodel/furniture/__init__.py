@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,22 +10,6 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from echomodel.furniture import (
-    armchairs,
-    bathrooms,
-    beds,
-    bunks,
-    chairs,
-    decor,
-    household,
-    kitchens,
-    lamps,
-    shelving,
-    sofas,
-    stools,
-    storage,
-    tables,
-)
 from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.solids import Joint, Solid
@@ -34,8 +19,26 @@ from echomodel.vocabulary import vocabulary
 __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 
 Builder = Callable[[np.ndarray, Style, Choices], list[Solid]]
-MODULES = (chairs, armchairs, stools, sofas, tables, storage, shelving, beds, bunks, lamps, decor,
-           kitchens, bathrooms, household)  # fmt: skip
+# Module -> its programs, functions of these names; one is loaded when a category asks for it.
+PROGRAMS = {
+    "chairs": ("dining_chair", "chair", "chinese_chair", "dressing_chair", "bar_stool", "office_chair"),
+    "armchairs": ("armchair", "lounge_chair"),
+    "stools": ("stool", "bench", "ottoman"),
+    "sofas": ("multi_seat_sofa", "loveseat_sofa", "sofa", "l_shaped_sofa", "chaise_longue_sofa", "lazy_sofa"),
+    "tables": ("dining_table", "coffee_table", "side_table", "round_end_table", "corner_side_table", "console_table",
+               "desk", "dressing_table"),
+    "storage": ("nightstand", "dresser", "sideboard", "cabinet", "children_cabinet", "wardrobe", "tv_stand"),
+    "shelving": ("bookshelf", "shelf", "wine_cabinet"),
+    "beds": ("double_bed", "single_bed"),
+    "bunks": ("kids_bed",),
+    "lamps": ("pendant_lamp", "ceiling_lamp", "floor_lamp", "table_lamp", "wall_lamp"),
+    "decor": ("plant", "tv"),
+    "kitchens": ("base_unit", "wall_unit", "tall_unit", "sink_unit", "hob_unit", "dishwasher", "fridge", "range_hood",
+                 "kitchen_island"),
+    "bathrooms": ("toilet", "washbasin", "shower", "bathtub", "mirror_cabinet", "towel_radiator", "washing_machine"),
+    "household": ("coat_rack", "shoe_cabinet", "radiator", "fireplace", "piano", "cot", "toy_box", "garden_table",
+                  "garden_chair"),
+}  # fmt: skip
 UNSAID = ("", "board")
 BY_MATERIAL = {"fabric": "upholstery", "shade": "shade", "leaf": "leaf", "mirror": "mirror"}
 
@@ -92,7 +95,8 @@ def _builder(name: str) -> Builder:
     """The program of a category, or of the one that its row is like."""
     row = vocabulary().category(name)
     for word in (name, row.like or row.sgfront):
-        for module in MODULES:
-            if hasattr(module, word):
-                return getattr(module, word)
+        for module, programs in PROGRAMS.items():
+            if word in programs:
+                program: Builder = getattr(importlib.import_module(f"echomodel.furniture.{module}"), word)
+                return program
     raise ValueError(f"no furniture is made for {name}")

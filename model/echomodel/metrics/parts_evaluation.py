@@ -22,7 +22,7 @@ from echomodel.metrics.shape_evaluation import FIRST_ROOM
 from echomodel.metrics.shapes import set_scores, surface_points
 from echomodel.objective.sizes import size_range
 from echomodel.progress import StageListener
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary

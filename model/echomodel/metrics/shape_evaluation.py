@@ -22,7 +22,7 @@ from echomodel.metrics.shapes import (
     watertight_share,
 )
 from echomodel.progress import StageListener
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary

@@ -17,7 +17,7 @@ from echomodel.config import CompactConfig, from_dict
 from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.training.parts_stage import PartsStage
 from echomodel.training.recipe import Recipe
 from echomodel.training.start import started

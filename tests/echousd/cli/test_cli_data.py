@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 from echousd.cli.main import run
 from echousd.stage.boxes import graph_of, room_of

@@ -8,7 +8,7 @@ from small_room import BARE
 import echousd
 from echomodel.boxes import Boxes
 from echomodel.openings import Opening
-from echomodel.rooms import generate_rooms
+from echomodel.rooms.generator import generate_rooms
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make.layouts import backlit, with_free_openings
 from echousd.make.verdicts import colliding

@@ -1,0 +1,27 @@
+"""What a default bedroom loads of this project: only what it uses."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[3]
+MOST = 33_500  # lines of modules
+CODE = """
+import sys
+from echousd.cli.main import run
+assert run(["generate", "samples/bedroom.usda", "-o", sys.argv[1], "--quiet"]) == 0
+ours = [m for n, m in sys.modules.items() if n.partition(".")[0] in ("echousd", "echomodel", "echoscene")]
+lines = {m.__name__: len(open(m.__file__, encoding="utf-8").readlines()) for m in ours if m.__file__}
+unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exporting", "echousd.settle",
+          "echousd.assets.choose", "echousd.store", "echomodel.training", "echomodel.metrics",
+          "echomodel.furniture.kitchens", "echomodel.rooms.generator", "echoscene", "sklearn", "scipy.stats")
+print(sum(lines.values()), [name for name in unused if name in sys.modules])
+"""
+
+
+def test_a_bedroom_loads_what_it_uses(tmp_path):
+    command = [sys.executable, "-c", CODE, str(tmp_path / "bedroom")]
+    found = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    lines, unused = found.split(maxsplit=1)
+    assert unused.strip() == "[]"
+    assert 15_000 < int(lines) < MOST
