@@ -57,10 +57,11 @@ def starting_graph(
 
 
 def _node(category: str, position: int, count: int) -> Node:
-    """Several objects of a category are numbered and share a style."""
+    """Several objects of a category are numbered and share a style; fitted units have that of the room."""
     if count == 1:
         return Node(category, category)
-    fields: dict[str, Any] = {"style": category}
+    fitted = vocabulary().category(category).stands in ("row", "over")
+    fields: dict[str, Any] = {} if fitted else {"style": category}
     return Node(f"{category}_{position + 1}", category, **fields)
 
 

@@ -337,6 +337,7 @@ def _mounted(graph: SceneGraph, boxes: Boxes) -> Boxes:
 
 def _alike(graph: SceneGraph, boxes: Boxes, styles: Mapping[str, str]) -> Boxes:
     names, categories = [n.name for n in graph.nodes], [n.category for n in graph.nodes]
-    free = np.array([node.size is None and not node.locked for node in graph.nodes])
+    cut = [vocabulary().category(word).stands in ("row", "over") for word in categories]  # to the length there is
+    free = np.array([node.size is None and not node.locked for node in graph.nodes]) & ~np.array(cut, bool)
     size = equal_sizes(names, categories, styles, np.asarray(boxes.size, float), free, unequal_pairs(graph))
     return Boxes(torch.as_tensor(size, dtype=torch.float32), boxes.position, boxes.yaw)

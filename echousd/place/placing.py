@@ -22,6 +22,7 @@ from echomodel.objective.sizes import (
 from echomodel.objective.support import ON_FLOOR
 from echomodel.openings import Opening
 from echomodel.vocabulary import vocabulary
+from echousd.place.fitted import fitted
 from echousd.place.overhead import lamps_along
 from echousd.place.placements import stated_placements
 from echousd.place.problem import Posed, pose, stacked
@@ -221,10 +222,12 @@ def place_boxes(
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
 
+    held: np.ndarray = fixed
+
     def posed(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, kept: np.ndarray) -> Posed:
         return pose(
             categories, size, position, yaw, triplets, floor_polygon=floor_polygon, height=height,
-            fixed=fixed, rigid=kept, turned=turned, stated=stated, rules=rules,
+            fixed=held, rigid=kept, turned=turned, stated=stated, rules=rules,
         )  # fmt: skip
 
     drawn = at = posed(np.where(rigid[:, None], size, np.maximum(size, SMALLEST)), position, yaw, rigid)
@@ -235,6 +238,10 @@ def place_boxes(
         usual = usual_sizes(drawn.problem.categories, drawn.size, lenient=lenient)
         kept = rigid | (has_proportions(drawn.problem.categories) & ~np.isin(np.arange(n), told))
         at = posed(np.where(rigid[:, None], size, usual), position, yaw, kept)
+        at, planned = fitted(at, rigid, turned, openings, floor_polygon)
+        if planned.any():
+            held, rigid, kept = fixed | planned, rigid | planned, kept | planned
+            at = posed(at.size, at.position, at.yaw, kept)
         anchor = plan_of(at, at.problem.categories, floor_polygon, (), triplets).anchor.numpy()
         free = ~rigid & ~np.isin(np.arange(n), told)
 
@@ -260,14 +267,14 @@ def place_boxes(
     if at is not drawn and violation(found.at) > UNMET:  # what the graph states comes before all habits
         plain = solve(drawn, config)
         if violation(plain.at) < violation(found.at) - UNMET:
-            found, at = plain, drawn
+            found, at, held = plain, drawn, fixed
     problem, turn, centre = at.problem, at.yaw, at.problem.centre
     # The supports are met to a fraction of a millimetre; put them exactly, ceiling things as the solver left them.
-    hung = lamps_along(categories, at.position, found.position, triplets, fixed) if at is not drawn else found.position
+    hung = lamps_along(categories, at.position, found.position, triplets, held) if at is not drawn else found.position
     size_end = in_proportion(problem.categories, found.size, ~rigid)
-    end = stacked(size_end, hung, problem.carrier, None, fixed)
+    end = stacked(size_end, hung, problem.carrier, None, held)
     ceiling = np.inf if height is None else np.maximum(height - size_end[:, 1], 0.0)
-    end[~fixed, 1] = np.clip(end[:, 1], 0.0, ceiling)[~fixed]  # whatever is told of a lamp, it stays in the room
+    end[~held, 1] = np.clip(end[:, 1], 0.0, ceiling)[~held]  # whatever is told of a lamp, it stays in the room
     ends = torch.as_tensor(size_end), torch.as_tensor(end), torch.as_tensor(turn)
     boxes = Boxes(*(t.float() for t in ends))
     headed = torch.from_numpy(problem.fronts)

@@ -134,7 +134,7 @@ def _stance(setting: Setting, i: int, anchor: int) -> str:
     if setting.carrier[i] == anchor:
         return "on_top"
     if kind.support != "floor":
-        return ""
+        return "over" if setting.stances[i] == "over" else ""
     if kind.stands in ("at", "foot") and to.role == "board":
         return "at_front" if to.access else "around"
     return setting.stances[i]

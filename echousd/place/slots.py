@@ -189,7 +189,12 @@ def on_top(own: Size, anchor: Size, kind: Category, count: int, apart: float, ah
     return out
 
 
+def over(own: Size, anchor: Size, kind: Category, count: int, apart: float, ahead: float) -> list[Slot]:
+    """Mirrors and hoods: over the middle, at the same wall."""
+    return [(0.0, (own[2] - anchor[2]) / 2, 0.0, 0.0)]
+
+
 STANDS: dict[str, Slots] = {
     "head": head, "before": before, "around": around, "at_front": at_front, "company": company, "beside": beside,
-    "foot": foot, "on_top": on_top, "with": joined,
+    "foot": foot, "on_top": on_top, "with": joined, "over": over,
 }  # fmt: skip

@@ -10,8 +10,9 @@ MEASURES = ("place", "size", None)
 UNITES = ("style", "shape")
 ROLES = ("seat", "sofa", "board", "bed", "storage", "light", "screen", "decor")  # boards are tables and desks
 # at a table or desk, before a sofa, at a bed's head, at a foot end, beside, opposite, in the company of a sofa, on top,
-# near, flush beside it at the same wall (fitted kitchens)
-STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near", "row")
+# near, flush in a row of fitted units, hung over it
+STANCES = ("", "at", "before", "head", "foot", "beside", "opposite", "company", "on", "near", "row", "over")
+TASKS = ("", "prepare", "wash", "rinse", "cook", "vent", "cool", "store", "launder")  # of fitted units
 # below and around it, on its seat, before it, beside it, over it on the wall, in its room
 INVITES = ("rug", "cushions", "pouf", "basket", "picture", "mirror", "clock", "tall_mirror")
 
@@ -36,6 +37,8 @@ class Category:
         hangs: it may also hang on a wall.
         solid: its collider may be one hull; everything else has room below or inside that other things need.
         access: metres in front that must stay free, so that it can be opened or used.
+        clear: metres before its whole front where somebody stands, washes or kneels and nothing else does.
+        task: what is done at it in kitchens and laundries, one of `TASKS`.
         mounted: metres between the floor and its lower edge, of what is fixed to a wall; 0 = as drawn.
         left_free: metres in front that the generator of rooms leaves free, as real rooms do. askew: share of such
             pieces that stand askew in real rooms.
@@ -70,6 +73,8 @@ class Category:
     hangs: bool = False
     solid: bool = False
     access: float = 0.0
+    clear: float = 0.0
+    task: str = ""
     mounted: float = 0.0
     left_free: float = 0.0
     askew: float = 0.0
@@ -151,6 +156,9 @@ class RoomType:
             signs are there, the one with the greatest is meant.
         like: the room type that weights take it for which do not know it, and whose statistics it has where real rooms
             tell none, "" = there is none.
+        floor: 5th percentile, median and 95th percentile of the area, square metres, and of the short side, metres,
+            where real rooms tell none: what such rooms are planned with, measured on none.
+        maybe: (category, share): what such a room of the generator holds besides its contents, now and then.
         cover: share of the floor that furniture covers, median. used: share of the floor that use can take, the rest
             are ways and corners. aspect: long side over short side, median. cut: share of floors with a corner cut off.
         cuts: shares of one, two, three and four corners among the generator's floors that are no rectangle.
@@ -166,6 +174,8 @@ class RoomType:
     signs: tuple[str, ...] = ()
     certainty: int = 0
     like: str = ""
+    floor: tuple[tuple[float, ...], ...] = ()
+    maybe: tuple[tuple[str, float], ...] = ()
     cover: float = 0.35
     used: float = 0.66
     aspect: float = 1.3

@@ -18,6 +18,7 @@ from echomodel.rows import (
     ROLES,
     STANCES,
     SUPPORTS,
+    TASKS,
     UNITES,
     Category,
     Habit,
@@ -162,6 +163,7 @@ class Vocabulary:
             _known(f"category {row.name}", "role", (row.role,), ROLES)
             _known(f"category {row.name}", "belongs_to", row.belongs_to, categories)
             _known(f"category {row.name}", "stands", (row.stands,), STANCES)
+            _known(f"category {row.name}", "task", (row.task,), TASKS)
             _known(f"category {row.name}", "like", (row.like,), {"", *categories})
             _known(f"category {row.name}", "invites", row.invites, INVITES)
             _known(f"category {row.name}", "admits", (word for word, _ in row.admits), categories | set(ROLES))

@@ -22,9 +22,14 @@ CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 def front_free(plan: Plan) -> Found:
     """Doors, drawers, shelves and sofas can be reached from the front."""
     depth = plan.column(lambda kind: kind.access) * NEEDED
-    opens = (depth > 0) & plan.standing & ~plan.of("seat")  # an armchair is walked round
+    return before_fronts(plan, (depth > 0) & plan.standing & ~plan.of("seat"), depth)  # an armchair is walked round
+
+
+def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
+    """How much more than a depth (N,) is free before the fronts of boxes (N,) bool; corners of rows are shared."""
     i, j = plan.pairs(opens, plan.standing & ~plan.movable)
-    other = (plan.anchor[j] != i) & (plan.anchor[i] != j)
+    corner = plan.stands("row")[i] & plan.stands("row")[j] & ((plan.yaw[i] - plan.yaw[j]).cos().abs() < 0.1)
+    other = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner
     low = plan.position[j, 1] + plan.size[j, 1] < 0.05  # rugs
     i, j = i[other & ~low], j[other & ~low]
     lateral, forward = plan.local(j, i)
@@ -91,7 +96,8 @@ def window_free(plan: Plan) -> Found:
 
 def _before_openings(plan: Plan, *, window: bool) -> Found:
     rows: list[tuple[Tensor, Tensor, int]] = []
-    asked = (plan.standing if window else plan.standing | _hangs_low(plan)) & plan.moved
+    on_wall = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
+    asked = (plan.standing | (on_wall if window else _hangs_low(plan))) & plan.moved
     for scenes, polygon, openings in plan.rooms:
         who = (torch.isin(plan.scene, scenes) & asked).nonzero()[:, 0]
         for number, opening in enumerate(openings):

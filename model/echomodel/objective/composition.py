@@ -13,7 +13,7 @@ from torch import Tensor
 from echomodel.objective.found import Found, found, joined, nobody, worst
 from echomodel.objective.plan import FAR, Plan
 from echomodel.objective.zones import floor_gaps, floor_points, in_rooms
-from echomodel.plans import filled_area
+from echomodel.plans import REACH, filled_area
 
 SERVED = 1.0  # metres: floor further from all furniture serves nothing
 SOFT = 0.2  # metres on both sides of it over which a point of the floor counts in part
@@ -43,9 +43,10 @@ def floor_served(plan: Plan) -> Found:
         if there.shape[1] < 2:
             continue
         size = plan.size[there[0]].detach()
+        row = plan.stands("row")[there[0]]  # whose neighbours fill what is beside each
         gap, nearest = floor_gaps(plan, there, points)
         share = ((gap - SERVED + SOFT) / (2 * SOFT)).clamp(0.0, 1.0).mean(1)
-        margin = served_limit(area, size[:, 0], size[:, 2]) - share
+        margin = served_limit(area, size[:, 0] - 2 * REACH * row, size[:, 2]) - share
         farthest = nearest.gather(1, gap.detach().argmax(1, keepdim=True))[:, 0]
         out = joined(out, found(farthest, margin, measure=100.0 * share))
     return out

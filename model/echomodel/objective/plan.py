@@ -284,11 +284,19 @@ class Plan:
 
     @cached_property
     def group(self) -> Tensor:
-        """(N,) int64, the box that each one's group is about: whom it attends, and whom that one attends in turn."""
+        """(N,) int64, the box that each one's group is about: whom it attends, and whom that one attends in turn.
+
+        The fitted units of a room are one group.
+        """
         out = torch.arange(len(self))
         for _ in range(3):
             ahead = self.anchor[out]
             out = torch.where(ahead >= 0, ahead, out)
+        row = self.stands("row")
+        if bool(row.any()):
+            for room in self.scene[row].unique():
+                here = row & (self.scene == room)
+                out[here[out]] = here.nonzero()[0, 0]
         return out
 
     def kin(self, i: Tensor, j: Tensor) -> Tensor:

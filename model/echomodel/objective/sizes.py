@@ -103,12 +103,16 @@ def smaller_sizes(categories: Sequence[str], size: np.ndarray, free: np.ndarray)
 def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray, free: np.ndarray) -> np.ndarray:
     """(n, 3) float: sizes in which every table suits the chairs around it: long and deep enough, and no hall's.
 
+    What hangs over something is no wider than that.
+
     Arguments:
         categories: n words. size: (n, 3) float, metres.
         anchor: (n,) int, whom each attends (`Plan.anchor`). free: (n,) bool, sizes that may change.
     """
     out = size.copy()
     kinds = [kind_of(word) for word in categories]
+    for i in (i for i, kind in enumerate(kinds) if kind.stands == "over" and anchor[i] >= 0 and free[i]):
+        out[i, 0] = min(size[i, 0], max(size[anchor[i], 0], size_range(categories[i])[0][0]))
     for table in np.unique(anchor[anchor >= 0]).tolist():
         chairs = [i for i in np.flatnonzero(anchor == table).tolist() if kinds[i].role == "seat"]
         if not free[table] or kinds[table].role != "board" or kinds[table].access or len(chairs) < 2:

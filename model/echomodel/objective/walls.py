@@ -39,7 +39,9 @@ def at_wall(plan: Plan) -> Found:
     wall = plan.which(lambda kind: kind.wall)
     beside = (plan.stands("head") & (plan.anchor >= 0)) | plan.stands("with")
     there = (plan.walls[3] > 0).any(1)[plan.scene]
-    who = (wall & plan.standing & ~beside & there & (plan.moved | plan.of("sofa"))).nonzero()[:, 0]
+    hung = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
+    belongs = (wall & plan.standing & ~beside) | hung
+    who = (belongs & there & (plan.moved | plan.of("sofa"))).nonzero()[:, 0]
     gap = plan.back_gaps(who)
     free = plan.of("sofa")[who] & (gap >= PASSAGE)
     if bool(free.any()):

@@ -67,6 +67,16 @@ class Floor:
     windows: tuple[tuple[Rectangle, float], ...] = ()
     area: float = field(default=0.0)
 
+    @property
+    def in_the_way(self) -> tuple[tuple[np.ndarray, float, float, bool], ...]:
+        """What fitted units keep clear of (`echomodel.rooms.runs.Site`)."""
+        rows = [(rectangle, 0.0, False) for rectangle in self.doors]
+        rows += [(rectangle, top, True) for rectangle, top in self.windows]
+        return tuple(
+            (np.array([(x0, z0), (x1, z0), (x1, z1), (x0, z1)]), bottom, math.inf, glass)
+            for (x0, z0, x1, z1), bottom, glass in rows
+        )
+
     def holds(self, x0: float, z0: float, x1: float, z1: float, play: float = 0.04) -> bool:
         """Whether a rectangle lies on the floor, up to `play` metres."""
         if x0 < -self.half_x - play or x1 > self.half_x + play or z0 < -self.half_z - play or z1 > self.half_z + play:

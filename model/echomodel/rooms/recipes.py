@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from echomodel.rooms.builder import BODY, HALF_PI, Builder, Item, Size
 from echomodel.rooms.floor import Wall
+from echomodel.rooms.home import balcony, bathroom, childrens_room, hallway, kitchen
 from echomodel.rooms.sofas import SOFAS, groups_left, sofa_group, television
 from echomodel.rooms.statistics import RoomTypeStatistics
 from echomodel.rooms.tables import VANITY_SEATS, desk_group, dining_group, seat_at
@@ -179,16 +182,37 @@ def wanted(statistics: RoomTypeStatistics, area: float, rng: np.random.Generator
 
 def furnish(room: Builder, name: str) -> None:
     """Furnish an empty room of one type of the vocabulary; a type without a recipe like the one that its row names."""
-    recipes = {
+    recipes: dict[str, Callable[[Builder], None]] = {
         "bedroom": _bedroom,
         "living_room": _living_room,
         "dining_room": _dining_room,
         "living_dining_room": _living_dining_room,
         "study": _study,
+        "kitchen": partial(_home, kitchen),
+        "utility_room": partial(_home, kitchen),
+        "bathroom": partial(_home, bathroom),
+        "hallway": partial(_home, hallway),
+        "balcony": partial(_home, balcony),
+        "childrens_room": _childrens_room,
     }
     if name not in recipes:
         name = vocabulary().room_type(name).like or "living_room"
     recipes[name](room)
+
+
+def _home(first: Callable[[Builder], None], room: Builder) -> None:
+    first(room)
+    _rest(room)
+    ceiling_lamps(room, [])
+
+
+def _childrens_room(room: Builder) -> None:
+    beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
+    childrens_room(room)
+    _wardrobe(room, beds[0] if beds else None)
+    _desks(room)
+    _rest(room)
+    ceiling_lamps(room, list(beds))
 
 
 def _bedroom(room: Builder) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 
 import numpy as np
 
+from echomodel.rows import RoomType
 from echomodel.vocabulary import vocabulary
 
 AT_WALL = 0.2  # metres: a class with a larger median gap does not belong at a wall
@@ -52,10 +54,11 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
     """
     rooms = room_statistics()["rooms"]
     if name not in rooms:
-        like = next((row.like for row in vocabulary().room_types if row.name == name), "")
-        if like:
-            return room_type_statistics(like, requests=requests)
-        raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
+        row = next((row for row in vocabulary().room_types if row.name == name and row.like), None)
+        if row is None:
+            raise ValueError(f"no statistics for room type {name!r}: allowed are {', '.join(rooms)}")
+        like = room_type_statistics(row.like, requests=requests)
+        return _planned(row, like) if row.floor else like
     raw = rooms[name]
     asked = room_requests()["presence"].get(name, {}) if requests else {}
     presence = {}
@@ -75,6 +78,20 @@ def room_type_statistics(name: str, *, requests: bool = True) -> RoomTypeStatist
         cuts=vocabulary().room_type(name).cuts,
         presence=presence,
     )
+
+
+def _planned(row: RoomType, like: RoomTypeStatistics) -> RoomTypeStatistics:
+    """Statistics of rooms that nobody measured, by what they are planned with."""
+    area, short = ([low, math.sqrt(low * mean), mean, math.sqrt(mean * high), high] for low, mean, high in row.floor)
+    long = tuple(a / s for a, s in zip(area, short, strict=True))
+    presence: dict[str, tuple[float, tuple[int, ...], tuple[float, ...]]] = {
+        category: (1.0, (count,), (1.0,)) for category, count in row.contents
+    }
+    presence |= {category: (share, (1,), (1.0,)) for category, share in row.maybe}
+    return replace(
+        like, name=row.name, area=tuple(area), short=tuple(short), long=long, rectangular=1.0 - row.cut,
+        cuts=row.cuts, presence=presence,
+    )  # fmt: skip
 
 
 @cache

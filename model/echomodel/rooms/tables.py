@@ -10,11 +10,14 @@ from echomodel.rooms.sofas import SOFAS
 VANITY_SEATS = ("dressing_chair", "stool", "chair", "dining_chair", "ottoman")
 
 
-def dining_group(room: Builder, *, central: bool = False, sharing: int = 1) -> Item | None:
+def dining_group(
+    room: Builder, category: str = "dining_table", chairs: tuple[str, ...] = ("dining_chair", "chinese_chair", "chair"),
+    *, central: bool = False, sharing: int = 1,
+) -> Item | None:  # fmt: skip
     """A table with its chairs tucked in: in the open, or with one end at a wall; `sharing` tables share the chairs."""
-    size = room.size("dining_table")
+    size = room.size(category)
     style = room.style()
-    chair_kind = next((c for c in ("dining_chair", "chinese_chair", "chair") if room.wanted.get(c)), None)
+    chair_kind = next((c for c in chairs if room.wanted.get(c)), None)
     count = room.wanted.get(chair_kind, 0) if chair_kind else 0
     chair = room.size(chair_kind) if chair_kind else (0.5, 0.8, 0.5)
     margin = chair[2] * 0.6 if count else 0.0
@@ -43,9 +46,9 @@ def dining_group(room: Builder, *, central: bool = False, sharing: int = 1) -> I
                 continue
         # The chairs' places must be free too; later tries are content with less.
         slack = margin if attempt < 26 else 0.1
-        around = Item("dining_table", (size[0], size[1], size[2] + 2 * slack + 0.1), x, 0.0, z, yaw)
+        around = Item(category, (size[0], size[1], size[2] + 2 * slack + 0.1), x, 0.0, z, yaw)
         if room.free(around):
-            table = room.put("dining_table", size, x, z, yaw, style)
+            table = room.put(category, size, x, z, yaw, style)
             if table:
                 break
     if table is None:

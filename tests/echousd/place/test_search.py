@@ -40,7 +40,7 @@ def missed():
     found = {}
     rooms = [
         room
-        for word in ("bedroom", "living_dining_room", "living_room", "dining_room", "study")
+        for word in ("bedroom", "living_dining_room", "living_room", "dining_room", "study", "kitchen", "bathroom")
         for room in generate_rooms(8, 2, room_type=word)
     ]
     for number, room in enumerate(rooms):

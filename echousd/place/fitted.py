@@ -1,0 +1,76 @@
+"""Fitted units are planned first, as one group along the walls; everything else is placed around them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from echomodel.objective import TERMS, plan_of
+from echomodel.openings import Opening
+from echomodel.rooms.runs import Run, Site, obstacles, runs
+from echomodel.vocabulary import vocabulary
+from echousd.place.problem import Posed
+from echousd.place.relations import relation_margins
+from echousd.place.search import part_of, price
+
+MISSED = 3.0  # what a relation costs that a plan breaks
+SHARE = 0.5  # of what a plan costs by itself beside what the objective says of it
+
+
+def fitted(
+    at: Posed, rigid: np.ndarray, turned: np.ndarray, openings: Sequence[Opening], outline: np.ndarray
+) -> tuple[Posed, np.ndarray]:
+    """The room with its fitted units in the best run that there is, and (n,) bool which these are; none = as it was.
+
+    Arguments:
+        rigid, turned: (n,) bool, boxes that keep their size and their heading.
+        openings: doors and windows. outline: (k, 2) float, the floor's corners in the order that these count edges in.
+    """
+    problem = at.problem
+    kinds = [vocabulary().category(word) for word in problem.categories]
+    none = np.zeros(len(kinds), bool)
+    mine = np.array([kind.stands == "row" or (kind.stands == "over" and bool(kind.task)) for kind in kinds], bool)
+    mine &= ~problem.fixed & ~turned
+    if sum(kinds[i].stands == "row" for i in np.flatnonzero(mine)) < 2:
+        return at, none
+    number = {int(i): k for k, i in enumerate(np.flatnonzero(mine))}
+    above = vocabulary().predicate_id("above")
+    over = {number[a]: number[b] for a, word, b in problem.triplets.tolist()
+            if word == above and a in number and b in number}  # fmt: skip
+    fixed = problem.fixed & np.array([kind.support in ("floor", "wall") for kind in kinds], bool)
+    site = Site(outline, obstacles(outline, openings, at.size[fixed], at.position[fixed], at.yaw[fixed]))
+
+    def built(run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        who = np.flatnonzero(mine)[run.which]
+        size, position, yaw = at.size.copy(), at.position.copy(), at.yaw.copy()
+        size[who], position[who], yaw[who] = run.size, run.position, run.yaw
+        return who, size, position, yaw
+
+    def missed(run: Run) -> float:
+        _, size, position, yaw = built(run)
+        margin, _ = relation_margins(
+            size, position, yaw, told, rules=problem.rules, centre=problem.centre, fronts=problem.fronts, slopes=False
+        )
+        return MISSED * float((margin < 0).sum())
+
+    told = problem.triplets[(mine | problem.fixed)[problem.triplets[:, [0, 2]]].all(1)]
+    found = runs([kinds[i] for i in number], at.size[mine], ~rigid[mine], site, over=over, draft=at.position[mine],
+                 missed=missed if len(told) else None)  # fmt: skip
+    best, least = (at, none), np.inf
+    for run in found:
+        who, size, position, yaw = built(run)
+        room = plan_of(
+            replace(at, size=size, position=position, yaw=yaw), problem.categories, outline, openings,
+            problem.triplets, given=problem.fixed, height=problem.height, rules=problem.rules, stated=problem.stated,
+        )  # fmt: skip
+        planned = np.isin(np.arange(len(kinds)), who)
+        with torch.inference_mode():
+            part = part_of(room, planned | fixed)
+            seen = ((term, term.find(part)) for term in TERMS)
+            cost = sum(float(price(term, one, part).sum()) for term, one in seen) + SHARE * run.cost
+        if cost < least - 1e-4:
+            best, least = (Posed(problem, size, position, yaw), planned), cost
+    return best

@@ -1,0 +1,435 @@
+"""Fitted runs: units flush side by side along walls and around corners, cut to the length there is, others over them.
+
+A run is planned as a person plans a kitchen: which walls, in which order, how wide; the cheapest plans are for the
+objective to judge. Lengths along a wall count from its first corner, metres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from echomodel.openings import Opening, free_area, signed_area
+from echomodel.roomboxes import footprints
+from echomodel.rooms.floor import Wall, walls_of
+from echomodel.sizes import usual_range
+from echomodel.vocabulary import Category
+
+TALL = 1.3  # metres: what is higher has no worktop
+BEHIND = 0.005  # metres between the backs and their wall
+CASING = 0.06  # metres that units keep from what blocks a wall
+OVER_SILL = 0.3  # metres that a unit may reach over a window's sill: a tap
+AISLE = 1.2  # metres between fronts that face each other, and before them
+BLIND = 0.35  # metres of a corner's unit that stay free beside the run around the corner
+LEAST_LEG = 0.55  # metres of wall that a run is begun at
+WIDEST = 1.5  # metres of a unit that is stretched, where less does not fill the wall
+SLIVER = 0.35  # metres of wall that are not left over beside a run
+LANDING = 0.4  # metres of worktop beside a hob
+TRIANGLE = (3.6, 8.0)  # metres, sum of the ways between hob, sink and fridge
+ENOUGH = 4000  # plans of one room that are looked at
+BUILT = 100  # of these with what hangs over them
+Interval = tuple[float, float]
+Obstacle = tuple[np.ndarray, float, float, bool]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Where units stand and hang: which (m,) int, size and position of the bottom (m, 3), metres, yaw (m,); cost."""
+
+    which: np.ndarray
+    size: np.ndarray
+    position: np.ndarray
+    yaw: np.ndarray
+    cost: float
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A part of a run: a wall, from where to where, and whether it owns the corners there or ends at another leg."""
+
+    wall: int
+    low: float
+    high: float
+    own_low: bool = False
+    own_high: bool = False
+    meets_low: bool = False
+    meets_high: bool = False
+
+    @property
+    def length(self) -> float:
+        return self.high - self.low
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """Walls to build at, and what is in the way.
+
+    Arguments:
+        polygon: (k, 2) float, corners of the floor, metres.
+        obstacles: outline in plan (m, 2), from which to which height, metres, and whether it is a window.
+    """
+
+    polygon: np.ndarray
+    obstacles: Sequence[Obstacle] = ()
+
+    @cached_property
+    def walls(self) -> tuple[Wall, ...]:
+        """The sides of the floor, the inside to the left of each."""
+        turned = self.polygon if signed_area(self.polygon) > 0 else self.polygon[::-1]
+        return walls_of(tuple((float(x), float(z)) for x, z in turned))
+
+    def blocked(self, wall: int, deep: float, low: float, high: float, *, glass: bool = False) -> list[Interval]:
+        """Where something is in the way of units so deep from one height to another; of windows alone if `glass`."""
+        at, out = self.walls[wall], []
+        for shape, bottom, top, window in self.obstacles:
+            if bottom >= high or top <= low or (glass and not window):
+                continue
+            off = shape - (at.x, at.z)
+            along, away = off @ (at.dx, at.dz), off @ (math.sin(at.yaw), math.cos(at.yaw))
+            if away.min() < deep - 1e-6 and away.max() > 1e-6 and along.max() > 0 and along.min() < at.length:
+                out.append((float(along.min()) - CASING, float(along.max()) + CASING))
+        return out
+
+    def free(self, wall: int, deep: float, low: float, high: float) -> list[Interval]:
+        """What is left of a wall."""
+        left = [(0.0, self.walls[wall].length)]
+        for a, b in self.blocked(wall, deep, low, high):
+            left = [part for lo, hi in left for part in ((lo, min(hi, a)), (max(lo, b), hi)) if part[1] - part[0] > 0]
+        return [part for part in left if part[1] - part[0] >= LEAST_LEG]
+
+    def ahead(self, wall: int, along: float, away: float) -> bool:
+        """Whether a point before a wall lies on the floor."""
+        x, z = self.walls[wall].point(along, away)
+        inside = False
+        for (x0, z0), (x1, z1) in zip(self.polygon, np.roll(self.polygon, -1, 0), strict=True):
+            if (z0 > z) != (z1 > z) and x < x0 + (z - z0) / (z1 - z0) * (x1 - x0):
+                inside = not inside
+        return inside
+
+    def shapes(self, deep: float) -> Iterator[tuple[Leg, ...]]:
+        """One wall, two around a corner or opposite each other, three around two corners."""
+        free = [self.free(k, deep, 0.0, 0.9) for k in range(len(self.walls))]
+        for k, parts in enumerate(free):
+            yield from ((Leg(k, lo, hi),) for lo, hi in parts)
+        for k in range(len(self.walls)):
+            one, two = k, (k + 1) % len(self.walls)
+            for first in free[one][-1:] if self._corner(one) else ():
+                for second in free[two][:1]:
+                    if first[1] < self.walls[one].length - 1e-6 or second[0] > 1e-6:
+                        continue
+                    yield Leg(one, *first, own_high=True), Leg(two, deep, second[1], meets_low=True)
+                    yield Leg(one, first[0], first[1] - deep, meets_high=True), Leg(two, *second, own_low=True)
+                    three = (k + 2) % len(self.walls)
+                    whole = second[1] > self.walls[two].length - 1e-6 and second[1] > 2 * deep + AISLE
+                    for third in free[three][:1] if whole and self._corner(two) and three != one else ():
+                        if third[0] < 1e-6:
+                            yield (Leg(one, first[0], first[1] - deep, meets_high=True),
+                                   Leg(two, *second, own_low=True, own_high=True),
+                                   Leg(three, deep, third[1], meets_low=True))  # fmt: skip
+        for k, here in enumerate(self.walls):
+            for m, there in enumerate(self.walls[:k]):
+                apart = (there.x - here.x) * math.sin(here.yaw) + (there.z - here.z) * math.cos(here.yaw)
+                if math.cos(here.yaw - there.yaw) < -0.99 and 2 * deep + AISLE < apart < 2 * deep + 2 * AISLE:
+                    yield from ((Leg(m, *a), Leg(k, *b)) for a in free[m] for b in free[k])
+
+    def _corner(self, wall: int) -> bool:
+        """Whether the next wall leaves into the room at a right angle."""
+        one, two = self.walls[wall], self.walls[(wall + 1) % len(self.walls)]
+        return one.dx * two.dz - one.dz * two.dx > 0.999
+
+
+def runs(
+    kinds: Sequence[Category], size: np.ndarray, free: np.ndarray, site: Site, *,
+    over: dict[int, int] | None = None, draft: np.ndarray | None = None,
+    missed: Callable[[Run], float] | None = None, most: int = 12,
+) -> list[Run]:  # fmt: skip
+    """The best plans for the fitted units among n pieces, the cheapest first; none where they do not fit.
+
+    Arguments:
+        kinds: n rows of the vocabulary. size: (n, 3) float, metres; free: (n,) bool, those that may be cut.
+        over: piece that hangs -> unit that it is told to hang over.
+        draft: (n, 3) float, where the pieces are rather, None = anywhere. most: how many plans.
+        missed: what a plan costs besides.
+    """
+    units = [i for i, kind in enumerate(kinds) if kind.stands == "row"]
+    if len(units) < 2:
+        return []
+    planner = _Planner(kinds, _even(kinds, size, free), free, site, units, over or {}, draft)
+    plans = sorted(planner.plans(), key=lambda plan: round(plan[0], 6))
+    out: dict[tuple[object, ...], tuple[float, Run]] = {}
+    for _, legs, parts in plans:
+        alike = tuple((leg.wall, tuple(kinds[i].name for i in part)) for leg, part in zip(legs, parts, strict=True))
+        if alike not in out:
+            run = planner.built(legs, parts)
+            out[alike] = run.cost + (missed(run) if missed else 0.0), run
+        if len(out) == BUILT:
+            break
+    return [run for _, run in sorted(out.values(), key=lambda row: round(row[0], 6))[:most]]
+
+
+def _even(kinds: Sequence[Category], size: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """(n, 3) float: what hangs in one line is as high and deep, high units are as high; they end at one height."""
+    out = size.copy()
+    groups: dict[str, list[int]] = {}
+    for i in np.flatnonzero(free).tolist():
+        if kinds[i].stands in ("row", "over"):
+            groups.setdefault(kinds[i].name, []).append(i)
+    for members in groups.values():
+        out[members, 1:] = size[members, 1:].max(0)
+    tops = [out[i, 1] for i, kind in enumerate(kinds) if kind.task == "store" and out[i, 1] > TALL]
+    for i in (i for members in groups.values() for i in members if tops and _hangs(kinds[i])):
+        low, high = usual_range(kinds[i].name)[1]
+        out[i, 1] = min(max(max(tops) - kinds[i].mounted, low), high)
+    return out
+
+
+def _hangs(kind: Category) -> bool:
+    """Whether it is a cupboard above a worktop."""
+    return kind.stands == "over" and kind.task == "store"
+
+
+class _Planner:
+    """Orders of units, legs for them, widths, and what each plan costs."""
+
+    def __init__(
+        self, kinds: Sequence[Category], size: np.ndarray, free: np.ndarray, site: Site, units: list[int],
+        over: dict[int, int], draft: np.ndarray | None,
+    ) -> None:  # fmt: skip
+        self.kinds, self.size, self.free, self.site, self.units, self.over = kinds, size, free, site, units, over
+        self.draft = draft
+        self.deep = BEHIND + max(float(size[i, 2]) for i in units if size[i, 1] <= TALL or kinds[i].task != "cool")
+        self.hung = [i for i, kind in enumerate(kinds) if kind.stands == "over" and kind.task]
+        self.elastic = {i: bool(free[i]) and kinds[i].task in ("prepare", "store") for i in units}
+        self.least = {i: usual_range(kinds[i].name)[0][0] if self.elastic[i] else float(size[i, 0]) for i in units}
+
+    def task(self, i: int) -> str:
+        return self.kinds[i].task
+
+    def orders(self) -> list[tuple[int, ...]]:
+        """Sequences of all units: what is high at the ends, the dishwasher at the sink, worktop about the hob."""
+        high = [i for i in self.units if self.size[i, 1] > TALL]
+        cold = [i for i in high if self.task(i) == "cool"]
+        store = [i for i in high if i not in cold]
+        wet = [i for i in self.units if self.task(i) == "wash"]
+        beside = [i for i in self.units if self.task(i) == "rinse"]
+        hot = [i for i in self.units if self.task(i) == "cook"]
+        tops = [i for i in self.units if i not in (*high, *wet, *beside, *hot)]
+        ends = [(high, []), (store, cold), (cold, store), ([], high)]
+        found: dict[tuple[int, ...], None] = {}
+        for left, right in ends:
+            for sink in ([*wet, *beside], [*beside, *wet]):
+                for a in range(len(tops) + 1):
+                    for b in range(a, len(tops) + 1):
+                        core = [*tops[:a], *sink, *tops[a:b], *hot, *tops[b:]]
+                        for inner in (core, core[::-1]):
+                            found[(*left, *inner, *right)] = None
+        return list(found)
+
+    def plans(self) -> Iterator[tuple[float, tuple[Leg, ...], tuple[tuple[int, ...], ...]]]:
+        orders, looked = self.orders(), 0
+        least = {order: np.cumsum([0.0, *(self.least[i] for i in order)]).tolist() for order in orders}
+        for legs in self.site.shapes(self.deep):
+            if sum(leg.length for leg in legs) < sum(self.least.values()):
+                continue
+            for order in orders:
+                for cuts in self._cuts(len(order), len(legs)):
+                    ends = [0, *cuts, len(order)]
+                    if any(least[order][b] - least[order][a] > leg.length + 1e-6
+                           for leg, (a, b) in zip(legs, pairwise(ends), strict=True)):  # fmt: skip
+                        continue
+                    parts = tuple(order[a:b] for a, b in pairwise(ends))
+                    cost = self.cost(legs, parts)
+                    if cost is not None:
+                        yield cost, legs, parts
+                        looked += 1
+                        if looked > ENOUGH * len(legs):
+                            break
+
+    @staticmethod
+    def _cuts(count: int, legs: int) -> list[tuple[int, ...]]:
+        if legs == 1:
+            return [()]
+        if legs == 2:
+            return [(k,) for k in range(1, count)]
+        return [(k, m) for k in range(1, count - 1) for m in range(k + 1, count)]
+
+    def widths(self, leg: Leg, part: Sequence[int]) -> list[float] | None:
+        """How wide the units of a leg are; None where they do not fit."""
+        least = [self.least[i] for i in part]
+        for owns, at in ((leg.own_low, 0), (leg.own_high, -1)):
+            if owns:
+                if not self.elastic[part[at]] or self.size[part[at], 1] > TALL:
+                    return None
+                least[at] = max(least[at], self.deep + BLIND)
+        spare = leg.length - sum(least)
+        if spare < -1e-6:
+            return None
+        want = [max(float(self.size[i, 0]), low) for i, low in zip(part, least, strict=True)]
+        soft = [self.elastic[i] for i in part]
+        more = sum(w - low for w, low, e in zip(want, least, soft, strict=True) if e)
+        if more > max(spare, 0.0):
+            return [
+                low + (w - low) * max(spare, 0.0) / more if e else low
+                for w, low, e in zip(want, least, soft, strict=True)
+            ]
+        out = [w if e else low for w, low, e in zip(want, least, soft, strict=True)]
+        room = [max(WIDEST - w, 0.0) if e else 0.0 for w, e in zip(out, soft, strict=True)]
+        left, total = leg.length - sum(out), sum(room)
+        if total and left - total > -1e-9 and left - total < SLIVER:  # rather a wide unit than a gap beside a wall
+            room = [r * left / total for r in room]
+            total = left
+        share = min(left / total, 1.0) if total else 0.0
+        return [w + share * r for w, r in zip(out, room, strict=True)]
+
+    def spans(self, leg: Leg, part: Sequence[int]) -> list[Interval] | None:
+        """From where to where along its wall each unit of a leg stands."""
+        widths = self.widths(leg, part)
+        if widths is None:
+            return None
+        left = leg.length - sum(widths)
+        ends = (leg.low < 1e-6 or leg.meets_low or leg.own_low), (leg.meets_high or leg.own_high)
+        start = leg.low if ends[0] and not ends[1] else leg.high - sum(widths) if ends[1] else leg.low + left
+        edges = np.cumsum([start, *widths]).tolist()
+        return list(pairwise(edges))
+
+    def cost(self, legs: Sequence[Leg], parts: Sequence[Sequence[int]]) -> float | None:
+        """What a person objects to in a plan, without its distances to the rest of the room; None = it cannot be."""
+        total, at, count = 0.15 * (len(legs) - 1), {}, len(legs)
+        order = [i for part in parts for i in part]
+        for leg, part in zip(legs, parts, strict=True):
+            spans = self.spans(leg, part)
+            if spans is None:
+                return None
+            length = self.site.walls[leg.wall].length
+            left = leg.length - (spans[-1][1] - spans[0][0])
+            total += 0.25 * left + 1.0 * (0.01 < left < SLIVER)
+            for number, (i, (lo, hi)) in enumerate(zip(part, spans, strict=True)):
+                inner = (leg.meets_low and number == 0) or (leg.meets_high and number == len(part) - 1)
+                if self.size[i, 1] > TALL:
+                    tall = self.site.blocked(leg.wall, float(self.size[i, 2]), TALL, float(self.size[i, 1]))
+                    if any(lo < b and hi > a for a, b in tall):
+                        return None
+                    total += 2.0 * inner + 1.0 * (count > 1 and i not in (order[0], order[-1]))
+                elif self.task(i) == "cook":
+                    sides = [self._top(part, spans, number, side) for side in (-1, 1)]
+                    total += 1.5 * (max(sides) < LANDING) + 0.7 * (min(sides) < LANDING / 2) + 1.5 * inner
+                    total += 1.0 * (min(lo, length - hi) < LANDING - 1e-6)
+                    glass = self.site.blocked(leg.wall, self.deep, 0.9, 9.0, glass=True)
+                    total += 2.0 * any(lo < b and hi > a for a, b in glass)
+                elif self.task(i) == "wash":
+                    glass = self.site.blocked(leg.wall, self.deep, 0.9, 9.0, glass=True)
+                    total -= 0.4 * any(a < (lo + hi) / 2 < b for a, b in glass)
+                elif self.task(i) == "rinse":
+                    total += 0.6 * inner
+                at[i] = self.site.walls[leg.wall].point((lo + hi) / 2, float(self.size[i, 2]))
+            middle = (spans[0][0] + spans[-1][1]) / 2
+            total += 4.0 * (not self.site.ahead(leg.wall, middle, self.deep + 0.75 * AISLE))
+        for one, two in pairwise(order):
+            total += 0.3 * ({self.task(one), self.task(two)} in ({"cook", "wash"}, {"cook", "cool"}))
+        corners = [at[next(i for i in order if self.task(i) == task)]
+                   for task in ("wash", "cook", "cool") if any(self.task(i) == task for i in order)]  # fmt: skip
+        if len(corners) == 3:
+            way = sum(math.dist(corners[k], corners[k - 1]) for k in range(3))
+            total += max(TRIANGLE[0] - way, way - TRIANGLE[1], 0.0)
+        if self.draft is not None:
+            off = [math.dist(at[i], self.draft[i, [0, 2]]) for i in order]
+            total += 0.1 * float(np.mean(off))
+        return total
+
+    def _top(self, part: Sequence[int], spans: Sequence[Interval], number: int, side: int) -> float:
+        """Metres of worktop beside a unit of a leg."""
+        out, k = 0.0, number + side
+        while 0 <= k < len(part) and self.size[part[k], 1] <= TALL:
+            out += spans[k][1] - spans[k][0]
+            k += side
+        return out
+
+    def built(self, legs: Sequence[Leg], parts: Sequence[Sequence[int]]) -> Run:
+        """The plan as boxes, with what hangs over it."""
+        rows: list[tuple[int, int, Interval, float]] = []  # unit, wall, from where to where, height
+        for leg, part in zip(legs, parts, strict=True):
+            spans = self.spans(leg, part)
+            assert spans is not None
+            rows += [(i, leg.wall, span, 0.0) for i, span in zip(part, spans, strict=True)]
+        cost = float(self.cost(legs, parts) or 0.0)
+        hoods = [i for i in self.hung if not _hangs(self.kinds[i])]
+        cooks = [row for row in rows if self.task(row[0]) == "cook"]
+        hooded = list(zip(hoods, cooks, strict=False))
+        over = [(i, wall, self._hood(i, span), self.kinds[i].mounted) for i, (_, wall, span, _) in hooded]
+        over += self._wall_units(legs, rows, [row for row in over])
+        every = [*rows, *over]
+        which = np.array([row[0] for row in every])
+        size = self.size[which].copy()
+        size[:, 0] = [span[1] - span[0] for _, _, span, _ in every]
+        walls = [self.site.walls[wall] for _, wall, _, _ in every]
+        plan = np.array([wall.point((span[0] + span[1]) / 2, BEHIND + deep / 2)
+                         for wall, (_, _, span, _), deep in zip(walls, every, size[:, 2], strict=True)])  # fmt: skip
+        position = np.stack([plan[:, 0], [row[3] for row in every], plan[:, 1]], 1)
+        missing = len(self.hung) - len(over)
+        return Run(which, size, position, np.array([wall.yaw for wall in walls]), cost + missing)
+
+    def _hood(self, i: int, span: Interval) -> Interval:
+        half = (span[1] - span[0]) / 2 if self.free[i] else float(self.size[i, 0]) / 2
+        middle = (span[0] + span[1]) / 2
+        return middle - half, middle + half
+
+    def _wall_units(
+        self, legs: Sequence[Leg], rows: Sequence[tuple[int, int, Interval, float]],
+        hoods: Sequence[tuple[int, int, Interval, float]],
+    ) -> list[tuple[int, int, Interval, float]]:  # fmt: skip
+        """Wall units in line over worktops: none over the hob, before a window, or through a high unit."""
+        units = [i for i in self.hung if _hangs(self.kinds[i])]
+        if not units:
+            return []
+        low, (_, high, deep) = self.kinds[units[0]].mounted, self.size[units].max(0)
+        least = usual_range(self.kinds[units[0]].name)[0][0]
+        gaps: list[tuple[int, Interval]] = []
+        for leg in legs:
+            mine = [(i, span) for i, wall, span, _ in rows if wall == leg.wall]
+            closed = [span for i, span in mine if self.size[i, 1] > low or self.task(i) == "cook"]
+            closed += [span for _, wall, span, _ in hoods if wall == leg.wall]
+            closed += self.site.blocked(leg.wall, float(deep), low, low + float(high))
+            start, end = mine[0][1][0], mine[-1][1][1]
+            start = min(start, float(deep)) if leg.meets_low else start
+            end = max(end, self.site.walls[leg.wall].length - float(deep)) if leg.meets_high else end
+            left = [(start, end)]
+            for a, b in closed:
+                left = [part for lo, hi in left for part in ((lo, min(hi, a)), (max(lo, b), hi)) if part[1] > part[0]]
+            gaps += [(leg.wall, part) for part in left if part[1] - part[0] >= least]
+        count = [0] * len(gaps)
+        for _ in units:  # each to where it is widest
+            room = [(b - a) / (n + 1) for (_, (a, b)), n in zip(gaps, count, strict=True)]
+            if room and max(room) >= least:
+                count[int(np.argmax(np.round(room, 6)))] += 1
+        places: list[tuple[int, Interval]] = []
+        for (wall, (a, b)), n in zip(gaps, count, strict=True):
+            step = min((b - a) / max(n, 1), WIDEST * 1.6)
+            places += [(wall, (a + k * step, a + (k + 1) * step)) for k in range(n)]
+        spans = {i: (wall, span) for i, wall, span, _ in rows}
+
+        def aside(i: int, wall: int, span: Interval) -> float:
+            at, (a, b) = spans.get(self.over.get(i, -1), (wall, span))
+            return -max(min(b, span[1]) - max(a, span[0]), 0.0) if at == wall else 0.0
+
+        cost = np.array([[aside(i, *place) for place in places] for i in units]).reshape(len(units), len(places))
+        one, other = linear_sum_assignment(np.round(cost, 6))
+        return [(units[i], *places[k], low) for i, k in zip(one.tolist(), other.tolist(), strict=True)]
+
+
+def obstacles(
+    polygon: np.ndarray, openings: Sequence[Opening], size: np.ndarray, position: np.ndarray, yaw: np.ndarray
+) -> list[Obstacle]:
+    """What openings in the edges of a floor and boxes (n, 3), (n, 3), (n,) that stand there take (`Site.obstacles`)."""
+    out = [(shape, float(at[1]), float(at[1] + own[1]), False)
+           for shape, own, at in zip(footprints(size, position, yaw), size, position, strict=True)]  # fmt: skip
+    for one in openings:
+        glass = one.kind == "window"
+        bottom, top = (one.sill + OVER_SILL, one.sill + one.height) if glass else (0.0, math.inf)
+        out.append((free_area(polygon, one), bottom, top, glass))
+    return out

@@ -1,0 +1,53 @@
+"""Kitchens are planned as one group before everything else is placed; what the graph states comes first."""
+
+import json
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echousd.graph import SceneGraph
+from echousd.place import place
+from echousd.place.living import living_faults
+
+WORDS = ("base_unit", "base_unit", "sink_unit", "hob_unit", "fridge", "wall_unit", "range_hood", "ceiling_lamp")
+
+
+def kitchen(relations=(), **fixed):
+    names = [f"{word}_{k}" if WORDS.count(word) > 1 else word for k, word in enumerate(WORDS)]
+    objects = {name: {"category": word, **fixed.get(name, {})} for name, word in zip(names, WORDS, strict=True)}
+    room = {"type": "kitchen", "size": [3.6, 3.0]}
+    graph = SceneGraph.from_yaml(json.dumps({"room": room, "objects": objects, "relations": list(relations)}))
+    rng = np.random.default_rng(3)
+    n = len(WORDS)
+    where = np.stack([rng.uniform(-1.5, 1.5, n), np.zeros(n), rng.uniform(-1.2, 1.2, n)], 1)
+    size = np.full((n, 3), 0.7)
+    for k, node in enumerate(graph.nodes):
+        if node.position is not None:
+            size[k], where[k] = node.size, node.position
+    boxes = Boxes(*(torch.tensor(v, dtype=torch.float32) for v in (size, where, np.zeros(n))))
+    return graph, place(graph, boxes)
+
+
+def test_units_stand_in_a_row_without_a_fault():
+    graph, found = kitchen()
+    assert found.collisions == ()
+    assert {fault.rule for fault in living_faults(graph, found.boxes)} == set()
+    assert set(found.boxes.size[:4, 2].tolist()) == {np.float32(0.6)}  # one front line
+
+
+def test_the_graph_says_where_in_the_row():
+    for side in ("left", "right"):
+        graph, found = kitchen([f"fridge {side} sink_unit"])
+        assert found.broken == ()
+        assert {f.rule for f in living_faults(graph, found.boxes)} <= {"work_triangle"}
+
+
+def test_what_stands_already_stays_and_is_built_around():
+    place_of = {"size": [0.6, 1.8, 0.6], "position": [-1.5, 0.0, -1.19], "yaw": 0.0}
+    graph, found = kitchen(fridge=place_of)
+    at = graph.names.index("fridge")
+    assert found.boxes.position[at].tolist() == [-1.5, 0.0, np.float32(-1.19)]
+    rules = {fault.rule for fault in living_faults(graph, found.boxes)}
+    assert "apart" not in rules
+    assert found.collisions == ()
