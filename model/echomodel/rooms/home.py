@@ -43,7 +43,9 @@ def _run(room: Builder) -> list[Item]:
         size = np.array([room.size(kind.name) for kind in kinds]).reshape(-1, 3)
         free = np.ones(len(kinds), bool)
         site = Site(np.array(room.floor.polygon), room.floor.in_the_way)
-        plans = [plan for plan in runs(kinds, size, free, site, most=TRIED) if len(plan.which) == len(kinds)]
+        spot = room.uniform(-1, 1) * room.floor.half_x, 0.0, room.uniform(-1, 1) * room.floor.half_z
+        draft = np.tile(spot, (len(kinds), 1))  # towards one end of the room or the other
+        plans = [plan for plan in runs(kinds, size, free, site, draft=draft, most=TRIED) if len(plan.which) == len(kinds)]
         if plans or units < 2:
             break
         less = next((name for name in GIVEN_UP if wanted.get(name, 0) > (name == "base_unit")), None)

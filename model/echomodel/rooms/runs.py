@@ -13,7 +13,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from echomodel.openings import Opening, free_area, signed_area
 from echomodel.roomboxes import footprints
@@ -384,6 +383,8 @@ class _Planner:
         hoods: Sequence[tuple[int, int, Interval, float]],
     ) -> list[tuple[int, int, Interval, float]]:  # fmt: skip
         """Wall units in line over worktops: none over the hob, before a window, or through a high unit."""
+        from scipy.optimize import linear_sum_assignment
+
         units = [i for i in self.hung if _hangs(self.kinds[i])]
         if not units:
             return []
