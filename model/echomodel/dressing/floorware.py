@@ -7,7 +7,7 @@ import numpy as np
 from echomodel.dressing.solids import Lathe
 from echomodel.dressing.vessels import vessel
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Ball, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 
 
 def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -28,14 +28,14 @@ def floor_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
         reach = wide * rng.uniform(0.1, 0.22)
         foot, knee, tip = out * 0.03 + (0, tall * 0.8, 0), out * reach * 0.4 + (0, 0.6 * top, 0), out * reach
         tip = tip + np.array([0, top, 0])
-        parts.append(Tube(points=np.stack([foot, knee, tip]), radius=0.007, material="stem"))
-        for at, turned in ((0.45, -0.9), (0.7, 0.9), (1.0, 0.0)):
+        parts.append(tube(np.stack([foot, knee, tip]), 0.007, "stem"))
+        for at, side in ((0.45, -0.9), (0.7, 0.9), (1.0, 0.0)):
             place = knee + (tip - knee) * at
             lift = rng.uniform(0.35, 0.9)
-            turn = rotation(y=yaw + turned + rng.uniform(-0.25, 0.25)) @ rotation(x=-lift)
+            turn = rotation(y=yaw + side + rng.uniform(-0.25, 0.25)) @ rotation(x=-lift)
             length = min(0.26, wide * 0.3) * rng.uniform(0.8, 1.1)
             half = np.array([0.36 * length, 0.02 * length, 0.62 * length])
-            parts.append(Ball(centre=place + turn @ (0, 0, 0.55 * length), half=half, turn=turn, material="leaf"))
+            parts.append(ball(place + turn @ (0, 0, 0.55 * length), half, "leaf", turn=turn))
     return parts
 
 
@@ -50,17 +50,17 @@ def floor_vase(size: Size, rng: np.random.Generator) -> list[Solid]:
         out = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * min(w, d) / 2
         knee = out * 0.3 + (0, h * 0.7, 0)
         tip = out * rng.uniform(0.55, 0.95) + (0, h * rng.uniform(0.85, 0.99), 0)
-        parts.append(Tube(points=np.stack([[0, 0.1 * tall, 0], knee, tip]), radius=0.003, material="stem"))
+        parts.append(tube(np.stack([[0, 0.1 * tall, 0], knee, tip]), 0.003, "stem"))
         for at in (0.6, 0.8, 1.0):
             place = knee + (tip - knee) * at
-            parts.append(Ball(centre=place, half=np.array([0.012, 0.02, 0.012]), material="petal"))
+            parts.append(ball(place, (0.012, 0.02, 0.012), "petal"))
     return parts
 
 
 def pouf(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A round knitted pouf."""
     w, h, d = size
-    return [Ball(centre=np.array([0, h / 2, 0]), half=np.array([w, h, d]) / 2, power=2.8, material="accent_cloth")]
+    return [ball((0, h / 2, 0), np.array([w, h, d]) / 2, "accent_cloth", power=2.8)]
 
 
 def slippers(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -69,10 +69,8 @@ def slippers(size: Size, rng: np.random.Generator) -> list[Solid]:
     parts: list[Solid] = []
     for side in (-1, 1):
         x, wide, slip = side * w * 0.27, w * 0.2, float(rng.uniform(-0.04, 0.04)) * d
-        parts.append(Turned(centre=np.array([x, 0, slip]), low=(wide, d * 0.45), high=(wide, d * 0.45),
-                            height=h * 0.28, power=2.6, material="paper"))  # fmt: skip
-        parts.append(Ball(centre=np.array([x, h * 0.45, slip + d * 0.18]), half=np.array([wide, h * 0.5, d * 0.25]),
-                          power=2.4, material="accent_plain"))  # fmt: skip
+        parts.append(turned((x, 0, slip), (wide, d * 0.45), h * 0.28, power=2.6, material="paper"))
+        parts.append(ball((x, h * 0.45, slip + d * 0.18), (wide, h * 0.5, d * 0.25), "accent_plain", power=2.4))
     return parts
 
 
@@ -85,4 +83,4 @@ def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     x = bend / max(float(np.abs(bend).max()), 1e-6) * (w / 2 - radius)
     line = np.stack([x, np.full_like(x, radius), (along - 0.5) * (d - h)], 1)
     plug = box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)
-    return [Tube(points=line, radius=radius, material="screen"), plug]
+    return [tube(line, radius, "screen"), plug]

@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.dressing.solids import Lathe
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Ball, Block, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
 
 
 def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -49,9 +49,9 @@ def round_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     face = rotation(x=np.pi / 2)
     back = np.array([0.0, h / 2, -d / 2])
-    rim = Turned(centre=back, low=(w / 2, h / 2), high=(w / 2, h / 2), height=d * 0.8, turn=face, material="frame")
+    rim = turned(back, (w / 2, h / 2), d * 0.8, turn=face, material="frame")
     inner = (w / 2 - 0.018, h / 2 - 0.018)
-    return [rim, Turned(centre=back, low=inner, high=inner, height=d, turn=face, material="mirror")]
+    return [rim, turned(back, inner, d, turn=face, material="mirror")]
 
 
 def photo(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -70,7 +70,7 @@ def photo(size: Size, rng: np.random.Generator) -> list[Solid]:
         block = box(low, high, material)
         parts.append(Block(centre=lean @ block.centre, half=block.half, turn=lean, material=material))
     strut = np.array([[0, h * 0.7, -0.13 * h], [0, 0.004, -d]])
-    parts.append(Tube(points=strut, radius=0.004, material="frame"))
+    parts.append(tube(strut, 0.004, "frame"))
     return parts
 
 
@@ -79,9 +79,9 @@ def clock(size: Size, rng: np.random.Generator) -> list[Solid]:
     w, h, d = size
     face, middle = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
     half = (w / 2, h / 2)
-    parts: list[Solid] = [Turned(centre=middle, low=half, high=half, height=d * 0.9, turn=face, material="frame")]
+    parts: list[Solid] = [turned(middle, half, d * 0.9, turn=face, material="frame")]
     inner = (w * 0.44, h * 0.44)
-    parts.append(Turned(centre=middle, low=inner, high=inner, height=d * 0.92, turn=face, material="paper"))
+    parts.append(turned(middle, inner, d * 0.92, turn=face, material="paper"))
     for angle, length in ((0.9, 0.24), (-2.1, 0.36)):
         turn = rotation(z=angle)
         half3 = np.array([0.012 * w + 0.001, length * h / 2, d * 0.02])
@@ -121,7 +121,7 @@ def television(size: Size, rng: np.random.Generator) -> list[Solid]:
     for x in (-0.32 * w, 0.32 * w):
         for z in (-d / 2, d / 2):
             leg = np.array([[x, foot + 0.02, 0], [x, 0.006, z * 0.97]])
-            parts.append(Tube(points=leg, radius=0.006, material="metal"))
+            parts.append(tube(leg, 0.006, "metal"))
     return parts
 
 
@@ -136,7 +136,7 @@ def pens(size: Size, rng: np.random.Generator) -> list[Solid]:
         foot = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * r * 0.4 + (0, tall * 0.15, 0)
         tip = np.array([np.sin(yaw), 0.0, np.cos(yaw)]) * r * 0.95 + (0, h * rng.uniform(0.85, 1.0), 0)
         material = ("frame", "book_a", "soil", "metal", "book_c")[number]
-        parts.append(Tube(points=np.array([foot, tip]), radius=0.0036, material=material))
+        parts.append(tube([foot, tip], 0.0036, material))
     return parts
 
 
@@ -153,13 +153,9 @@ def shoes(size: Size, rng: np.random.Generator) -> list[Solid]:
     for side in (-1, 1):
         x, wide = side * w * 0.27, w * 0.21
         slip = float(rng.uniform(-0.03, 0.03)) * d
-        sole = Turned(centre=np.array([x, 0, slip]), low=(wide, d * 0.46), high=(wide, d * 0.46), height=h * 0.2,
-                      power=2.6, material="paper")  # fmt: skip
-        toe = Ball(centre=np.array([x, h * 0.3, slip + d * 0.12]), half=np.array([wide * 0.96, h * 0.28, d * 0.34]),
-                   power=2.4, material="leather")  # fmt: skip
-        heel = Ball(centre=np.array([x, h * 0.48, slip - d * 0.2]), half=np.array([wide * 0.94, h * 0.5, d * 0.25]),
-                    power=2.6, material="leather")  # fmt: skip
-        mouth = Ball(centre=np.array([x, h * 0.86, slip - d * 0.21]), half=np.array([wide * 0.62, h * 0.14, d * 0.17]),
-                     material="soil")  # fmt: skip
+        sole = turned((x, 0, slip), (wide, d * 0.46), h * 0.2, power=2.6, material="paper")
+        toe = ball((x, h * 0.3, slip + d * 0.12), (wide * 0.96, h * 0.28, d * 0.34), "leather", power=2.4)
+        heel = ball((x, h * 0.48, slip - d * 0.2), (wide * 0.94, h * 0.5, d * 0.25), "leather", power=2.6)
+        mouth = ball((x, h * 0.86, slip - d * 0.21), (wide * 0.62, h * 0.14, d * 0.17), "soil")
         parts += [sole, toe, heel, mouth]
     return parts

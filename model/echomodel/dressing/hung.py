@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.dressing import household
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Ball, Block, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
 
 
 def wall_clock(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -30,7 +30,7 @@ def wall_shelf(size: Size, rng: np.random.Generator) -> list[Solid]:
         parts.append(box((x - 0.01, 0, back), (x + 0.01, under, back + 0.008), "metal"))
         parts.append(box((x - 0.01, under - 0.006, back), (x + 0.01, under, d * 0.32), "metal"))
         stay = np.array([[x, 0.012, back + 0.006], [x, under - 0.006, d * 0.28]])
-        parts.append(Tube(points=stay, radius=0.005, material="metal"))
+        parts.append(tube(stay, 0.005, "metal"))
     return parts
 
 
@@ -42,25 +42,25 @@ def coats(size: Size, rng: np.random.Generator) -> list[Solid]:
     hooks = np.linspace(-0.38, 0.38, 4) * w
     for x in hooks:
         hook = np.array([[x, level, back + 0.015], [x, level - 0.01, back + 0.07], [x, level + 0.03, back + 0.08]])
-        parts.append(Tube(points=hook, radius=0.006, material="metal"))
+        parts.append(tube(hook, 0.006, "metal"))
     coat, bag = hooks[int(rng.integers(2))], hooks[3]
     tall, deep = level - 0.03, d * 0.5
     # a coat hangs narrow from its loop, wide at the shoulders, open at the hem
     for low, high, wide in ((0.0, 0.72, 0.3), (0.62, 1.0, 0.24)):
         half = np.array([wide * w * 0.75, (high - low) * tall / 2, deep / 2])
         middle = np.array([coat, (low + high) / 2 * tall, back + 0.03 + deep / 2])
-        parts.append(Ball(centre=middle, half=half, power=3.4, material="blanket"))
+        parts.append(ball(middle, half, "blanket", power=3.4))
     for side in (-1, 1):
         half = np.array([0.045, 0.27 * tall, deep * 0.36])
         middle = np.array([coat + side * 0.23 * w * 0.9, 0.58 * tall, back + 0.035 + deep / 2])
         turn = rotation(z=0.08 * side)
-        parts.append(Ball(centre=middle, half=half, turn=turn, power=2.8, material="blanket"))
+        parts.append(ball(middle, half, "blanket", power=2.8, turn=turn))
     size_bag = np.array([0.105, 0.13, deep * 0.36])
     middle = np.array([bag - 0.02, level - 0.5, back + 0.03 + deep * 0.4])
-    parts.append(Ball(centre=middle, half=size_bag, power=4.0, material="leather"))
+    parts.append(ball(middle, size_bag, "leather", power=4.0))
     strap = np.array([[bag - 0.09, middle[1] + 0.1, middle[2]], [bag, level + 0.005, back + 0.06],
                       [bag + 0.05, middle[1] + 0.1, middle[2]]])  # fmt: skip
-    parts.append(Tube(points=strap, radius=0.006, material="leather"))
+    parts.append(tube(strap, 0.006, "leather"))
     return parts
 
 
@@ -70,8 +70,7 @@ def tall_mirror(size: Size, rng: np.random.Generator) -> list[Solid]:
         return household.mirror(size, rng)
     w, h, d = size
     face, back = rotation(x=np.pi / 2), np.array([0.0, h / 2, -d / 2])
-    rim = Turned(centre=back, low=(w / 2, h / 2), high=(w / 2, h / 2), height=d * 0.8, turn=face, power=4.0,
-                 material="frame")  # fmt: skip
+    rim = turned(back, (w / 2, h / 2), d * 0.8, power=4.0, turn=face, material="frame")
     inner = (w / 2 - 0.016, h / 2 - 0.016)
-    glass = Turned(centre=back, low=inner, high=inner, height=d, turn=face, power=4.0, material="mirror")
+    glass = turned(back, inner, d, power=4.0, turn=face, material="mirror")
     return [rim, glass]

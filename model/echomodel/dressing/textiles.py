@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.dressing.solids import Sheet
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Ball, Solid, Turned
+from echomodel.furniture.solids import Solid, ball, turned
 
 RUGS = ("rug", "rug_striped", "rug_lattice")  # what is woven into them
 FOLD = 0.14  # metres of curtain from one fold to the next
@@ -21,7 +21,7 @@ def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
 def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A round of pile."""
     w, h, d = size
-    return [Turned(low=(w / 2, d / 2), high=(w / 2, d / 2), height=h, rounding=h * 0.45, material="rug")]
+    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material="rug")]
 
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:
@@ -57,7 +57,7 @@ def cushion(size: Size, rng: np.random.Generator) -> list[Solid]:
     half = np.array([w / 2, h / 2, d / 2])
     # A pillow is thick in the middle and thin at its seams: a flat superellipsoid, drawn in at the sides.
     material = str(rng.choice(("accent_cloth", "accent_plain")))
-    return [Ball(centre=np.array([0, h / 2, 0]), half=half, power=3.2, material=material)]
+    return [ball((0, h / 2, 0), half, material, power=3.2)]
 
 
 def throw(size: Size, rng: np.random.Generator) -> list[Solid]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from echomodel.dressing.solids import Lathe
 from echomodel.furniture.carpentry import Size, box
-from echomodel.furniture.solids import Ball, Solid, Tube, rotation
+from echomodel.furniture.solids import Solid, ball, rotation, tube
 
 
 def vessel(outer: np.ndarray, wall: float, material: str, inside: float = 0.1) -> Lathe:
@@ -48,13 +48,13 @@ def flowers(size: Size, rng: np.random.Generator) -> list[Solid]:
         tall = h * rng.uniform(0.78, 0.97)
         tip = np.array([np.sin(yaw) * reach, tall, np.cos(yaw) * reach])
         knee = np.array([tip[0] * 0.35, h * 0.62, tip[2] * 0.35])
-        parts.append(Tube(points=np.array([[0, h * 0.1, 0], knee, tip]), radius=0.0022, material="stem"))
+        parts.append(tube([[0, h * 0.1, 0], knee, tip], 0.0022, "stem"))
         for at in (0.55, 0.75, 0.92):
             place = knee + (tip - knee) * at
             lean = rotation(y=yaw + rng.uniform(-1.2, 1.2)) @ rotation(x=-rng.uniform(0.2, 0.9))
             half = np.array([0.014, 0.003, 0.026]) * rng.uniform(0.8, 1.2)
-            parts.append(Ball(centre=place + lean @ (0, 0, 0.022), half=half, turn=lean, material="leaf"))
-        parts.append(Ball(centre=tip, half=np.full(3, 0.014 * rng.uniform(0.8, 1.3)), material="petal"))
+            parts.append(ball(place + lean @ (0, 0, 0.022), half, "leaf", turn=lean))
+        parts.append(ball(tip, 0.014 * rng.uniform(0.8, 1.3), "petal"))
     return parts
 
 
@@ -75,7 +75,7 @@ def small_plant(size: Size, rng: np.random.Generator) -> list[Solid]:
         root = np.array([0, pot_h * 0.85, 0])
         turn = rotation(y=yaw) @ rotation(x=-lift)
         half = np.array([0.2 * length, 0.035 * length, 0.55 * length])
-        parts.append(Ball(centre=root + out * length * 0.75, half=half, turn=turn, material="leaf"))
+        parts.append(ball(root + out * length * 0.75, half, "leaf", turn=turn))
     return parts
 
 
@@ -91,7 +91,7 @@ def bowl(size: Size, rng: np.random.Generator) -> list[Solid]:
             yaw = 2 * np.pi * number / 4 + rng.uniform(0, 0.4)
             level = h - radius if number == 4 else rim - radius * 0.6
             centre = np.array([np.sin(yaw) * away, level, np.cos(yaw) * away])
-            parts.append(Ball(centre=centre, half=np.full(3, radius) * (1, 0.93, 1), material="fruit"))
+            parts.append(ball(centre, np.full(3, radius) * (1, 0.93, 1), "fruit"))
     return parts
 
 
@@ -106,8 +106,7 @@ def candles(size: Size, rng: np.random.Generator) -> list[Solid]:
         tall = h * share - 0.012
         disc = np.array([[radius, 0.0], [radius, tall - 0.004], [radius - 0.003, tall]])
         parts.append(Lathe(centre=np.array([x, 0.0, 0.0]), profile=disc, material="wax"))
-        parts.append(Tube(points=np.array([[x, tall - 0.003, 0], [x + 0.002, tall + 0.012, 0]]), radius=0.0012,
-                          material="soil"))  # fmt: skip
+        parts.append(tube([[x, tall - 0.003, 0], [x + 0.002, tall + 0.012, 0]], 0.0012, "soil"))
     return parts
 
 
@@ -120,7 +119,7 @@ def cup(size: Size, rng: np.random.Generator) -> list[Solid]:
     turn = np.linspace(-np.pi / 2, np.pi / 2, 7)
     loop = np.stack([radius * 0.95 + (w - d) * np.cos(turn), h * (0.52 + 0.3 * np.sin(turn)), 0 * turn], 1)
     coffee = Lathe(profile=np.array([[radius * 0.92, h * 0.5], [radius * 0.92, h * 0.78]]), material="soil")
-    parts = [body, Tube(points=loop, radius=0.0045, material="ceramic"), coffee]
+    parts = [body, tube(loop, 0.0045, "ceramic"), coffee]
     return [_moved(part, (centre, 0, 0)) for part in parts]
 
 
@@ -158,7 +157,7 @@ def basket(size: Size, rng: np.random.Generator) -> list[Solid]:
     for x, z, tall in ((-0.1, 0.06, 1.0), (0.12, -0.05, 0.94)):
         half = np.array([w * 0.24, h * 0.22, d * 0.26])
         centre = np.array([x * w, h * tall - half[1], z * d])
-        parts.append(Ball(centre=centre, half=half, power=2.6, material="accent_cloth"))
+        parts.append(ball(centre, half, "accent_cloth", power=2.6))
     return parts
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from echomodel.furniture.backs import chair_legs, leaning, slim_arms
 from echomodel.furniture.carpentry import Size, base, box, cushion, of_role
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.solids import Shell, Solid, Turned, rotation
+from echomodel.furniture.solids import Solid, bent, rotation, turned
 from echomodel.furniture.style import Style
 
 
@@ -27,32 +27,30 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         arms = foot + (h - foot) * (0.6 + 0.3 * style.arm_height)
         power = 2.2 + 3 * style.corner
         parts.append(
-            Shell(
-                centre=np.array([0, foot, d * 0.42]),
-                half=(w / 2, d * 0.92),
-                thickness=wall,
-                back=h - foot,
-                front=arms - foot,
+            bent(
+                (0, foot, d * 0.42),
+                (w / 2, d * 0.92),
+                wall,
+                h - foot,
+                arms - foot,
                 power=power,
                 ease=2.5,
                 material="fabric",
                 role="back",
             )
         )
-        low = Turned(
-            centre=np.array([0, foot, 0]),
-            low=(w / 2 - wall * 0.7, d * 0.45),
-            high=(w / 2 - wall * 0.7, d * 0.45),
-            height=(seat - foot) * 0.62,
+        low = turned(
+            (0, foot, 0),
+            (w / 2 - wall * 0.7, d * 0.45),
+            (seat - foot) * 0.62,
             power=power + 1,
             material="fabric",
             role="base",
         )
-        disc = Turned(
-            centre=np.array([0, foot + (seat - foot) * 0.6, d * 0.04]),
-            low=(w / 2 - wall, d * 0.44),
-            high=(w / 2 - wall, d * 0.44),
-            height=(seat - foot) * 0.4,
+        disc = turned(
+            (0, foot + (seat - foot) * 0.6, d * 0.04),
+            (w / 2 - wall, d * 0.44),
+            (seat - foot) * 0.4,
             power=power + 1,
             rounding=0.05 * style.softness,
             material="fabric",
@@ -106,14 +104,8 @@ def upholstered_arms(w: float, foot: float, y: float, d: float, arm: float, styl
                 box((x0 + arm * 0.14, foot, -d / 2 + 0.03), (x1 - arm * 0.14, y - r, d / 2 - 0.02), "fabric", 0.015)
             )
             parts.append(
-                Turned(
-                    centre=np.array([x, y - r, -d / 2 + 0.03]),
-                    low=(r, r),
-                    high=(r, r),
-                    height=d - 0.05,
-                    turn=rotation(x=np.pi / 2),
-                    rounding=0.02,
-                    material="fabric",
+                turned(
+                    (x, y - r, -d / 2 + 0.03), r, d - 0.05, rounding=0.02, turn=rotation(x=np.pi / 2), material="fabric"
                 )
             )
         else:
@@ -155,22 +147,22 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = seat * 0.5
     arms = foot + (h - foot) * (0.3 + 0.25 * style.arm_height)
     body: list[Solid] = [
-        Shell(
-            centre=np.array([0, foot, d * 0.32]),
-            half=(w / 2, d * 0.8),
-            thickness=wall,
-            back=h - foot,
-            front=arms - foot,
+        bent(
+            (0, foot, d * 0.32),
+            (w / 2, d * 0.8),
+            wall,
+            h - foot,
+            arms - foot,
             power=2.6 + style.corner,
             ease=2.6,
             material="fabric",
             role="back",
         ),
-        Turned(
-            centre=np.array([0, foot, d * 0.02]),
-            low=(w * 0.42, d * 0.42),
-            high=(w * 0.46, d * 0.46),
-            height=seat - foot,
+        turned(
+            (0, foot, d * 0.02),
+            (w * 0.42, d * 0.42),
+            seat - foot,
+            (w * 0.46, d * 0.46),
             power=2.6,
             rounding=0.05,
             material="fabric",
@@ -178,8 +170,8 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         ),
     ]
     if kind == "swivel":
-        stem = Turned(low=(0.03, 0.03), high=(0.03, 0.03), height=foot, material="metal")
-        disc = Turned(low=(w * 0.34, w * 0.34), high=(w * 0.3, w * 0.3), height=0.025, material="metal")
+        stem = turned((0, 0, 0), 0.03, foot, material="metal")
+        disc = turned((0, 0, 0), w * 0.34, 0.025, w * 0.3, material="metal")
         return [*body, *of_role("leg", [stem, disc])]
     legs = style.legs if style.legs in ("tapered", "splayed", "straight", "hairpin") else "splayed"
     return [*body, *base(style, w * 0.72, d * 0.7, foot + 0.02, 0.035 * style.bulk, legs)]

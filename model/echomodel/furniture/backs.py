@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import base, box, cushion, leg, of_role, top
-from echomodel.furniture.solids import Ball, Block, Solid, rotation
+from echomodel.furniture.solids import Block, Solid, ball, rotation
 from echomodel.furniture.style import Style
 
 
@@ -75,12 +75,7 @@ def _back(style: Style, kind: str, w: float, y0: float, y1: float, z: float, thi
         middle = y0 + length * 0.62
         turn = rotation(x=-rake)
         centre = turn @ np.array([0, middle - y0, 0]) + [0, y0, z]
-        return [
-            *stems,
-            Ball(
-                centre=centre, half=np.array([a * 0.95, length * 0.4, t / 2]), power=2.6, turn=turn, material="fabric"
-            ),
-        ]
+        return [*stems, ball(centre, (a * 0.95, length * 0.4, t / 2), "fabric", power=2.6, turn=turn)]
     posts: list[Solid] = [
         lean(s * (a - post / 2) - post / 2, s * (a - post / 2) + post / 2, -0.08, 1, post) for s in (-1, 1)
     ]

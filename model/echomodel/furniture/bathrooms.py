@@ -10,11 +10,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, of_role
+from echomodel.furniture.carpentry import Size, box, of_role, post
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
 from echomodel.furniture.kitchens import spout
-from echomodel.furniture.solids import Shell, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, bent, rotation, tube, turned
 from echomodel.furniture.style import Style
 
 SEAT = 0.42  # metres
@@ -32,14 +32,25 @@ def toilet(size: Size, style: Style, choices: Choices) -> list[Solid]:
     middle, half = (z0 + d / 2) / 2, (d / 2 - z0) / 2
     tank = (w / 2, h) if hung else (0.46 * w, h)
     low = 0.1 if hung else 0.0
-    bowl = Turned(
-        centre=np.array([0, low, middle - 0.02]), low=(0.27 * w, 0.6 * half), high=(0.46 * w, half - 0.01),
-        height=seat - 0.03 - low, power=2.6, material="ceramic", role="bowl",
-    )  # fmt: skip
-    lid = Turned(
-        centre=np.array([0, seat - 0.032, middle]), low=(0.48 * w, half), high=(0.47 * w, half), height=0.032,
-        power=2.6, rounding=0.008, material="ceramic", role="lid",
-    )  # fmt: skip
+    bowl = turned(
+        (0, low, middle - 0.02),
+        (0.27 * w, 0.6 * half),
+        seat - 0.03 - low,
+        (0.46 * w, half - 0.01),
+        power=2.6,
+        material="ceramic",
+        role="bowl",
+    )
+    lid = turned(
+        (0, seat - 0.032, middle),
+        (0.48 * w, half),
+        0.032,
+        (0.47 * w, half),
+        power=2.6,
+        rounding=0.008,
+        material="ceramic",
+        role="lid",
+    )
     plate = box((-0.1, h - 0.1, z0 - 0.003), (0.1, h - 0.03, z0 + 0.008), "metal", 0.003, "plate")
     if not hung:
         plate = box((-0.03, h - 0.004, -d / 2 + 0.06), (0.03, h + 0.006, -d / 2 + 0.12), "metal", 0.003, "button")
@@ -69,16 +80,18 @@ def washbasin(size: Size, style: Style, choices: Choices) -> list[Solid]:
     ]
     rim += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.1)
     if w < 0.62 and choices.chance("kind", 0.35):
-        column = Turned(
-            low=(0.11, 0.1), high=(0.085, 0.085), height=h - thick + 0.004, centre=np.array([0, 0, -0.05]), power=2.8,
-            material="ceramic", role="foot",
-        )  # fmt: skip
+        column = turned(
+            (0, 0, -0.05), (0.11, 0.1), h - thick + 0.004, 0.085, power=2.8, material="ceramic", role="foot"
+        )
         return [*rim, column]
     foot = 0.25 if choices.chance("raised", 0.6) else 0.08
     x, z = w / 2 - 0.02, d / 2 - 0.05
     body = box((-x, foot, -d / 2), (x, h - thick + 0.004, z), "wood", 0.0, "body")
-    legs = [box((sx - 0.015, 0, sz - 0.015), (sx + 0.015, foot + 0.004, sz + 0.015), "metal", 0.0, "leg")
-            for sx in (0.05 - x, x - 0.05) for sz in (0.06 - d / 2, z - 0.05)]  # fmt: skip
+    legs = [
+        post(sx, sz, 0.015, 0, foot + 0.004, "metal", 0.0, "leg")
+        for sx in (0.05 - x, x - 0.05)
+        for sz in (0.06 - d / 2, z - 0.05)
+    ]
     kind, rows, columns = ("drawer", 2, 1) if choices.chance("front", 0.6) else ("door", 1, 2 if w > 0.6 else 1)
     return [*rim, body, *legs, *front((-x, foot), (x, h - thick), z, rows, columns, kind, style)]
 
@@ -89,22 +102,21 @@ def shower(size: Size, style: Style, choices: Choices) -> list[Solid]:
     tray = 0.05
     x, z = w / 2, d / 2
     parts: list[Solid] = [box((-x, 0, -z), (x, tray, z), "ceramic", 0.006, "tray")]
-    parts.append(Turned(centre=np.array([0, tray - 0.002, 0]), low=(0.05, 0.05), high=(0.05, 0.05), height=0.006,
-                        material="metal", role="drain"))  # fmt: skip
+    parts.append(turned((0, tray - 0.002, 0), 0.05, 0.006, material="metal", role="drain"))
     parts.append(box((x - 0.02, tray - 0.002, -z), (x - 0.02 + GLASS, h, z - 0.012), "glass", 0.0, "pane"))
     if not choices.chance("kind", 0.3):  # else one walks in at its front
         parts.append(box((-x + 0.02, tray - 0.002, z - 0.02), (x - 0.02, h, z - 0.02 + GLASS), "glass", 0.0, "pane"))
         grip = np.array(
             [[-x + 0.12, 0.95, z - 0.015], [-x + 0.12, 0.95, z], [-x + 0.12, 1.2, z], [-x + 0.12, 1.2, z - 0.015]]
         )
-        parts.append(Tube(points=grip, radius=0.007, material="metal", role="handle"))
+        parts.append(tube(grip, 0.007, "metal", "handle"))
     top = h - 0.08
     rail = np.array([[0, 0.95, -z + 0.03], [0, top, -z + 0.03], [0, top + 0.03, -z + 0.1], [0, top + 0.02, -0.1 * d]])
-    head = Turned(centre=np.array([0, top - 0.005, -0.1 * d]), low=(0.11, 0.11), high=(0.1, 0.1), height=0.02)
+    head = turned((0, top - 0.005, -0.1 * d), 0.11, 0.02, 0.1)
     mixer = box((-0.12, 1.0, -z), (0.12, 1.05, -z + 0.055), radius=0.008)
     wall = box((-0.012, 0.95, -z), (0.012, 0.975, -z + 0.035))
     foot = box((-0.012, tray - 0.002, -z), (0.012, 1.0, -z + 0.012))  # pipes, up the wall
-    tubes = [Tube(points=rail, radius=0.01), head, mixer, wall, foot]
+    tubes = [tube(rail, 0.01), head, mixer, wall, foot]
     return parts + of_role("shower_head", tubes, material="metal")
 
 
@@ -116,13 +128,19 @@ def bathtub(size: Size, style: Style, choices: Choices) -> list[Solid]:
     x, z = w / 2 - wall, d / 2 - wall
     taps = spout(0.42 * w - wall, h, -d / 2 + 0.035, TAP, 0.14)
     if choices.chance("kind", 0.3):
-        shell = Turned(
-            low=(0.42 * w, 0.4 * d), high=(w / 2, d / 2), height=floor, power=2.6, material="ceramic", role="shell"
+        shell = turned(
+            (0, 0, 0), (0.42 * w, 0.4 * d), floor, (w / 2, d / 2), power=2.6, material="ceramic", role="shell"
         )
-        half = Shell(
-            centre=np.array([0, floor - 0.004, 0]), half=(w / 2, d / 2), thickness=wall, back=h - floor,
-            front=h - floor, power=2.6, material="ceramic", role="shell",
-        )  # fmt: skip
+        half = bent(
+            (0, floor - 0.004, 0),
+            (w / 2, d / 2),
+            wall,
+            h - floor,
+            h - floor,
+            power=2.6,
+            material="ceramic",
+            role="shell",
+        )
         return [shell, half, replace(half, turn=rotation(y=np.pi)), *spout(0.0, h, wall / 2 - d / 2, TAP, 0.14)]
     parts: list[Solid] = [
         box((-w / 2, 0, -d / 2), (w / 2, floor, d / 2), "ceramic", 0.0, "shell"),
@@ -152,13 +170,11 @@ def towel_radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two uprights and rungs in groups, on brackets at the wall."""
     w, h, d = size
     x, z, rungs = w / 2 - 0.02, d / 2 - 0.02, max(6, round(h / 0.07))
-    parts: list[Solid] = [
-        box((s * x - 0.02, 0, z - 0.02), (s * x + 0.02, h, z + 0.02), "ceramic", 0.006, "upright") for s in (-1, 1)
-    ]
+    parts: list[Solid] = [post(s * x, z, 0.02, 0, h, "ceramic", 0.006, "upright") for s in (-1, 1)]
     for number, y in enumerate(np.linspace(0.05, h - 0.05, rungs).tolist()):
         if number % 6 != 5:
             points = np.array([[-x, y, z], [x, y, z]])
-            parts.append(Tube(points=points, radius=0.011, material="ceramic", role="rung"))
+            parts.append(tube(points, 0.011, "ceramic", "rung"))
     for y in (0.12 * h, 0.88 * h):
         parts += [
             box((s * x - 0.012, y, -d / 2), (s * x + 0.012, y + 0.024, z), "metal", 0.0, "bracket") for s in (-1, 1)
@@ -173,19 +189,9 @@ def washing_machine(size: Size, style: Style, choices: Choices) -> list[Solid]:
     centre, ahead = np.array([0, 0.45 * h, z - 0.004]), rotation(x=np.pi / 2)
 
     def disc(radius: float, deep: float, material: str, role: str) -> Solid:
-        return Turned(
-            centre=centre,
-            low=(radius, radius),
-            high=(radius, radius),
-            height=deep,
-            turn=ahead,
-            material=material,
-            role=role,
-        )
+        return turned(centre, radius, deep, turn=ahead, material=material, role=role)
 
-    knob = Turned(
-        centre=np.array([0.12, h - 0.075, z]), low=(0.025, 0.025), high=(0.022, 0.022), height=0.025, turn=ahead
-    )
+    knob = turned((0.12, h - 0.075, z), 0.025, 0.025, 0.022, turn=ahead)
     return [
         box((-w / 2, 0, -d / 2), (w / 2, h, z), "ceramic", 0.006, "machine"),
         box((-w / 2 + 0.02, h - 0.12, z - 0.004), (w / 2 - 0.02, h - 0.03, z + 0.004), "screen", 0.0, "switches"),

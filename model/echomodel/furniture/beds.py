@@ -9,7 +9,7 @@ import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core, cushion, of_role
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.solids import Ball, Block, Solid, Turned, rotation
+from echomodel.furniture.solids import Block, Solid, ball, rotation, turned
 from echomodel.furniture.style import Style
 
 SET_BACK = 0.006  # metres between two faces that would lie in one plane
@@ -63,17 +63,11 @@ def _headboard(style: Style, w: float, h: float, z: float) -> list[Solid]:
         return parts + [box((x - 0.025, h * 0.45, z + 0.01), (x + 0.025, h, z + 0.04)) for x in xs]
     if kind == "posts":
         r = 0.045 * style.bulk
-        parts = [
-            Turned(centre=np.array([s * (w / 2 - r), 0, z + r]), low=(r, r), high=(r * 0.8, r * 0.8), height=h - r)
-            for s in (-1, 1)
-        ]
-        parts += [Ball(centre=np.array([s * (w / 2 - r), h - r, z + r]), half=np.full(3, r * 1.2)) for s in (-1, 1)]
+        parts = [turned((s * (w / 2 - r), 0, z + r), r, h - r, r * 0.8) for s in (-1, 1)]
+        parts += [ball((s * (w / 2 - r), h - r, z + r), r * 1.2) for s in (-1, 1)]
         return [*parts, box((-w / 2 + r, 0.3, z + r * 0.6), (w / 2 - r, h * 0.86, z + r * 1.3), "wood")]
     stuff = "fabric" if style.softness > 0.5 else "wood"
-    arch = Turned(
-        centre=np.array([0, h * 0.6, z]), low=(w / 2, h * 0.4), high=(w / 2, h * 0.4), height=t,
-        turn=rotation(x=np.pi / 2), power=2.4, material=stuff,
-    )  # fmt: skip
+    arch = turned((0, h * 0.6, z), (w / 2, h * 0.4), t, power=2.4, turn=rotation(x=np.pi / 2), material=stuff)
     return [arch, box((-w / 2, 0.02, z + SET_BACK), (w / 2, h * 0.62, z + t - SET_BACK), stuff)]
 
 
@@ -85,13 +79,13 @@ def bedding(w: float, z0: float, z1: float, low: float, choices: Choices, style:
     for i in range(pillows):
         x = -w / 2 + each * (i + 0.5)
         parts.append(
-            Ball(
-                centre=np.array([x, low + thick + 0.06, z0 + 0.26]),
-                half=np.array([min(each * 0.44, 0.38), 0.09, 0.22]),
+            ball(
+                (x, low + thick + 0.06, z0 + 0.26),
+                (min(each * 0.44, 0.38), 0.09, 0.22),
+                "linen",
+                "pillow",
                 power=2.8,
                 turn=rotation(x=-0.25),
-                material="linen",
-                role="pillow",
             )
         )
     if choices.chance("cover", 0.75):

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.beds import bed
-from echomodel.furniture.carpentry import Size, box, of_role
+from echomodel.furniture.carpentry import Size, box, of_role, post
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
-from echomodel.furniture.solids import Ball, Solid, rotation
+from echomodel.furniture.solids import Solid, ball, rotation
 from echomodel.furniture.style import Style
 
 
@@ -47,12 +47,12 @@ def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Sol
     rear, near = -d / 2 + inset, d / 2 - inset
     return [
         box((x0 + 0.05, y, rear), (x1 - 0.05, y + thick, near), "linen", 0.04, "mattress"),
-        Ball(
-            centre=np.array([middle, y + thick + 0.045, rear + 0.22]),
-            half=np.array([min(0.32, 0.36 * wide), 0.075, 0.18]),
+        ball(
+            (middle, y + thick + 0.045, rear + 0.22),
+            (min(0.32, 0.36 * wide), 0.075, 0.18),
+            "linen",
+            "pillow",
             power=2.8,
-            material="linen",
-            role="pillow",
         ),
         box((x0 + 0.045, y + 0.05, -d * 0.12), (x1 - 0.045, y + thick + 0.03, near + 0.01), "blanket", 0.03, "cover"),
     ]
@@ -61,11 +61,7 @@ def _made_up(x0: float, x1: float, y: float, d: float, inset: float) -> list[Sol
 def _house(w: float, h: float, d: float) -> list[Solid]:
     """Posts and rafters in the outline of a house."""
     t, eaves = 0.03, h * 0.72
-    parts: list[Solid] = [
-        box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, eaves, sz * (d / 2 - t) + t))
-        for sx in (-1, 1)
-        for sz in (-1, 1)
-    ]
+    parts: list[Solid] = [post(sx * (w / 2 - t), sz * (d / 2 - t), t, 0, eaves) for sx in (-1, 1) for sz in (-1, 1)]
     slope, length = np.arctan2(h - eaves, w / 2), np.hypot(h - eaves, w / 2)
     for z in (-(d / 2 - t), d / 2 - t):
         for s in (-1, 1):
@@ -82,7 +78,7 @@ def _loft(size: Size) -> list[Solid]:
     w, h, d = size
     t, deck = 0.035, h - 0.45
     posts = [(sx * (w / 2 - t), sz * (d / 2 - t)) for sx in (-1, 1) for sz in (-1, 1)]
-    parts: list[Solid] = [box((x - t, 0, z - t), (x + t, h - 0.05, z + t), role="leg") for x, z in posts]
+    parts: list[Solid] = [post(x, z, t, 0, h - 0.05, role="leg") for x, z in posts]
     parts.append(box((-w / 2, deck, -d / 2), (w / 2, deck + 0.1, d / 2), role="rail"))
     parts += _made_up(-w / 2, w / 2, deck + 0.08, d, 0.05)
     guard: list[Solid] = []
@@ -107,11 +103,7 @@ def _cot(size: Size, style: Style) -> list[Solid]:
     """Bars on four sides round a small mattress."""
     w, h, d = size
     t, y0 = 0.025, min(0.2, h * 0.3)
-    posts: list[Solid] = [
-        box((sx * (w / 2 - t) - t, 0, sz * (d / 2 - t) - t), (sx * (w / 2 - t) + t, h, sz * (d / 2 - t) + t))
-        for sx in (-1, 1)
-        for sz in (-1, 1)
-    ]
+    posts: list[Solid] = [post(sx * (w / 2 - t), sz * (d / 2 - t), t, 0, h) for sx in (-1, 1) for sz in (-1, 1)]
     parts: list[Solid] = []
     for y in (y0, h - 0.05):
         parts += [
@@ -122,9 +114,9 @@ def _cot(size: Size, style: Style) -> list[Solid]:
         ]
     r = 0.011
     for z in np.linspace(-d / 2, d / 2, int(np.clip(d / 0.13, 5, 24)))[1:-1]:
-        parts += [box((s * (w / 2 - t) - r, y0, z - r), (s * (w / 2 - t) + r, h - 0.03, z + r)) for s in (-1, 1)]
+        parts += [post(s * (w / 2 - t), z, r, y0, h - 0.03) for s in (-1, 1)]
     for x in np.linspace(-w / 2, w / 2, int(np.clip(w / 0.13, 4, 16)))[1:-1]:
-        parts += [box((x - r, y0, s * (d / 2 - t) - r), (x + r, h - 0.03, s * (d / 2 - t) + r)) for s in (-1, 1)]
+        parts += [post(x, s * (d / 2 - t), r, y0, h - 0.03) for s in (-1, 1)]
     low, high = (-w / 2 + 0.04, y0, -d / 2 + 0.04), (w / 2 - 0.04, y0 + 0.12, d / 2 - 0.04)
     mattress = box(low, high, "linen", 0.03, "mattress")
     return [*of_role("leg", posts), *of_role("guard", parts), mattress]
@@ -140,9 +132,7 @@ def _bunk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     upper = h - 0.42
     parts: list[Solid] = []
     for x in (x0 + t, x0 + wide - t):
-        parts += [
-            box((x - t, 0, s * (d / 2 - t) - t), (x + t, h - 0.08, s * (d / 2 - t) + t), role="leg") for s in (-1, 1)
-        ]
+        parts += [post(x, s * (d / 2 - t), t, 0, h - 0.08, role="leg") for s in (-1, 1)]
     for y in (0.22, upper):
         parts.append(box((x0, y, -d / 2), (x0 + wide, y + 0.12, d / 2), role="rail"))
         parts += _made_up(x0, x0 + wide, y + 0.1, d, 0.06)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echomodel.furniture.solids import IDENTITY, Ball, Block, Solid, Tube, Turned, rotation, upright
+from echomodel.furniture.solids import IDENTITY, Block, Solid, Turned, ball, rotation, tube, turned, upright
 from echomodel.furniture.style import Style
 
 Size = np.ndarray  # (3,) width x, height y, depth z, metres
@@ -18,6 +18,20 @@ def box(low: tuple, high: tuple, material: str = "wood", radius: float = 0.0, ro
     """The block between two corners (3,)."""
     a, b = np.asarray(low, float), np.asarray(high, float)
     return Block(centre=(a + b) / 2, half=np.maximum((b - a) / 2, 1e-4), radius=radius, material=material, role=role)
+
+
+def post(
+    x: float,
+    z: float,
+    half: float,
+    y0: float,
+    y1: float,
+    material: str = "wood",
+    radius: float = 0.0,
+    role: str = "board",
+) -> Block:
+    """An upright of square section about (x, z), from y0 to y1."""
+    return box((x - half, y0, z - half), (x + half, y1, z + half), material, radius, role)
 
 
 def core(low: tuple, high: tuple, material: str = "wood") -> Block:
@@ -37,7 +51,7 @@ def cushion(
     a, b = np.asarray(low, float), np.asarray(high, float)
     centre, half = (a + b) / 2, np.maximum((b - a) / 2, 1e-3)
     if style.softness > 0.85 and half.min() / half.max() > 0.12:
-        return Ball(centre=centre, half=half * 1.02, power=5.0, turn=turn, material=material, role=role)
+        return ball(centre, half * 1.02, material, role, power=5.0, turn=turn)
     radius = float(half.min() * (0.25 + 0.7 * style.softness))
     return Block(centre=centre, half=half, radius=radius, turn=turn, material=material, role=role)
 
@@ -57,16 +71,7 @@ def top(shape: str, width: float, depth: float, y: float, thick: float, style: S
     half = (width / 2, depth / 2)
     power = {"square": np.inf, "corners": corner_power(style), "round": 2.0}[shape]
     rounding = 0.0 if shape == "square" else thick * 0.3 * style.softness
-    return Turned(
-        centre=np.array([0.0, y - thick, 0.0]),
-        low=half,
-        high=half,
-        height=thick,
-        power=power,
-        rounding=rounding,
-        material=material,
-        role="top",
-    )
+    return turned((0.0, y - thick, 0.0), half, thick, power=power, rounding=rounding, material=material, role="top")
 
 
 def leg(foot: tuple, head: tuple, thick: float, style: Style, material: str = "wood", taper: float = 1.0) -> Turned:
@@ -74,13 +79,13 @@ def leg(foot: tuple, head: tuple, thick: float, style: Style, material: str = "w
     bottom, above = np.asarray(foot, float), np.asarray(head, float)
     power = 2.0 if style.profile == "round" else np.inf
     half = thick / 2
-    return Turned(
-        centre=bottom,
-        turn=upright(bottom, above),
-        low=(half * taper, half * taper),
-        high=(half, half),
-        height=float(np.linalg.norm(above - bottom)),
+    return turned(
+        bottom,
+        half * taper,
+        float(np.linalg.norm(above - bottom)),
+        half,
         power=power,
+        turn=upright(bottom, above),
         material=material,
     )
 
@@ -90,18 +95,9 @@ def turned_leg(x: float, z: float, height: float, thick: float, material: str = 
     r = thick / 2
 
     def section(y0: float, y1: float, low: float, high: float, power: float = 2.0) -> Turned:
-        return Turned(
-            centre=np.array([x, y0 * height, z]),
-            low=(low * r, low * r),
-            high=(high * r, high * r),
-            height=(y1 - y0) * height,
-            power=power,
-            material=material,
-        )
+        return turned((x, y0 * height, z), low * r, (y1 - y0) * height, high * r, power=power, material=material)
 
-    ring = Ball(
-        centre=np.array([x, 0.68 * height, z]), half=np.array([1.25 * r, 0.45 * r, 1.25 * r]), material=material
-    )
+    ring = ball((x, 0.68 * height, z), (1.25 * r, 0.45 * r, 1.25 * r), material)
     return [section(0, 0.08, 0.9, 0.55), section(0.08, 0.7, 0.55, 1.0), ring, section(0.7, 1, 1.05, 1.05, np.inf)]
 
 
@@ -138,12 +134,7 @@ def _stand(
         return [box((-width / 2 * 0.94, 0, -depth / 2 * 0.94), (width / 2 * 0.94, h, depth / 2 * 0.9), "accent")]
     if kind == "bun":
         return [
-            Ball(
-                centre=np.array([cx, h / 2 + 0.004, cz]),
-                half=np.array([thick * 0.8, h / 2 + 0.004, thick * 0.8]),
-                power=2.5,
-            )
-            for cx, cz in corners
+            ball((cx, h / 2 + 0.004, cz), (thick * 0.8, h / 2 + 0.004, thick * 0.8), power=2.5) for cx, cz in corners
         ]
     if kind == "turned":
         return [part for cx, cz in corners for part in turned_leg(cx, cz, h, thick * 1.15)]
@@ -154,11 +145,7 @@ def _stand(
     if kind == "hairpin":
         r = max(0.006, thick * 0.16)
         return [
-            Tube(
-                points=np.array([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]]),
-                radius=r,
-                material="metal",
-            )
+            tube([[cx - np.sign(cx) * d, h, cz], [cx, r, cz], [cx, h, cz - np.sign(cz) * d]], r, "metal")
             for cx, cz in corners
             for d in (min(0.12, width * 0.12),)
         ]
@@ -184,7 +171,7 @@ def _sled(x: float, z: float, h: float, thick: float) -> list[Solid]:
     parts: list[Solid] = []
     for side in (-x, x):
         parts.append(box((side - t, 0, -z), (side + t, 2 * t, z), "metal"))
-        parts += [box((side - t, 0, end - t), (side + t, h, end + t), "metal") for end in (-z, z)]
+        parts += [post(side, end, t, 0, h, "metal") for end in (-z, z)]
         parts.append(box((side - t, h - 2 * t, -z), (side + t, h, z), "metal"))
     return parts
 
@@ -196,14 +183,7 @@ def _trestle(x: float, z: float, h: float, thick: float) -> list[Solid]:
         parts.append(box((side - t, 0, -z), (side + t, thick, z)))
         parts.append(box((side - t, h - thick, -z * 0.9), (side + t, h, z * 0.9)))
         parts += [
-            Turned(
-                centre=np.array([side, thick * 0.5, s * z * 0.25]),
-                low=(t, t),
-                high=(t, t),
-                height=h - thick,
-                power=np.inf,
-                turn=rotation(x=-s * 0.12),
-            )
+            turned((side, thick * 0.5, s * z * 0.25), t, h - thick, power=np.inf, turn=rotation(x=-s * 0.12))
             for s in (-1, 1)
         ]
         parts.append(box((side - t * 0.8, h * 0.45, -z * 0.25), (side + t * 0.8, h * 0.45 + thick, z * 0.25)))
@@ -220,28 +200,24 @@ def _column(width: float, depth: float, height: float, style: Style) -> list[Sol
     r = max(0.025, 0.055 * style.bulk * min(width, depth) ** 0.5)
     material = "metal" if style.family in ("modern", "industrial") else "wood"
     spread = min(width, depth) * 0.32
-    column = Turned(low=(r, r), high=(r * 0.8, r * 0.8), height=height, material=material)
+    column = turned((0, 0, 0), r, height, r * 0.8, material=material)
     if style.family in ("classic", "rustic"):
         feet: list[Solid] = [
-            Tube(
-                points=np.array(
-                    [
-                        [0, height * 0.3, 0],
-                        [s * spread * c, height * 0.14, s * spread * d * 0.9],
-                        [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d],
-                    ]
-                ),
-                radius=r * 0.6,
+            tube(
+                [
+                    [0, height * 0.3, 0],
+                    [s * spread * c, height * 0.14, s * spread * d * 0.9],
+                    [s * spread * 1.3 * c, r * 0.6, s * spread * 1.3 * d],
+                ],
+                r * 0.6,
             )
             for s in (-1, 1)
             for c, d in ((0.7, 0.7), (0.7, -0.7))
         ]
-        bulb = Ball(centre=np.array([0, height * 0.55, 0]), half=np.array([r * 1.5, height * 0.12, r * 1.5]))
+        bulb = ball((0, height * 0.55, 0), (r * 1.5, height * 0.12, r * 1.5))
         return [column, bulb, *feet]
     if style.contrast > 0.6:
-        cone = Turned(low=(spread * 0.95, spread * 0.95), high=(r, r), height=height * 0.95, material=material)
+        cone = turned((0, 0, 0), spread * 0.95, height * 0.95, r, material=material)
         return [cone, replace(column, height=height)]
-    disc = Turned(
-        low=(spread, spread), high=(spread * 0.9, spread * 0.9), height=max(0.015, height * 0.04), material=material
-    )
+    disc = turned((0, 0, 0), spread, max(0.015, height * 0.04), spread * 0.9, material=material)
     return [disc, column]

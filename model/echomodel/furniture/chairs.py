@@ -10,7 +10,7 @@ import numpy as np
 from echomodel.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.furniture.carpentry import Size, base, box, of_role, top
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.solids import Ball, Shell, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.stools import stool
 from echomodel.furniture.style import Style
 
@@ -27,12 +27,12 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
     if style.back == "shell":
         arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
-        shell = Shell(
-            centre=np.array([0, seat - thick * 0.6, d * 0.15]),
-            half=(w / 2, d * 0.62),
-            thickness=0.035 + 0.04 * style.softness,
-            back=h - seat,
-            front=arms - seat,
+        shell = bent(
+            (0, seat - thick * 0.6, d * 0.15),
+            (w / 2, d * 0.62),
+            0.035 + 0.04 * style.softness,
+            h - seat,
+            arms - seat,
             power=2.4 + style.corner,
             ease=2.5,
             material="fabric",
@@ -59,11 +59,9 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
     parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
     corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
-    legs: list[Solid] = [
-        Tube(points=np.array([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]]), radius=r) for cx, cz in corners
-    ]
-    legs += [Tube(points=np.array([[-x, y, cz], [x, y, cz]]), radius=r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
-    legs += [Tube(points=np.array([[cx, 0.13, -z], [cx, 0.13, z]]), radius=r * 0.7) for cx in (-x, x)]
+    legs: list[Solid] = [tube([[cx, 0, cz], [cx * 0.97, seat, cz * 0.97]], r) for cx, cz in corners]
+    legs += [tube([[-x, y, cz], [x, y, cz]], r * 0.7) for y, cz in ((0.1, z), (0.16, -z))]
+    legs += [tube([[cx, 0.13, -z], [cx, 0.13, z]], r * 0.7) for cx in (-x, x)]
     parts += of_role("leg", legs)
     splat = w * choices.between("share", 0.14, 0.24)
     parts.append(leaning((-splat / 2, seat, -z - 0.012), (splat / 2, h - r, -z + 0.012), 0.1, seat, -z))
@@ -72,15 +70,10 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         t = np.linspace(-np.pi / 2, np.pi / 2, 13)
         fall = np.abs(t) / (np.pi / 2)
         bow = np.stack([x * np.sin(t), h - r - (h - arm) * fall**1.5, z * 0.7 - (z * 1.7 + 0.05) * np.cos(t)], 1)
-        arms: list[Solid] = [Tube(points=bow, radius=r * 1.1)]
-        arms += [
-            Tube(points=np.array([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]]), radius=r * 0.8) for s in (-1, 1)
-        ]
+        arms: list[Solid] = [tube(bow, r * 1.1)]
+        arms += [tube([[s * x, seat, z * 0.6], [s * x, arm, z * 0.68]], r * 0.8) for s in (-1, 1)]
         head = bow[int(np.abs(bow[:6, 2] + z * 0.5).argmin())]  # where the posts behind meet the bow
-        arms += [
-            Tube(points=np.array([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]]), radius=r * 0.8)
-            for s in (-1, 1)
-        ]
+        arms += [tube([[s * head[0] * 1.05, seat, -z * 0.6], [s * head[0], *head[1:]]], r * 0.8) for s in (-1, 1)]
         return parts + of_role("arm", arms)
     yoke = np.array(
         [
@@ -90,21 +83,19 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             [w * 0.5, h - 0.03, -z - 0.07],
         ]
     )
-    parts.append(Tube(points=yoke, radius=r * 1.2, role="back"))
-    posts = [Tube(points=np.array([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]]), radius=r) for s in (-1, 1)]
+    parts.append(tube(yoke, r * 1.2, role="back"))
+    posts = [tube([[s * x, seat, -z], [s * x * 0.98, h - r, -z - 0.07]], r) for s in (-1, 1)]
     parts += of_role("back", [*posts])
     for s in (-1, 1):
         parts.append(
-            Tube(
-                points=np.array(
-                    [[s * x, arm + 0.03, -z - 0.03], [s * x, arm, z * 0.7], [s * x * 1.02, arm - 0.02, z * 0.8]]
-                ),
-                radius=r * 0.9,
+            tube(
+                [[s * x, arm + 0.03, -z - 0.03], [s * x, arm, z * 0.7], [s * x * 1.02, arm - 0.02, z * 0.8]],
+                r * 0.9,
                 role="arm",
             )
         )
         post = np.array([[s * x, seat, z * 0.75], [s * x, arm, z * 0.75]])
-        parts.append(Tube(points=post, radius=r * 0.8, role="arm"))
+        parts.append(tube(post, r * 0.8, role="arm"))
     return parts
 
 
@@ -120,12 +111,12 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back in ("shell", "cushion", "oval"):
         return [
             *parts,
-            Shell(
-                centre=np.array([0, seat - thick * 0.5, d * 0.05]),
-                half=(w / 2, d * 0.55),
-                thickness=0.05,
-                back=h - seat,
-                front=(h - seat) * 0.6,
+            bent(
+                (0, seat - thick * 0.5, d * 0.05),
+                (w / 2, d * 0.55),
+                0.05,
+                h - seat,
+                (h - seat) * 0.6,
                 ease=2.0,
                 material="fabric",
                 role="back",
@@ -144,15 +135,9 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if choices.chance("form", 0.25):
         r = 0.026
         parts += [
-            Turned(low=(r, r), high=(r, r), height=seat - thick, material="metal"),
-            Turned(low=(w * 0.46, w * 0.46), high=(w * 0.42, w * 0.42), height=0.03, material="metal"),
-            Turned(
-                centre=np.array([0, seat * 0.35, 0]),
-                low=(w * 0.28, w * 0.28),
-                high=(w * 0.28, w * 0.28),
-                height=0.022,
-                material="metal",
-            ),
+            turned((0, 0, 0), r, seat - thick, material="metal"),
+            turned((0, 0, 0), w * 0.46, 0.03, w * 0.42, material="metal"),
+            turned((0, seat * 0.35, 0), w * 0.28, 0.022, material="metal"),
         ]
         parts = of_role("leg", parts)
     else:
@@ -175,12 +160,12 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back in ("shell", "cushion", "oval"):
         return [
             *parts,
-            Shell(
-                centre=np.array([0, seat - thick * 0.5, 0]),
-                half=(w * 0.48, d * 0.46),
-                thickness=0.035,
-                back=h - seat,
-                front=(h - seat) * 0.4,
+            bent(
+                (0, seat - thick * 0.5, 0),
+                (w * 0.48, d * 0.46),
+                0.035,
+                h - seat,
+                (h - seat) * 0.4,
                 material="fabric",
                 role="back",
             ),
@@ -196,28 +181,21 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts: list[Solid] = []
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 2:
         x, z = reach * np.cos(angle), reach * np.sin(angle)
-        parts.append(
-            Tube(points=np.array([[0, 0.1, 0], [x, wheel * 2 + 0.01, z]]), radius=0.018, material="metal", role="leg")
-        )
-        parts.append(Ball(centre=np.array([x, wheel, z]), half=np.full(3, wheel), material="metal", role="caster"))
-    parts.append(
-        Turned(
-            centre=np.array([0, 0.08, 0]), low=(0.03, 0.03), high=(0.026, 0.026), height=seat - 0.1, material="metal",
-            role="stem",
-        )
-    )  # fmt: skip
+        parts.append(tube([[0, 0.1, 0], [x, wheel * 2 + 0.01, z]], 0.018, "metal", "leg"))
+        parts.append(ball((x, wheel, z), wheel, "metal", "caster"))
+    parts.append(turned((0, 0.08, 0), 0.03, seat - 0.1, 0.026, material="metal", role="stem"))
     sw, sd = w * 0.86, d * 0.8
     parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), sw, sd, seat, 0.08, d * 0.04))
     rake = 0.1 + style.rake * 0.5
     y0 = seat + 0.08 * style.contrast
     if style.back == "shell":
         parts.append(
-            Shell(
-                centre=np.array([0, seat - 0.05, d * 0.05]),
-                half=(sw / 2 + 0.02, d * 0.5),
-                thickness=0.05,
-                back=h - seat + 0.05,
-                front=0.12 + 0.1 * style.arm_height,
+            bent(
+                (0, seat - 0.05, d * 0.05),
+                (sw / 2 + 0.02, d * 0.5),
+                0.05,
+                h - seat + 0.05,
+                0.12 + 0.1 * style.arm_height,
                 material="fabric",
                 role="back",
             )
@@ -228,14 +206,7 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         turn = rotation(x=-rake)
         centre = turn @ np.array([0, y0 - seat + tall / 2, 0]) + [0, seat, -d * 0.4]
         parts.append(
-            Ball(
-                centre=centre,
-                half=np.array([sw * 0.47, tall / 2, 0.04]),
-                power=2.6 + 2 * style.contrast,
-                turn=turn,
-                material="fabric",
-                role="back",
-            )
+            ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=2.6 + 2 * style.contrast, turn=turn)
         )
     elif style.tufting > 0.6:
         slats = np.linspace(y0, h, 5)
@@ -270,26 +241,12 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         )
     rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
     rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
-    parts.append(
-        Tube(
-            points=np.array([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest]),
-            radius=0.016,
-            material="metal",
-            role="stem",
-        )
-    )
+    parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))
     if choices.chance("extra", 0.75):
         y = seat + 0.2
         for s in (-1, 1):
             x = s * (w / 2 - 0.025)
-            parts.append(
-                Tube(
-                    points=np.array([[s * sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]]),
-                    radius=0.016,
-                    material="metal",
-                    role="arm",
-                )
-            )
+            parts.append(tube([[s * sw * 0.4, seat - 0.05, 0], [x, seat - 0.03, 0], [x, y, 0]], 0.016, "metal", "arm"))
             pad = box((x - 0.025, y - 0.015, -d * 0.22), (x + 0.025, y + 0.015, d * 0.22), "accent", 0.012, "arm")
             parts.append(pad)
     return parts

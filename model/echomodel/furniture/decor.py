@@ -7,7 +7,7 @@ import numpy as np
 from echomodel.furniture.carpentry import Size, box, of_role
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.lathe import Blade
-from echomodel.furniture.solids import Ball, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, ball, rotation, tube, turned
 from echomodel.furniture.style import Style
 
 PANEL = (16 / 9, 21 / 9)  # width over height of a screen with its bezel
@@ -26,31 +26,11 @@ def plant(size: Size, style: Style, choices: Choices) -> list[Solid]:
         foot = min(0.2, h * 0.15)
         for a in np.arange(4) * np.pi / 2 + np.pi / 4:
             x, z = pot_r * 1.05 * np.cos(a), pot_r * 1.05 * np.sin(a)
-            parts.append(
-                Tube(points=np.array([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]]), radius=0.014, role="leg")
-            )
+            parts.append(tube([[x, 0, z], [x * 0.9, foot + pot_h * 0.5, z * 0.9]], 0.014, role="leg"))
     waist = 0.6 + 0.35 * style.taper
+    parts.append(turned((0, foot, 0), pot_r * waist, pot_h, pot_r, power=power, material="ceramic", role="pot"))
     parts.append(
-        Turned(
-            centre=np.array([0, foot, 0]),
-            low=(pot_r * waist, pot_r * waist),
-            high=(pot_r, pot_r),
-            height=pot_h,
-            power=power,
-            material="ceramic",
-            role="pot",
-        )
-    )
-    parts.append(
-        Turned(
-            centre=np.array([0, foot + pot_h * 0.98, 0]),
-            low=(pot_r * 0.9, pot_r * 0.9),
-            high=(pot_r * 0.9, pot_r * 0.9),
-            height=pot_h * 0.04,
-            power=power,
-            material="soil",
-            role="soil",
-        )
+        turned((0, foot + pot_h * 0.98, 0), pot_r * 0.9, pot_h * 0.04, power=power, material="soil", role="soil")
     )
     y0 = foot + pot_h
     kind = choices.pick("kind", ["tree", "blades", "leaves", "cactus"], [0.38, 0.22, 0.32, 0.08])
@@ -64,7 +44,7 @@ def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Sol
     crown = (h - y0) * choices.between("split", 0.5, 0.7)
     middle, fork = h - crown / 2, max(y0 + 0.05, h - crown * 1.02)
     trunk = np.array([[0, y0 - 0.02, 0], [0.015, (y0 + fork) / 2, 0.01], [0, fork, 0]])
-    parts: list[Solid] = [Tube(points=trunk, radius=0.016, material="stem", role="stem")]
+    parts: list[Solid] = [tube(trunk, 0.016, "stem", "stem")]
     count, reach = choices.whole("count", 8, 11), np.array([a, crown / 2, b])
     for i in range(count):
         around, level = 2 * np.pi * (i * 0.382 + rng.uniform(-0.05, 0.05)), 2 * (i + 0.5) / count - 0.9
@@ -73,7 +53,7 @@ def _tree(y0: float, h: float, a: float, b: float, choices: Choices) -> list[Sol
         start, tip = np.array([0, fork - 0.02, 0]), np.array([0, middle, 0]) + out * reach * rng.uniform(0.6, 0.75)
         bend = (start + tip) / 2 + np.array([out[0], -0.3, out[2]]) * 0.12 * crown
         branch = np.array([start, bend, tip])
-        parts.append(Tube(points=branch, radius=0.006, material="stem", role="stem"))
+        parts.append(tube(branch, 0.006, "stem", "stem"))
         length = float(np.clip(0.42 * min(a, b, crown / 2), 0.05, 0.16))
         for k in range(8):
             share = 0.35 + 0.65 * k / 7
@@ -127,7 +107,7 @@ def _leaves(y0: float, h: float, a: float, b: float, choices: Choices) -> list[S
         out = np.array([np.sin(yaw) * a, 0, np.cos(yaw) * b]) * rng.uniform(0.4, 0.5) * (1 - 0.35 * i / count)
         end = np.array([0, y0 + tall, 0]) + out
         stem = np.array([[0, y0 - 0.02, 0], [out[0] * 0.4, y0 + tall * 0.65, out[2] * 0.4], end])
-        parts.append(Tube(points=stem, radius=0.007, material="leaf", role="stem"))
+        parts.append(tube(stem, 0.007, "leaf", "stem"))
         length = min(a, b) * rng.uniform(0.75, 0.95)
         parts.append(_leaf(end, yaw, rng.uniform(-0.1, 0.45), length, length * 0.68, bend=0.9))
     return parts
@@ -138,16 +118,16 @@ def _cactus(y0: float, h: float, a: float, b: float, choices: Choices) -> list[S
     rng = choices.stream("detail")
     r = min(a, b) * 0.26
     parts: list[Solid] = [
-        Tube(points=np.array([[0, y0 - 0.02, 0], [0, h - r, 0]]), radius=r, material="leaf", role="stem"),
-        Ball(centre=np.array([0, h - r, 0]), half=np.full(3, r), material="leaf", role="stem"),
+        tube([[0, y0 - 0.02, 0], [0, h - r, 0]], r, "leaf", "stem"),
+        ball((0, h - r, 0), r, "leaf", "stem"),
     ]
     for s in (-1, 1):
         y = y0 + (h - y0) * rng.uniform(0.3, 0.5)
         tip = y + (h - y0) * rng.uniform(0.2, 0.4)
         x = s * (a - r * 0.6)
         arm = np.array([[0, y, 0], [x * 0.75, y + r * 0.1, 0], [x, y + r * 0.8, 0], [x, tip, 0]])
-        parts.append(Tube(points=arm, radius=r * 0.6, material="leaf", role="stem"))
-        parts.append(Ball(centre=arm[-1], half=np.full(3, r * 0.6), material="leaf", role="stem"))
+        parts.append(tube(arm, r * 0.6, "leaf", "stem"))
+        parts.append(ball(arm[-1], r * 0.6, "leaf", "stem"))
     return parts
 
 
@@ -174,7 +154,7 @@ def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for s in (-1, 1):
             for reach in (-d / 2 + 0.006, d / 2 - 0.006):
                 top, toe = np.array([s * w * 0.34, low + 0.03, (back + thin) / 2]), [s * w * 0.37, 0.008, reach]
-                feet.append(Tube(points=np.array([top, [s * w * 0.35, low * 0.6, reach * 0.4], toe]), radius=0.008))
+                feet.append(tube([top, [s * w * 0.35, low * 0.6, reach * 0.4], toe], 0.008))
     elif kind == "plate":
         feet = [
             box((-w * 0.17, 0, -d / 2), (w * 0.17, 0.012, d / 2), radius=0.005),
@@ -183,6 +163,6 @@ def tv(size: Size, style: Style, choices: Choices) -> list[Solid]:
     elif kind == "arc":
         turn = np.linspace(-np.pi / 2, np.pi / 2, 9)
         bow = np.stack([0.24 * w * np.sin(turn), 0 * turn + 0.009, d / 2 - 0.009 - (d - 0.018) * np.cos(turn)], 1)
-        feet = [Tube(points=bow, radius=0.009), box((-0.03, 0, back - 0.004), (0.03, low + 0.1 * h, back + 0.012))]
+        feet = [tube(bow, 0.009), box((-0.03, 0, back - 0.004), (0.03, low + 0.1 * h, back + 0.012))]
         feet.append(box((-0.03, 0, -d / 2), (0.03, 0.012, back + 0.008)))
     return parts + of_role("foot", feet, material="metal")

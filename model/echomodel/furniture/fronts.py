@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import box, core
-from echomodel.furniture.solids import Ball, Joint, Solid, Tube
+from echomodel.furniture.solids import Joint, Solid, ball, tube
 from echomodel.furniture.style import Style
 
 Point = tuple[float, float]
@@ -117,9 +117,7 @@ def _inside(low: Point, high: Point, z0: float, z1: float) -> list[Solid]:
     (x0, y0), (x1, y1), tall = low, high, high[1] - low[1]
     if tall > HANGING:
         y, z = y1 - 0.3, (z0 + z1) / 2
-        rail = Tube(
-            points=np.array([[x0, y - 0.07, z], [x1, y - 0.07, z]]), radius=0.012, material="metal", role="rail"
-        )
+        rail = tube([[x0, y - 0.07, z], [x1, y - 0.07, z]], 0.012, "metal", "rail")
         return [box((x0, y, z0), (x1, y + 0.018, z1), role="shelf"), rail]
     heights = np.linspace(y0, y1, int(np.clip(round(tall / SHELVES), 1, 6)) + 1)[1:-1]
     return [box((x0, y - 0.009, z0), (x1, y + 0.009, z1), role="shelf") for y in heights]
@@ -158,13 +156,10 @@ def _handle(
             part
             for dx in places
             for part in (
-                Tube(points=np.array([x + dx, y, z]) + stem, radius=0.006, material="metal", role="handle"),
-                Ball(
-                    centre=np.array([x + dx, y, z + r + 0.004]), half=np.array([r, r, r * 0.8]), material="metal",
-                    role="handle",
-                ),
+                tube(np.array([x + dx, y, z]) + stem, 0.006, "metal", "handle"),
+                ball((x + dx, y, z + r + 0.004), (r, r, r * 0.8), "metal", "handle"),
             )
-        ]  # fmt: skip
+        ]
     if style.handles == "edge":
         if door:
             return [
@@ -177,9 +172,9 @@ def _handle(
     along = np.array([0.0, length, 0.0]) if door else np.array([length, 0.0, 0.0])
     grip, out = np.array([x, y, z]), np.array([0.0, 0.0, 0.026])
     ends = np.array([grip + out - along, grip + out + along])
-    bar = Tube(points=ends, radius=0.0055, material="metal", role="handle")
+    bar = tube(ends, 0.0055, "metal", "handle")
     posts = [
-        Tube(points=np.array([end - np.array([0, 0, deep]), end + out]), radius=0.005, material="metal", role="handle")
+        tube([end - np.array([0, 0, deep]), end + out], 0.005, "metal", "handle")
         for end in (grip - 0.85 * along, grip + 0.85 * along)
     ]
     return [bar, *posts]

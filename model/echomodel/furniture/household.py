@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, of_role
+from echomodel.furniture.carpentry import Size, box, of_role, post
 from echomodel.furniture.cases import carcass
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
-from echomodel.furniture.solids import Ball, Solid, Tube
+from echomodel.furniture.solids import Solid, ball, tube
 from echomodel.furniture.style import Style
 
 SLAT = 0.09  # metres, width of a slat outdoors
@@ -23,11 +23,9 @@ def coat_rack(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if choices.chance("kind", 0.4):
         x, posts = w / 2 - 0.02, []
         for s in (-1, 1):
-            posts.append(
-                Tube(points=np.array([[s * x, 0.014, -d / 2 + 0.014], [s * x, 0.014, d / 2 - 0.014]]), radius=0.014)
-            )
-            posts.append(Tube(points=np.array([[s * x, 0.01, 0.0], [s * x, h - 0.014, 0.0]]), radius=0.014))
-        posts.append(Tube(points=np.array([[-x, h - 0.014, 0.0], [x, h - 0.014, 0.0]]), radius=0.014))
+            posts.append(tube([[s * x, 0.014, -d / 2 + 0.014], [s * x, 0.014, d / 2 - 0.014]], 0.014))
+            posts.append(tube([[s * x, 0.01, 0.0], [s * x, h - 0.014, 0.0]], 0.014))
+        posts.append(tube([[-x, h - 0.014, 0.0], [x, h - 0.014, 0.0]], 0.014))
         shelf = box((-x, 0.16, -d / 2 + 0.03), (x, 0.18, d / 2 - 0.03), role="shelf")
         return [*of_role("post", posts, material="metal"), shelf]
     z = -d / 2 + 0.03
@@ -40,7 +38,7 @@ def coat_rack(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts.append(box((x, 0, z - 0.004), (x + 0.03, 0.432, d / 2 - 0.01), "wood", 0.0, "side"))
     for x in np.linspace(-w / 2 + 0.1, w / 2 - 0.1, count):
         bend = np.array([[x, y, z - 0.004], [x, y - 0.01, z + 0.05], [x, y + 0.03, z + 0.075]])
-        hooks.append(Tube(points=bend, radius=0.008, material="metal", role="hook"))
+        hooks.append(tube(bend, 0.008, "metal", "hook"))
     return parts + hooks
 
 
@@ -59,7 +57,7 @@ def radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if choices.chance("kind", 0.35):
         for x in np.linspace(-w / 2 + 0.03, w / 2 - 0.03, max(3, round(w / 0.06))):
             for z in (0.022 - d / 2, d / 2 - 0.022):
-                parts.append(Tube(points=np.array([[x, low, z], [x, h - 0.022, z]]), radius=0.022))
+                parts.append(tube([[x, low, z], [x, h - 0.022, z]], 0.022))
         for y in (low + 0.02, h - 0.04):
             parts.append(box((-w / 2, y - 0.02, 0.02 - d / 2), (w / 2, y + 0.02, d / 2 - 0.02)))
     else:
@@ -77,9 +75,7 @@ def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
         body = box((-w / 2, 0.08, -d / 2), (w / 2, h, d / 2 - 0.02), "screen", 0.01, "stove")
         pane = box((-0.36 * w, 0.4 * h, d / 2 - 0.024), (0.36 * w, 0.85 * h, d / 2), "glass", 0.0, "pane")
         feet = [
-            box((x - 0.02, 0, z - 0.02), (x + 0.02, 0.084, z + 0.02), "metal", 0.0, "leg")
-            for x in (-0.4 * w, 0.4 * w)
-            for z in (-0.35 * d, 0.35 * d)
+            post(x, z, 0.02, 0, 0.084, "metal", 0.0, "leg") for x in (-0.4 * w, 0.4 * w) for z in (-0.35 * d, 0.35 * d)
         ]
         return [body, pane, *feet]
     pier, top = 0.17 * w, h - 0.06
@@ -94,8 +90,10 @@ def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((min(a, b), 0, -d / 2), (max(a, b), 0.72 * h, inner), "ceramic", 0.004, "stone")
         for a, b in ((-w / 2 + 0.03, -w / 2 + pier), (w / 2 - pier, w / 2 - 0.03))
     ]
-    logs = [Tube(points=np.array([[-0.2 * w, 0.1 + 0.06 * k, z], [0.2 * w, 0.1 + 0.06 * k, z]]), radius=0.042)
-            for k, z in ((0, -0.05), (0, 0.03), (1, -0.01))]  # fmt: skip
+    logs = [
+        tube([[-0.2 * w, 0.1 + 0.06 * k, z], [0.2 * w, 0.1 + 0.06 * k, z]], 0.042)
+        for k, z in ((0, -0.05), (0, 0.03), (1, -0.01))
+    ]
     return parts + of_role("log", logs, material="stem")
 
 
@@ -140,23 +138,15 @@ def cot(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     x, z, t = w / 2 - 0.02, d / 2 - 0.02, 0.02
     low, floor = 0.12, min(0.35, 0.4 * h)
-    parts: list[Solid] = [
-        box((sx * x - t, 0, sz * z - t), (sx * x + t, h, sz * z + t), "wood", 0.004, "leg")
-        for sx in (-1, 1)
-        for sz in (-1, 1)
-    ]
+    parts: list[Solid] = [post(sx * x, sz * z, t, 0, h, "wood", 0.004, "leg") for sx in (-1, 1) for sz in (-1, 1)]
     for y in (low, h - 0.05):
         parts += [box((-x, y, s * z - 0.013), (x, y + 0.04, s * z + 0.013), "wood", 0.0, "rail") for s in (-1, 1)]
         parts += [box((s * x - 0.013, y, -z), (s * x + 0.013, y + 0.04, z), "wood", 0.0, "rail") for s in (-1, 1)]
     for s in (-1, 1):
         for at in np.arange(-z + 0.08, z - 0.05, 0.075):
-            parts.append(
-                Tube(points=np.array([[s * x, low + 0.02, at], [s * x, h - 0.03, at]]), radius=0.008, role="bar")
-            )
+            parts.append(tube([[s * x, low + 0.02, at], [s * x, h - 0.03, at]], 0.008, role="bar"))
         for at in np.arange(-x + 0.08, x - 0.05, 0.075):
-            parts.append(
-                Tube(points=np.array([[at, low + 0.02, s * z], [at, h - 0.03, s * z]]), radius=0.008, role="bar")
-            )
+            parts.append(tube([[at, low + 0.02, s * z], [at, h - 0.03, s * z]], 0.008, role="bar"))
     slab = box((-x, floor - 0.03, -z), (x, floor, z), role="slats")
     mattress = box((-x + 0.03, floor - 0.002, -z + 0.03), (x - 0.03, floor + 0.1, z - 0.03), "linen", 0.02, "mattress")
     cover = box((-x + 0.025, floor + 0.03, -0.2 * d), (x - 0.025, floor + 0.125, z - 0.028), "blanket", 0.02, "duvet")
@@ -173,8 +163,7 @@ def toy_box(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-0.08, 0.62 * h, d / 2 - 0.016), (0.08, 0.72 * h, d / 2 - 0.006), "accent", 0.0, "handle"),
     ]
     if foot:
-        wheels = [Ball(centre=np.array([sx * (w / 2 - 0.06), 0.027, sz * (d / 2 - 0.06)]), half=np.full(3, 0.027))
-                  for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+        wheels = [ball((sx * (w / 2 - 0.06), 0.027, sz * (d / 2 - 0.06)), 0.027) for sx in (-1, 1) for sz in (-1, 1)]
         parts += of_role("foot", wheels, material="screen")
     return parts
 
@@ -191,8 +180,7 @@ def garden_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((s * x - 0.02, h - t - 0.06, -z), (s * x + 0.02, h - t + 0.003, z), material, 0.0, "apron") for s in (-1, 1)
     ]
     parts += [box((-x, h - t - 0.06, s * z - 0.02), (x, h - t, s * z + 0.02), material, 0.0, "apron") for s in (-1, 1)]
-    parts += [box((sx * x - 0.025, 0, sz * z - 0.025), (sx * x + 0.025, h - t, sz * z + 0.025), material, 0.003, "leg")
-              for sx in (-1, 1) for sz in (-1, 1)]  # fmt: skip
+    parts += [post(sx * x, sz * z, 0.025, 0, h - t, material, 0.003, "leg") for sx in (-1, 1) for sz in (-1, 1)]
     return parts
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.lathe import Lathe, wall
-from echomodel.furniture.solids import Ball, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Solid, Turned, ball, rotation, tube, turned
 from echomodel.furniture.style import Style
 
 DOWN = rotation(x=np.pi)
@@ -21,7 +21,7 @@ def _disc(
 ) -> Turned:  # fmt: skip
     """A disc or cone with its lower face at y: half widths a and b, `high` times that above."""
     low, up = (a, b), (a * high, b * high)
-    return Turned(centre=np.array([x, y, z]), low=low, high=up, height=h, material=material, role=role)
+    return turned((x, y, z), low, h, up, material=material, role=role)
 
 
 def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float, style: Style) -> list[Solid]:
@@ -32,7 +32,7 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     place = np.array([x, y, z])
     if kind == "sphere":
         half = np.minimum([a, min(a, b), b], h / 2)
-        return [Ball(centre=np.array([x, y + h - half[1], z]), half=half, material="shade", role="shade")]
+        return [ball((x, y + h - half[1], z), half, "shade", "shade")]
     thick, squash = min(0.006, 0.1 * a), b / a
     if kind == "dome":
         turn = np.linspace(0, np.pi / 2, 8)
@@ -47,7 +47,7 @@ def shade(kind: str, x: float, y: float, z: float, a: float, b: float, h: float,
     bulb = min(0.045, 0.4 * inner, 0.3 * h)
     skin = Lathe(centre=place, profile=wall(outline, thick), squash=squash, hollow=True, material="shade", role="shade")
     body = replace(skin, profile=np.array(outline), hollow=False, core=True)  # a coarse grid sees a full shade
-    light = Ball(centre=np.array([x, y + 0.45 * h, z]), half=np.full(3, bulb), material="shade", role="bulb")
+    light = ball((x, y + 0.45 * h, z), bulb, "shade", "bulb")
     low = y + 0.45 * h + 0.7 * bulb
     socket = _disc(x, low, z, 0.45 * bulb, 0.45 * bulb, y + high * h - low, role="bulb")
     arms: list[Solid] = []
@@ -88,7 +88,7 @@ def pendant_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     tall = min(h * 0.55, max(w * (0.4 + 0.4 * style.taper), h * 0.22))
     kind, tall = _one_shade(style, min(w, d), tall, 0.75 * h)
     r = max(0.006, 0.012 * w)
-    parts.append(Tube(points=np.array([[0, tall * 0.9, 0], [0, h, 0]]), radius=r, material="metal", role="cord"))
+    parts.append(tube([[0, tall * 0.9, 0], [0, h, 0]], r, "metal", "cord"))
     if kind == "drum" and style.tufting > 0.6:
         inner = _disc(0, tall * 0.15, 0, w * 0.34, d * 0.34, tall * 0.5, "shade", role="shade")
         return [*parts, *shade(kind, 0, tall * 0.35, 0, w / 2, d / 2, tall * 0.65, style), inner]
@@ -101,14 +101,7 @@ def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
     bar = box((-w * 0.42, h - 0.03, -d * 0.15), (w * 0.42, h, d * 0.15), "metal", 0.0, "canopy")
     if d < 0.25 and (style.shade == "ring" or choices.chance("form", 0.3)):
         beam = box((-w / 2, 0, -d * 0.4), (w / 2, min(0.08, h * 0.15), d * 0.4), "shade", 0.01, "shade")
-        return [
-            bar,
-            beam,
-            *[
-                Tube(points=np.array([[s * w * 0.35, 0.05, 0], [s * w * 0.35, h, 0]]), radius=0.006, material="metal")
-                for s in (-1, 1)
-            ],
-        ]
+        return [bar, beam, *[tube([[s * w * 0.35, 0.05, 0], [s * w * 0.35, h, 0]], 0.006, "metal") for s in (-1, 1)]]
     count = int(np.clip(round(w / max(d * 1.35, 0.16)), 2, 6))
     each = min(w / count * 0.46, d / 2)
     xs = np.linspace(-w / 2 + each, w / 2 - each, count)
@@ -119,7 +112,7 @@ def _row(size: Size, style: Style, choices: Choices) -> list[Solid]:
         y = stagger * (i % 2)
         kind, high = _one_shade(style, 2 * each, tall, 0.7 * h)
         parts += shade(kind, x, y, 0, each, each, high, style)
-        parts.append(Tube(points=np.array([[x, y + high * 0.9, 0], [x, h - 0.01, 0]]), radius=0.006, material="metal"))
+        parts.append(tube([[x, y + high * 0.9, 0], [x, h - 0.01, 0]], 0.006, "metal"))
     return parts
 
 
@@ -129,10 +122,8 @@ def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
     body = min(h * 0.55, w * 0.6)
     arms = choices.pick("count", [5, 6, 8])
     r = max(0.008, 0.012 * w)
-    parts: list[Solid] = [Tube(points=np.array([[0, body * 0.1, 0], [0, h, 0]]), radius=r, material="metal")]
-    parts.append(
-        Ball(centre=np.array([0, body * 0.22, 0]), half=np.array([w * 0.07, body * 0.14, d * 0.07]), material="metal")
-    )
+    parts: list[Solid] = [tube([[0, body * 0.1, 0], [0, h, 0]], r, "metal")]
+    parts.append(ball((0, body * 0.22, 0), (w * 0.07, body * 0.14, d * 0.07), "metal"))
     cup = min(0.07, w * 0.11)
     for angle in np.arange(arms) * 2 * np.pi / arms + np.pi / arms:
         c, s = np.cos(angle) * (w / 2 - cup), np.sin(angle) * (d / 2 - cup)
@@ -144,15 +135,11 @@ def _chandelier(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 [c, body * (0.68 if style.taper > 0.55 else 0.42), s],
             ]
         )
-        parts.append(Tube(points=curve, radius=r * 0.9, material="metal"))
+        parts.append(tube(curve, r * 0.9, "metal"))
         if style.taper > 0.55:
             parts += shade("cone", c, body * 0.5, s, cup, cup, body * 0.4, style)
         else:
-            parts.append(
-                Ball(
-                    centre=np.array([c, body * 0.55, s]), half=np.array([cup * 0.85, cup, cup * 0.85]), material="shade"
-                )
-            )
+            parts.append(ball((c, body * 0.55, s), (cup * 0.85, cup, cup * 0.85), "shade"))
     return parts
 
 
@@ -168,10 +155,10 @@ def _rings(size: Size, style: Style) -> list[Solid]:
         ring = np.stack(
             [np.cos(angle) * (w / 2 - 0.02) * share, np.full(33, y), np.sin(angle) * (d / 2 - 0.02) * share], 1
         )
-        parts.append(Tube(points=ring, radius=0.02, material="shade"))
+        parts.append(tube(ring, 0.02, "shade"))
         for a in np.arange(3) * 2 * np.pi / 3:
             foot = [np.cos(a) * (w / 2 - 0.02) * share, y, np.sin(a) * (d / 2 - 0.02) * share]
-            parts.append(Tube(points=np.array([foot, [0, h - 0.02, 0]]), radius=0.004, material="metal"))
+            parts.append(tube([foot, [0, h - 0.02, 0]], 0.004, "metal"))
     return parts
 
 
@@ -181,7 +168,7 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     plate = _disc(0, h * 0.8, 0, w * 0.3, d * 0.3, h * 0.2)
     alike = max(w, d) / min(w, d) < 1.2
     if h > 0.35:
-        stem = Tube(points=np.array([[0, h * 0.45, 0], [0, h, 0]]), radius=0.014, material="metal")
+        stem = tube([[0, h * 0.45, 0], [0, h, 0]], 0.014, "metal")
         if choices.chance("form", 0.5):
             count = choices.pick("count", [3, 4, 6])
             parts: list[Solid] = [stem, _disc(0, h - 0.03, 0, w * 0.14, d * 0.14, 0.03)]
@@ -189,7 +176,7 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             kind, tall = _one_shade(replace(style, shade=_kind(style, "cylinder")), 2 * r, h * 0.45, h)
             for a in np.arange(count) * 2 * np.pi / count:
                 x, z = np.cos(a) * (w / 2 - r), np.sin(a) * (d / 2 - r)
-                parts.append(Tube(points=np.array([[0, h * 0.5, 0], [x, tall, z]]), radius=0.011, material="metal"))
+                parts.append(tube([[0, h * 0.5, 0], [x, tall, z]], 0.011, "metal"))
                 parts += shade(kind, x, 0.0, z, r, r, tall, style)
             return parts
         return [
@@ -208,16 +195,10 @@ def ceiling_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             box((-w / 2 + r, r, -0.012), (w / 2 - r, r + 0.03, 0.012), "metal"),
             box((-0.012, r, -d / 2 + r), (0.012, r + 0.03, d / 2 - r), "metal"),
         ]
-        return [Tube(points=circle, radius=r, material="shade"), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
+        return [tube(circle, r, "shade"), *spokes, _disc(0, r, 0, w * 0.16, d * 0.16, h - r)]
     if kind == "bowl":
-        bowl = Turned(
-            centre=np.array([0, h * 0.8, 0]),
-            low=(w / 2, d / 2),
-            high=(w * 0.2, d * 0.2),
-            height=h * 0.8,
-            turn=DOWN,
-            rounding=0.02,
-            material="shade",
+        bowl = turned(
+            (0, h * 0.8, 0), (w / 2, d / 2), h * 0.8, (w * 0.2, d * 0.2), rounding=0.02, turn=DOWN, material="shade"
         )
         return [bowl, _disc(0, h * 0.78, 0, w * 0.42, d * 0.42, h * 0.22)]
     drum = _disc(0, 0, 0, w / 2, d / 2, h * 0.85, "shade")
@@ -239,10 +220,10 @@ def floor_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         hub = (h - tall) * 0.93
         for angle in np.arange(3) * 2 * np.pi / 3 + np.pi / 2:
             toe = [a * 0.95 * np.cos(angle), r, b * 0.95 * np.sin(angle)]
-            parts.append(Tube(points=np.array([toe, [0, hub, 0]]), radius=r * 1.3))
-        return [*parts, Tube(points=np.array([[0, hub, 0], [0, h - tall * 0.5, 0]]), radius=r, material="metal")]
+            parts.append(tube([toe, [0, hub, 0]], r * 1.3))
+        return [*parts, tube([[0, hub, 0], [0, h - tall * 0.5, 0]], r, "metal")]
     parts.append(_disc(0, 0, 0, min(0.15, a * 0.8), min(0.15, b * 0.8), 0.025))
-    pole = Tube(points=np.array([[0, 0, 0], [0, h - tall * 0.5, 0]]), radius=r, material="metal")
+    pole = tube([[0, 0, 0], [0, h - tall * 0.5, 0]], r, "metal")
     if style.contrast > 0.75:
         parts.append(_disc(0, h * 0.32, 0, a * 0.7, b * 0.7, 0.02, "wood"))
     return [*parts, pole]
@@ -262,8 +243,8 @@ def _arc(size: Size, style: Style, r: float) -> list[Solid]:
     tall = min(0.3, head * 1.3)
     return [
         _disc(start[0], 0, start[1], foot, foot, 0.03, role="foot"),
-        Tube(points=sweep, radius=r, material="metal", role="stem"),
-        Tube(points=np.array([[x, high, z], [x, high - 0.5 * tall, z]]), radius=r, material="metal", role="stem"),
+        tube(sweep, r, "metal", "stem"),
+        tube([[x, high, z], [x, high - 0.5 * tall, z]], r, "metal", "stem"),
         *shade(_kind(style, "cylinder"), x, high - tall, z, head, head, tall, style),
     ]
 
@@ -277,7 +258,7 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
         arm = np.array([[0, 0.02, -b * 0.6], [0, h * 0.6, -b * 0.8], [0, h * 0.95, b * 0.3]])
         return [
             _disc(0, 0, -b * 0.5, a * 0.7, b * 0.5, 0.02),
-            Tube(points=arm, radius=r, material="metal"),
+            tube(arm, r, "metal"),
             *shade("cone", 0, h * 0.72, b * 0.5, a * 0.55, b * 0.5, h * 0.22, style),
         ]
     kind, tall = _one_shade(style, min(w, d), h * (0.36 + 0.12 * style.taper), 0.6 * h)
@@ -286,17 +267,12 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     body = choices.pick("kind", ["vase", "column", "balls", "cone"])
     if body == "vase":
         parts += [
-            Ball(
-                centre=np.array([0, stem * 0.42, 0]),
-                half=np.array([a * 0.5, stem * 0.42, b * 0.5]),
-                power=2.3,
-                material="ceramic",
-            ),
+            ball((0, stem * 0.42, 0), (a * 0.5, stem * 0.42, b * 0.5), "ceramic", power=2.3),
             _disc(0, 0, 0, a * 0.3, b * 0.3, stem * 0.1, "ceramic"),
         ]
     elif body == "balls":
         parts += [
-            Ball(centre=np.array([0, stem * y, 0]), half=np.array([a * s, stem * 0.2, b * s]), material="ceramic")
+            ball((0, stem * y, 0), (a * s, stem * 0.2, b * s), "ceramic")
             for y, s in ((0.22, 0.42), (0.55, 0.32), (0.82, 0.22))
         ]
         parts.append(_disc(0, 0, 0, a * 0.4, b * 0.4, stem * 0.08))
@@ -307,7 +283,7 @@ def table_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             _disc(0, 0, 0, a * 0.5, b * 0.5, max(0.012, stem * 0.06)),
             _disc(0, 0, 0, a * 0.12, b * 0.12, stem, "metal"),
         ]
-    parts.append(Tube(points=np.array([[0, stem * 0.7, 0], [0, stem + tall * 0.5, 0]]), radius=0.012, material="metal"))
+    parts.append(tube([[0, stem * 0.7, 0], [0, stem + tall * 0.5, 0]], 0.012, "metal"))
     return parts
 
 
@@ -317,14 +293,8 @@ def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
     plate = box((-min(w, h) * 0.18, h * 0.3, -d / 2), (min(w, h) * 0.18, h * 0.7, -d / 2 + 0.02), "metal")
     if w > h * 1.1:
         r = min(w * 0.22, d * 0.4)
-        bar = Tube(
-            points=np.array([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]]),
-            radius=0.01,
-            material="metal",
-        )
-        arm = Tube(
-            points=np.array([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]]), radius=0.01, material="metal"
-        )
+        bar = tube([[-w / 2 + r, h * 0.3, d / 2 - r], [w / 2 - r, h * 0.3, d / 2 - r]], 0.01, "metal")
+        arm = tube([[0, h * 0.4, -d / 2 + 0.01], [0, h * 0.3, d / 2 - r]], 0.01, "metal")
         return [
             plate,
             bar,
@@ -336,14 +306,8 @@ def wall_lamp(size: Size, style: Style, choices: Choices) -> list[Solid]:
             ],
         ]
     if choices.chance("form", 0.3):
-        body = Turned(
-            centre=np.array([0, 0, d * 0.1]), low=(w / 2, d * 0.4), high=(w / 2, d * 0.4), height=h, material="shade"
-        )
+        body = turned((0, 0, d * 0.1), (w / 2, d * 0.4), h, material="shade")
         return [body, box((-w * 0.2, h * 0.2, -d / 2), (w * 0.2, h * 0.8, d * 0.1), "metal")]
     b = d * 0.36
     bend = np.array([[0, h * 0.45, -d / 2 + 0.01], [0, h * 0.3, 0], [0, h * 0.4, d / 2 - b], [0, h * 0.7, d / 2 - b]])
-    return [
-        plate,
-        Tube(points=bend, radius=0.009, material="metal"),
-        *shade(_kind(style), 0, h * 0.45, d / 2 - b, w / 2, b, h * 0.55, style),
-    ]
+    return [plate, tube(bend, 0.009, "metal"), *shade(_kind(style), 0, h * 0.45, d / 2 - b, w / 2, b, h * 0.55, style)]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, box, core, of_role
+from echomodel.furniture.carpentry import Size, base, box, core, of_role, post
 from echomodel.furniture.cases import BOARD, carcass, depth_of, foot_height, shelves
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
@@ -105,9 +105,7 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
     w, h, d = size
     t = 0.014
     xs = np.linspace(-w / 2 + t, w / 2 - t, min(columns, 3) + 1)
-    parts: list[Solid] = [
-        box((x - t, 0, s * (d / 2 - t) - t), (x + t, h, s * (d / 2 - t) + t), "metal") for x in xs for s in (-1, 1)
-    ]
+    parts: list[Solid] = [post(x, s * (d / 2 - t), t, 0, h, "metal") for x in xs for s in (-1, 1)]
     ys = np.linspace(min(0.12, 0.2 * h), h - 0.02, rows + 1)
     boards: list[Solid] = [box((-w / 2, y - 0.018, -d / 2), (w / 2, y + 0.018, d / 2)) for y in ys]
     return of_role("side", parts) + of_role("shelf", boards)

@@ -11,7 +11,7 @@ from echomodel.furniture.armchairs import upholstered_arms
 from echomodel.furniture.carpentry import Size, base, box, cushion, of_role
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.lathe import Lathe
-from echomodel.furniture.solids import Ball, Block, Shell, Solid, Tube, Turned, rotation
+from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.style import Style
 
 
@@ -59,7 +59,7 @@ def _piping(pad: Solid) -> list[Solid]:
     cords: list[Solid] = []
     for y in (pad.half[1] - sunk, -pad.half[1] + sunk):
         points = np.insert(plan, 1, y, axis=1) @ pad.turn.T + pad.centre
-        cords.append(Tube(points=points, radius=0.005, material=pad.material, role="seam"))
+        cords.append(tube(points, 0.005, pad.material, "seam"))
     return cords
 
 
@@ -135,13 +135,13 @@ def _throw_pillows(inner: float, seat: float, h: float, z: float, style: Style) 
     turn = rotation(x=-0.35)
     sides = (-1, 1) if style.contrast > 0.4 else (1,)
     return [
-        Ball(
-            centre=np.array([s * (inner - a * 1.05), seat + a * 0.85, z + 0.06]),
-            half=np.array([a, a, 0.07]),
+        ball(
+            (s * (inner - a * 1.05), seat + a * 0.85, z + 0.06),
+            (a, a, 0.07),
+            "cushion",
+            "cushion",
             power=2.8,
             turn=turn,
-            material="cushion",
-            role="cushion",
         )
         for s in sides
     ]
@@ -174,12 +174,12 @@ def _curved(size: Size, style: Style) -> list[Solid]:
     seat = min(0.43, h * 0.58)
     parts: list[Solid] = _legs(style, w * 0.8, d * 0.9, foot)
     parts.append(
-        Shell(
-            centre=np.array([0, foot, d * 0.4]),
-            half=(w / 2, d * 0.9),
-            thickness=wall,
-            back=h - foot,
-            front=(h - foot) * (0.55 + 0.3 * style.arm_height),
+        bent(
+            (0, foot, d * 0.4),
+            (w / 2, d * 0.9),
+            wall,
+            h - foot,
+            (h - foot) * (0.55 + 0.3 * style.arm_height),
             power=2.6 + 2 * style.corner,
             ease=3,
             material="fabric",
@@ -187,12 +187,11 @@ def _curved(size: Size, style: Style) -> list[Solid]:
         )
     )
     parts.append(
-        Turned(
-            low=(w / 2 - wall * 0.6, d * 0.46),
-            high=(w / 2 - wall * 0.6, d * 0.46),
-            height=(seat - foot) * 0.6,
+        turned(
+            (0, foot, 0.02),
+            (w / 2 - wall * 0.6, d * 0.46),
+            (seat - foot) * 0.6,
             power=3.5,
-            centre=np.array([0, foot, 0.02]),
             material="fabric",
             role="base",
         )
@@ -252,13 +251,12 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
         parts.append(cushion((x0, foot, -d / 2 + 0.02), (x1, seat + (h - seat) * 0.5, reach), style, role="arm"))
     if style.arms == "rolled":
         parts.append(
-            Turned(
-                centre=np.array([-w * 0.46, seat + 0.09, -d / 2 + 0.28]),
-                low=(0.09, 0.09),
-                high=(0.09, 0.09),
-                height=w * 0.92,
-                turn=rotation(z=-np.pi / 2),
+            turned(
+                (-w * 0.46, seat + 0.09, -d / 2 + 0.28),
+                0.09,
+                w * 0.92,
                 rounding=0.02,
+                turn=rotation(z=-np.pi / 2),
                 material="accent",
                 role="cushion",
             )
@@ -287,23 +285,12 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for turn in np.arange(6) * np.pi / 3 + 0.3:
             around = np.array([np.cos(turn), np.sin(turn) * d / w])
             line = np.insert(profile[1:, :1] * around, 1, profile[1:, 1], axis=1)
-            seams.append(Tube(points=line, radius=0.005, material="fabric", role="seam"))
+            seams.append(tube(line, 0.005, "fabric", "seam"))
         return [bag, *seams]
     if kind == "lounger":
         lounger: list[Solid] = [
-            Ball(
-                centre=np.array([0, h * 0.27, d * 0.05]),
-                half=np.array([w / 2, h * 0.27, d * 0.46]),
-                power=2.8,
-                material="fabric",
-            ),
-            Ball(
-                centre=np.array([0, h * 0.55, -d * 0.27]),
-                half=np.array([w * 0.46, h * 0.46, d * 0.2]),
-                power=2.6,
-                turn=rotation(x=-0.25),
-                material="fabric",
-            ),
+            ball((0, h * 0.27, d * 0.05), (w / 2, h * 0.27, d * 0.46), "fabric", power=2.8),
+            ball((0, h * 0.55, -d * 0.27), (w * 0.46, h * 0.46, d * 0.2), "fabric", power=2.6, turn=rotation(x=-0.25)),
         ]
         return of_role("seat", lounger)
     turn = rotation(x=-0.2 - style.rake)

@@ -7,8 +7,9 @@ planes and first-order exact elsewhere, which is what the few voxels inside the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -386,3 +387,36 @@ def cube_surface(cells: int) -> tuple[Array, Array]:
         vertices, inverse = np.unique(np.round(np.concatenate(points), 9), axis=0, return_inverse=True)
         _CUBES[cells] = vertices, inverse.reshape(-1)[np.concatenate(faces)]
     return _CUBES[cells]
+
+
+Vector = Sequence[float] | Array  # (3,)
+Wide = float | tuple[float, float]  # half widths along x and z, one number where they are equal
+
+
+def ball(
+    centre: Vector,
+    half: float | Vector,
+    material: str = "wood",
+    role: str = "",
+    power: float = 2.0,
+    turn: Array = IDENTITY,
+) -> Ball:
+    """A ball or cushion about `centre` (3,) with half axes `half`, (3,) or one number."""
+    axes = np.array(np.broadcast_to(half, 3), float)
+    return Ball(np.array(centre, float), turn, material, role, half=axes, power=power)
+
+
+def turned(centre: Vector, low: Wide, height: float, high: Wide | None = None, **form: Any) -> Turned:
+    """What stands on `centre` (3,), with half widths `low` below and `high` (None = as below) above."""
+    ends = [(wide, wide) if np.ndim(wide) == 0 else wide for wide in (low, low if high is None else high)]
+    return Turned(np.array(centre, float), low=ends[0], high=ends[1], height=height, **form)
+
+
+def tube(points: Sequence[Vector] | Array, radius: float, material: str = "wood", role: str = "") -> Tube:
+    """A round rod along a polyline (k, 3)."""
+    return Tube(material=material, role=role, points=np.array(points, float), radius=radius)
+
+
+def bent(centre: Vector, half: tuple[float, float], thickness: float, back: float, front: float, **form: Any) -> Shell:
+    """A wall round the back of `centre` (3,), see `Shell`."""
+    return Shell(np.array(centre, float), half=half, thickness=thickness, back=back, front=front, **form)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from echomodel.furniture.backs import seat_of
 from echomodel.furniture.carpentry import Size, base, box, cushion, top, within
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.solids import Ball, Solid, Turned
+from echomodel.furniture.solids import Solid, ball, turned
 from echomodel.furniture.style import Style
 
 
@@ -21,8 +19,8 @@ def stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if alike and choices.chance("kind", 0.15):
         waist = 0.3 + 0.15 * style.taper
         return [
-            Turned(low=(w * 0.48, d * 0.48), high=(w * waist, d * waist), height=h / 2),
-            Turned(centre=np.array([0, h / 2, 0]), low=(w * waist, d * waist), high=(w / 2, d / 2), height=h / 2),
+            turned((0, 0, 0), (w * 0.48, d * 0.48), h / 2, (w * waist, d * waist)),
+            turned((0, h / 2, 0), (w * waist, d * waist), h / 2, (w / 2, d / 2)),
         ]
     thick = min(0.03 + 0.07 * style.softness, h * 0.4)
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "tapered"
@@ -67,17 +65,13 @@ def ottoman(size: Size, style: Style, choices: Choices) -> list[Solid]:
     )
     if alike and style.round_tops > 0.45:
         if foot == 0 and style.softness > 0.6:
-            return [
-                Ball(centre=np.array([0, h / 2, 0]), half=np.array([w / 2, h / 2, d / 2]), power=2.6, material="fabric",
-                     role="seat")
-            ]  # fmt: skip
+            return [ball((0, h / 2, 0), (w / 2, h / 2, d / 2), "fabric", "seat", power=2.6)]
         return [
             *parts,
-            Turned(
-                centre=np.array([0, foot, 0]),
-                low=(w / 2, d / 2),
-                high=(w / 2, d / 2),
-                height=h - foot,
+            turned(
+                (0, foot, 0),
+                (w / 2, d / 2),
+                h - foot,
                 rounding=0.1 * h + 0.15 * h * style.softness,
                 material="fabric",
                 role="seat",

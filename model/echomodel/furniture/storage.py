@@ -10,7 +10,7 @@ from echomodel.furniture.carpentry import Size, base, box, core
 from echomodel.furniture.cases import BOARD, carcass, depth_of, foot_height, fronted, mixed, shelves
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import case, front, sliding
-from echomodel.furniture.solids import Solid, Turned, rotation
+from echomodel.furniture.solids import Solid, rotation, turned
 from echomodel.furniture.style import Style
 
 
@@ -20,17 +20,8 @@ def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = foot_height(style, h, 0.4)
     kind = choices.pick("kind", ["drawers", "niche", "table", "drum"], [0.55, 0.27, 0.13, 0.05])
     if kind == "drum" and style.profile == "round":
-        body = Turned(
-            centre=np.array([0, foot, 0]), low=(w / 2, d / 2), high=(w / 2, d / 2), height=h - foot, role="side"
-        )
-        lip = Turned(
-            centre=np.array([0, foot + (h - foot) * 0.55, 0]),
-            low=(w * 0.515, d * 0.515),
-            high=(w * 0.515, d * 0.515),
-            height=0.02,
-            material="accent",
-            role="side",
-        )
+        body = turned((0, foot, 0), (w / 2, d / 2), h - foot, role="side")
+        lip = turned((0, foot + (h - foot) * 0.55, 0), (w * 0.515, d * 0.515), 0.02, material="accent", role="side")
         return [body, lip, *base(style, w * 0.7, d * 0.7, foot, 0.04)]
     if kind == "niche":
         parts, rect = carcass(size, style, foot, solid=False)

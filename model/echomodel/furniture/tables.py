@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, top, within
+from echomodel.furniture.carpentry import Size, base, between_legs, box, of_role, pedestal, post, top, within
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import case, front
-from echomodel.furniture.solids import Block, Solid, Turned, rotation
+from echomodel.furniture.solids import Block, Solid, rotation, turned
 from echomodel.furniture.style import Style
 
 KNEES = 0.45  # metres between what stands on both sides of a seat
@@ -62,7 +62,7 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     shape, thick = _outline(style, size, choices), max(style.top, 0.025)
     kind = choices.pick("kind", ["legs", "shelf", "block", "drum", "nested"], [0.36, 0.24, 0.2, 0.12, 0.08])
     if kind == "drum" and shape == "round":
-        drum = Turned(low=(w * 0.4, d * 0.4), high=(w * 0.47, d * 0.47), height=h - thick, material="accent")
+        drum = turned((0, 0, 0), (w * 0.4, d * 0.4), h - thick, (w * 0.47, d * 0.47), material="accent")
         return [top(shape, w, d, h, thick, style), *of_role("leg", [drum])]
     if kind == "block" and shape != "round":
         foot = max(0.04, h * 0.15)
@@ -84,26 +84,10 @@ def coffee_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
             *base(style, w * 0.85, d * 0.85, foot, 0.05, "plinth"),
         ]
     if kind == "nested" and w > 0.7:
-        low_top = Turned(
-            centre=np.array([w * 0.28, h * 0.62, d * 0.1]),
-            low=(w * 0.22, w * 0.22),
-            high=(w * 0.22, w * 0.22),
-            height=thick,
-            material="accent",
-            role="top",
-        )
-        post = Turned(
-            centre=np.array([w * 0.28, 0, d * 0.1]), low=(w * 0.14, w * 0.14), high=(0.03, 0.03), height=h * 0.62,
-            role="leg",
-        )  # fmt: skip
-        main = Turned(
-            centre=np.array([-w * 0.14, h - thick, 0]), low=(w * 0.36, d / 2), high=(w * 0.36, d / 2), height=thick,
-            role="top",
-        )  # fmt: skip
-        stem = Turned(
-            centre=np.array([-w * 0.14, 0, 0]), low=(w * 0.2, d * 0.28), high=(w * 0.05, d * 0.08), height=h - thick,
-            role="leg",
-        )  # fmt: skip
+        low_top = turned((w * 0.28, h * 0.62, d * 0.1), w * 0.22, thick, material="accent", role="top")
+        post = turned((w * 0.28, 0, d * 0.1), w * 0.14, h * 0.62, 0.03, role="leg")
+        main = turned((-w * 0.14, h - thick, 0), (w * 0.36, d / 2), thick, role="top")
+        stem = turned((-w * 0.14, 0, 0), (w * 0.2, d * 0.28), h - thick, (w * 0.05, d * 0.08), role="leg")
         return [main, stem, low_top, post]
     parts: list[Solid] = [top(shape, w, d, h, thick, style, "glass" if style.contrast > 0.85 else "wood")]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
@@ -126,14 +110,8 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return parts + pedestal(w, d, h - thick, style)
     if kind == "drum" and shape == "round":
         waist = 0.3 + 0.16 * style.taper
-        lower = Turned(low=(w * 0.42, d * 0.42), high=(w * waist, d * waist), height=h / 2, material="accent")
-        upper = Turned(
-            centre=np.array([0, h / 2, 0]),
-            low=(w * waist, d * waist),
-            high=(w * 0.45, d * 0.45),
-            height=h / 2 - thick,
-            material="accent",
-        )
+        lower = turned((0, 0, 0), (w * 0.42, d * 0.42), h / 2, (w * waist, d * waist), material="accent")
+        upper = turned((0, h / 2, 0), (w * waist, d * waist), h / 2 - thick, (w * 0.45, d * 0.45), material="accent")
         return [*parts, *of_role("leg", [lower, upper])]
     if kind == "cube" and shape != "round":
         t = 0.02
@@ -150,10 +128,7 @@ def side_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
         bars = [
             box((-w / 2 * 0.9, 0, s * d * 0.4 - t), (w / 2 * 0.9, 2 * t, s * d * 0.4 + t), "metal") for s in (-1, 1)
         ]
-        posts = [
-            box((-w / 2 * 0.9 - t, 0, s * d * 0.4 - t), (-w / 2 * 0.9 + t, h, s * d * 0.4 + t), "metal")
-            for s in (-1, 1)
-        ]
+        posts = [post(-w / 2 * 0.9, s * d * 0.4, t, 0, h, "metal") for s in (-1, 1)]
         return [top("square", w, d, h, thick, style), *of_role("leg", [*bars, *posts])]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle") else "straight"
     inner = within(shape, style)
@@ -175,9 +150,7 @@ def round_end_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if kind == "drum":
         return [
             *parts,
-            Turned(
-                low=(w * 0.36, d * 0.36), high=(w * 0.46, d * 0.46), height=h - thick, material="accent", role="leg"
-            ),
+            turned((0, 0, 0), (w * 0.36, d * 0.36), h - thick, (w * 0.46, d * 0.46), material="accent", role="leg"),
         ]
     legs = style.legs if style.legs not in ("plinth", "bun", "trestle", "sled") else "tapered"
     inner = 0.8 if legs == "splayed" else within("round", style)
@@ -249,16 +222,11 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
             rows = choices.whole("rows", 2, 4)
             parts += front((x0, foot), (x1, y1), d * 0.46, rows, 1, "drawer", style, d * 0.88)
             parts += [
-                box((x - 0.02, 0, z - 0.02), (x + 0.02, foot, z + 0.02), role="leg")
-                for x in (x0 + 0.04, x1 - 0.04)
-                for z in (-d * 0.42, d * 0.42)
+                post(x, z, 0.02, 0, foot, role="leg") for x in (x0 + 0.04, x1 - 0.04) for z in (-d * 0.42, d * 0.42)
             ]
         if len(sides) == 1:
             x = -sides[0] * w * 0.47
-            parts += [
-                box((x - 0.025, 0, s * d * 0.43 - 0.025), (x + 0.025, y1, s * d * 0.43 + 0.025), role="leg")
-                for s in (-1, 1)
-            ]
+            parts += [post(x, s * d * 0.43, 0.025, 0, y1, role="leg") for s in (-1, 1)]
     else:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
@@ -336,13 +304,7 @@ def mirror_of(w: float, low: float, high: float, d: float, style: Style, choices
 def _disc(w: float, high: float, tall: float, z: float) -> list[Solid]:
     """A round mirror in a ring of wood."""
     half, up = min(w * 0.4, tall * 0.46), tall * 0.46
-    ring = Turned(
-        centre=np.array([0, high - up, z - 0.015]),
-        low=(half, up),
-        high=(half, up),
-        height=0.024,
-        turn=rotation(x=np.pi / 2),
-    )
+    ring = turned((0, high - up, z - 0.015), (half, up), 0.024, turn=rotation(x=np.pi / 2))
     inner = (half - 0.014, up - 0.014)
     face = replace(ring, centre=ring.centre + np.array([0, 0, 0.02]), low=inner, high=inner, height=0.008)
     return [ring, replace(face, material="mirror")]
