@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-import torch
 
 from echomodel.data import roomset
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet, build_rooms
-from echomodel.floors import centred
 from echomodel.rooms.generator import generate_rooms, untidied
-from echomodel.rules import label_relations, verdicts
+from echomodel.rules import label_relations
 
 
 @pytest.fixture(scope="module")
@@ -33,31 +31,6 @@ def test_rooms_come_back(folder):
         assert np.allclose(read.floor_polygon, true.floor_polygon, atol=1e-4)
         for rules in ("strict", "sgfront"):
             assert np.array_equal(rooms.relations(number, rules=rules), label_relations(read, rules=rules))
-
-
-def test_batches_hold_the_rooms_and_their_relations(folder):
-    rooms = RoomSet(folder)
-    picked = [7, 0, 33]
-    batch = rooms.batch(picked)
-    for scene, number in zip(batch.graph.unpack(), picked, strict=True):
-        assert np.array_equal(scene.triplets.numpy(), rooms.relations(number))
-        assert np.allclose(scene.floor[0], centred(rooms.room(number).floor_polygon), atol=1e-3)
-    assert (verdicts(batch.boxes, batch.graph.triplets) != 0).all()
-    thinned = rooms.batch(picked, drop=0.5, rng=np.random.default_rng(0)).graph.triplets
-    assert 0.4 < len(thinned) / len(batch.graph.triplets) < 0.6
-    assert [int(k) for k in batch.style[:3]] == list(rooms.room(7).styles[:3])
-
-
-def test_passes_are_seeded_and_leave_out_what_is_held_out(folder):
-    rooms = RoomSet(folder)
-    seen = [batch.rooms for batch in rooms.batches(16, seed=4)]
-    assert sorted(np.concatenate(seen)) == np.flatnonzero(~rooms.held_out).tolist()
-    again = list(rooms.batches(16, seed=4))
-    assert all(np.array_equal(a, b.rooms) for a, b in zip(seen, again, strict=True))
-    first, second = next(rooms.batches(16, seed=4)), next(rooms.batches(16, seed=5))
-    assert torch.equal(first.graph.triplets, again[0].graph.triplets)
-    assert not np.array_equal(first.rooms, second.rooms)
-    assert sum(len(b.rooms) for b in rooms.batches(16, held_out=True)) == 2
 
 
 def test_equal_seeds_give_equal_bytes_also_after_an_interruption(folder, tmp_path, monkeypatch):

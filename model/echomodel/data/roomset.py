@@ -8,8 +8,7 @@ set.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +23,7 @@ from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
 if TYPE_CHECKING:
-    from echomodel.boxes import Boxes
-    from echomodel.graph import GraphBatch
+    pass
 
 MAGIC = b"ECHOROM3"
 MAGIC_OF_16 = b"ECHOROM2"  # earlier sets: 16 bits per pair and rule set
@@ -138,22 +136,6 @@ def write_shard(
             file.write(table.tobytes())
 
 
-@dataclass(frozen=True, eq=False)
-class RoomBatch:
-    """Some rooms of a set, packed.
-
-    Arguments:
-        graph: S scenes with their relations. boxes: N true boxes.
-        style: (N,) int64 tensor, style group of each node, -1 = unknown; shape number = style * C + category.
-        rooms: (S,) numbers of the rooms in their set.
-    """
-
-    graph: GraphBatch
-    boxes: Boxes
-    style: object
-    rooms: np.ndarray
-
-
 class RoomSet:
     """A set of labelled rooms on disk, read through memory maps.
 
@@ -175,10 +157,6 @@ class RoomSet:
         # sets of before named their categories alone
         here = {kind: [row.name for row in getattr(words, kind)] for kind in ("categories", "room_types")}
         self._names: dict[str, list[str]] = {kind: self.info.get(kind, here[kind]) for kind in here}
-        self._today = {
-            "categories": np.array([words.category_id(name) for name in self._names["categories"]]),
-            "room_types": np.array([words.room_type_id(name) for name in self._names["room_types"]]),
-        }
         most = {kind: len(names) for kind, names in self._names.items()}
         self._shards = [_tables(path, most) for path in sorted(self.directory.glob("rooms-*.bin"))]
         rooms = [shard["rooms"] for shard in self._shards]
@@ -225,50 +203,9 @@ class RoomSet:
 
     def relations(self, number: int, *, rules: str = "strict") -> np.ndarray:
         """(E, 3) int64 [subject, predicate, object] of one room; raises ValueError for unknown rules."""
-        return _triplets(self._part("pairs", number)[:, _column(rules)], self.counts[number : number + 1], None)
-
-    def batch(
-        self,
-        rooms: Sequence[int] | np.ndarray,
-        *,
-        rules: str = "strict",
-        drop: float = 0.0,
-        rng: np.random.Generator | None = None,
-    ) -> RoomBatch:
-        """Rooms packed for the model, each relation left out with probability `drop`."""
-        import torch
-
-        from echomodel.boxes import Boxes
-        from echomodel.floors import centred, padded
-        from echomodel.graph import GraphBatch
-        from echomodel.openingrows import opening_rows, padded_rows
-
-        rooms = np.asarray(rooms, np.int64)
-        objects = np.concatenate([self._part("objects", k) for k in rooms])
-        bits = np.concatenate([self._part("pairs", k)[:, _column(rules)] for k in rooms])
-        corners = [self._part("corners", k) for k in rooms]
-        openings = [_openings(self._part("openings", k)) for k in rooms]
-        counts = self.counts[rooms]
-        triplets = _triplets(bits, counts, None if drop == 0.0 else (drop, rng or np.random.default_rng()))
-        graph = GraphBatch(
-            category=torch.from_numpy(self._today["categories"][objects["category"]]),
-            triplets=torch.from_numpy(triplets),
-            scene=torch.from_numpy(np.repeat(np.arange(len(rooms)), counts)),
-            room_type=torch.from_numpy(self._today["room_types"][self._table["type"][rooms]]),
-            floor=padded([centred(c)[None] for c in corners]),
-            openings=padded_rows([opening_rows(o, c)[None] for o, c in zip(openings, corners, strict=True)]),
-        )
-        fields = (torch.from_numpy(np.ascontiguousarray(objects[name])) for name in ("size", "position", "yaw"))
-        return RoomBatch(graph, Boxes(*fields), torch.from_numpy(objects["style"].astype(np.int64)), rooms)
-
-    def batches(
-        self, scenes: int = 64, *, seed: int = 0, held_out: bool = False, rules: str = "strict", drop: float = 0.5
-    ) -> Iterator[RoomBatch]:
-        """One pass over the training (or held-out) rooms in a seeded order, `scenes` at a time."""
-        rng = np.random.default_rng(seed)
-        order = rng.permutation(np.flatnonzero(self.held_out == held_out))
-        for start in range(0, len(order), scenes):
-            yield self.batch(order[start : start + scenes], rules=rules, drop=drop, rng=rng)
+        bits = self._part("pairs", number)[:, _column(rules)]
+        pair, predicate = np.nonzero((bits[:, None] >> np.arange(8 * bits.itemsize, dtype=bits.dtype)) & 1)
+        return np.stack([*np.divmod(pair, self.counts[number]), predicate], -1)[:, [0, 2, 1]].astype(np.int64)
 
 
 def _held_out(number: int) -> bool:
@@ -305,19 +242,6 @@ def _rounded(room: RoomBoxes) -> RoomBoxes:
     for k, item in enumerate(entry["objects"]):
         item["yaw"] = float(np.float32(room.yaw[k]))
     return RoomBoxes.from_json(entry)
-
-
-def _triplets(bits: np.ndarray, counts: np.ndarray, thinned: tuple[float, np.random.Generator] | None) -> np.ndarray:
-    """(E, 3) triplets of the packed rooms from their pairs' bits (n * n per room, row = subject)."""
-    pair, predicate = np.nonzero((bits[:, None] >> np.arange(8 * bits.itemsize, dtype=bits.dtype)) & 1)
-    if thinned:
-        keep = thinned[1].random(len(pair)) >= thinned[0]
-        pair, predicate = pair[keep], predicate[keep]
-    squares = counts * counts
-    owner = np.repeat(np.arange(len(counts)), squares)[pair]
-    local = pair - (np.cumsum(squares) - squares)[owner]
-    first = (np.cumsum(counts) - counts)[owner]
-    return np.stack([first + local // counts[owner], predicate, first + local % counts[owner]], -1).astype(np.int64)
 
 
 def _column(rules: str) -> int:

@@ -1,7 +1,7 @@
 """SG-FRONT as published: scene graphs over 3D-FRONT rooms, their boxes, and the 3D-FUTURE-SDF grids (SPEC 1 and 2).
 
 Whoever has the files puts them in one folder: `relationships_{room}_{split}.json`, `obj_boxes_{room}_{split}.json`,
-`classes_{room}.txt`, `relationships.txt`, `mapping.json`, `centered_bounds_{room}_trainval.txt`.
+`classes_{room}.txt`, `relationships.txt`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import json
 import math
 import os
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from echomodel.vocabulary import vocabulary
 ROOMS = ("bedroom", "livingroom", "diningroom", "library", "all")
 SPLITS = ("trainval", "test")  # the paper's; test is what its tables are computed on
 SCENE, FLOOR, IN = "_scene_", "floor", 0
-BOUNDS = 14
 
 
 class SGFrontError(ValueError):
@@ -86,21 +84,6 @@ class Scan:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """A scan as the published networks see it (SPEC 1.3), the `_scene_` node last.
-
-    Arguments:
-        classes, fine: (m,) int64 class ids, small (or fine) and fine. boxes: (m, 7) float32, normalised size and
-        position and the angle in radians. triples: (e, 3) int64 with `in` edges to the scene node behind the others.
-    """
-
-    classes: np.ndarray
-    fine: np.ndarray
-    boxes: np.ndarray
-    triples: np.ndarray
-
-
 class SGFront:
     """One split of SG-FRONT.
 
@@ -108,64 +91,29 @@ class SGFront:
         folder: where the files are.
         room: `bedroom`, `livingroom`, `diningroom`, `library` or `all` (the published weights).
         split: `trainval` or `test`.
-        large: fine classes as node classes instead of the small ones (14 for `all`).
 
-    Attributes: `classes` and `fine_classes`, names by id; `predicates`, names by id (0 is `in`); `bounds` (14,).
+    Attributes: `classes`, the fine ones, sorted; `predicates`, names by id (0 is `in`).
 
     Raises:
         SGFrontError: a file is missing or malformed.
     """
 
-    def __init__(
-        self, folder: str | os.PathLike[str], room: str = "all", split: str = "trainval", *, large: bool = False
-    ) -> None:
+    def __init__(self, folder: str | os.PathLike[str], room: str = "all", split: str = "trainval") -> None:
         if room not in ROOMS or split not in SPLITS:
             raise SGFrontError(
                 f"room {room!r}, split {split!r}: allowed are {', '.join(ROOMS)} and {', '.join(SPLITS)}"
             )
-        self.folder, self.room, self.split, self.large = Path(folder), room, split, large
-        names = self._lines(f"classes_{room}.txt")
-        self.fine_classes = tuple(sorted(set(names)))
+        self.folder, self.room, self.split = Path(folder), room, split
+        self.classes = tuple(sorted(set(self._lines(f"classes_{room}.txt"))))
         self.predicates = ("in", *self._lines("relationships.txt"))
         expected = len(vocabulary().sgfront_predicates)
         if len(self.predicates) != expected:
             path = self.folder / "relationships.txt"
             raise SGFrontError(f"{path}: holds {len(self.predicates) - 1} relationships, expected {expected - 1}")
-        self.mapping = self._mapping()
-        self.classes = self.fine_classes if large else tuple(sorted({self.mapping[n] for n in self.fine_classes}))
         self.scans = self._scans()
 
     def __len__(self) -> int:
         return len(self.scans)
-
-    @cached_property
-    def bounds(self) -> np.ndarray:
-        """Minimum and maximum size, minimum and maximum position, angles: 14 numbers of the trainval split."""
-        path = self._path(f"centered_bounds_{self.room}_trainval.txt", f"boxes_centered_stats_{self.room}_trainval.txt")
-        try:
-            values = np.array([float(word) for word in path.read_text("utf-8").split()])
-        except ValueError as error:
-            raise SGFrontError(f"{path}: {error}") from None
-        if len(values) != BOUNDS:
-            raise SGFrontError(f"{path}: holds {len(values)} numbers, expected {BOUNDS}")
-        return values
-
-    def sample(self, number: int) -> Sample:
-        """One scan with its scene node, boxes normalised (SPEC 1.3 and 2)."""
-        scan, low_high = self.scans[number], self.bounds
-        fine = [self.fine_classes.index(name) for name in scan.fine]
-        names = scan.fine if self.large else [self.mapping[name] for name in scan.fine]
-        n = len(fine)
-        size = _normalised(scan.size, low_high[0:3], low_high[3:6])
-        position = _normalised(scan.position, low_high[6:9], low_high[9:12])
-        boxes = np.concatenate([size, position, scan.yaw[:, None]], -1)
-        inside = np.stack([np.arange(n), np.full(n, IN), np.full(n, n)], -1)
-        return Sample(
-            classes=np.array([*(self.classes.index(name) for name in names), self.classes.index(SCENE)], np.int64),
-            fine=np.array([*fine, self.fine_classes.index(SCENE)], np.int64),
-            boxes=np.concatenate([boxes, -np.ones((1, 7))]).astype(np.float32),
-            triples=np.concatenate([scan.triples, inside]).astype(np.int64),
-        )
 
     def rooms(self) -> list[RoomBoxes]:
         """All scans as labelled rooms."""
@@ -173,11 +121,10 @@ class SGFront:
 
     # -- files ---------------------------------------------------------------------------------------------------
 
-    def _path(self, *names: str) -> Path:
-        for name in names:
-            if (self.folder / name).exists():
-                return self.folder / name
-        raise SGFrontError(f"{self.folder / names[0]}: no such file, SG-FRONT has it")
+    def _path(self, name: str) -> Path:
+        if not (self.folder / name).exists():
+            raise SGFrontError(f"{self.folder / name}: no such file, SG-FRONT has it")
+        return self.folder / name
 
     def _lines(self, name: str) -> list[str]:
         return [line.strip() for line in self._path(name).read_text("utf-8").splitlines() if line.strip()]
@@ -188,13 +135,6 @@ class SGFront:
             return json.loads(path.read_text("utf-8"))
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             raise SGFrontError(f"{path}: not JSON ({error})") from None
-
-    def _mapping(self) -> dict[str, str]:
-        mapping = {SCENE: SCENE, FLOOR: FLOOR, **self._json("mapping.json")}
-        missing = [name for name in self.fine_classes if name not in mapping]
-        if missing:
-            raise SGFrontError(f"{self.folder / 'mapping.json'}: no small class for {', '.join(missing)}")
-        return mapping
 
     def _scans(self) -> list[Scan]:
         graphs = f"relationships_{self.room}_{self.split}.json"
@@ -222,7 +162,7 @@ class SGFront:
             raise fault(graphs, "no objects")
         params, models = [], []
         for key, category in objects.items():
-            if category not in self.fine_classes:
+            if category not in self.classes:
                 raise fault(graphs, f"object {key} is a {category!r}, which classes_{self.room}.txt does not hold")
             box = boxed.get(key)
             if box is None:
@@ -265,10 +205,6 @@ class SGFront:
             centre=np.array(centre, float),
             triples=np.array(triples, np.int64).reshape(-1, 3),
         )
-
-
-def _normalised(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    return 2 * (values - low) / (high - low) - 1
 
 
 def small_mapping() -> dict[str, str]:

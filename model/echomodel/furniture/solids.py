@@ -408,8 +408,8 @@ def ball(
 
 def turned(centre: Vector, low: Wide, height: float, high: Wide | None = None, **form: Any) -> Turned:
     """What stands on `centre` (3,), with half widths `low` below and `high` (None = as below) above."""
-    ends = [(wide, wide) if np.ndim(wide) == 0 else wide for wide in (low, low if high is None else high)]
-    return Turned(np.array(centre, float), low=ends[0], high=ends[1], height=height, **form)
+    below, above = (wide if isinstance(wide, tuple) else (wide, wide) for wide in (low, low if high is None else high))
+    return Turned(np.array(centre, float), low=below, high=above, height=height, **form)
 
 
 def tube(points: Sequence[Vector] | Array, radius: float, material: str = "wood", role: str = "") -> Tube:

@@ -160,6 +160,6 @@ def test_a_room_set_names_its_words(tmp_path):
         for old, new in zip(before, (after.room(k) for k in range(4)), strict=True):
             assert (old.categories, old.room_type) == (new.categories, new.room_type)
             assert np.array_equal(old.relations, new.relations)
-        graph = after.batch([0]).graph
+        graph = GraphBatch.from_room(after.room(0))
         assert [vocabulary().categories[k].name for k in graph.category.tolist()] == list(before[0].categories)
         assert vocabulary().room_types[int(graph.room_type[0])].name == before[0].room_type
