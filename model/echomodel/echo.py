@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -14,18 +16,17 @@ from torch import Tensor, nn
 from echomodel.boxes import Boxes
 from echomodel.compact.branches import branches
 from echomodel.compact.furnishing import sample_descriptions, with_whole_styles
-from echomodel.compact.given import Sampling, known_values, repeated, starting_noise
-from echomodel.compact.layouts import LayoutSampling, sample_boxes
+from echomodel.compact.given import CompactSampling, known_values, repeated
+from echomodel.compact.layouts import sample_boxes
 from echomodel.compact.learned import unlearned
 from echomodel.compact.model import CompactModel, WeightsError, load_weights
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing, group_means, merit, shape_predictor
-from echomodel.config import CompactConfig, Sampler
+from echomodel.config import CompactConfig
 from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps
-from echomodel.progress import StepListener, part_of
+from echomodel.progress import part_of
 from echomodel.protocols import GraphEdit, touched_nodes
-from echomodel.randomness import Randomness
 from echomodel.samplers import Predict, guided
 from echomodel.vocabulary import vocabulary
 
@@ -99,48 +100,17 @@ class EchoModel:
         return self.model.device
 
     @torch.no_grad()
-    def sample_layout(
-        self,
-        graph: GraphBatch,
-        *,
-        generator: Randomness,
-        steps: int | None = None,
-        sampler: Sampler | None = None,
-        known: Boxes | None = None,
-        known_mask: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        rules: str = "strict",
-        guidance: float = 1.0,
-        relation_guidance: float | None = None,
-        noise: Tensor | None = None,
-        progress: StepListener | None = None,
-    ) -> Boxes:
-        """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`.
+    def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
+        """Boxes for all objects of S scenes (EchoScene 3.3), in the room frame of `Boxes`; sizes are positive.
 
         Arguments:
-            graph: S scenes, N nodes.
-            generator: source of all randomness, or one a scene.
-            steps, sampler: None = the config's.
-            known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
-            edit: what was changed in the graph, None = nothing.
-            rules: the rule set that the relations are meant in, `strict` or `sgfront`.
-            guidance: scale of classifier-free guidance towards the relations, 1 = off.
-            relation_guidance: strength of the pull of the rules' margins on the denoised boxes at every step, 0 = off,
-                None = the config's.
-            noise: (N, 8) starting noise in place of the generator's.
-            progress: called with (steps done, steps).
-
-        Returns:
-            N boxes; sizes are positive.
+            graph: S scenes, N nodes. how: fields of `CompactSampling`.
 
         Raises:
             ValueError: a graph, box or argument that the model cannot work with; the message names it.
         """
         graph = self._checked(graph)
-        known, known_mask = known_values(graph, known, known_mask, self.device)
-        by = Sampling(generator, steps, sampler, None, known_mask, guidance, progress)
-        how = LayoutSampling(by, rules, known, edit, relation_guidance, noise)
-        return sample_boxes(self.model, self.graph_latent, graph, how)
+        return sample_boxes(self.model, self.graph_latent, graph, self._how(graph, how))
 
     @torch.no_grad()
     def graph_latent(self, graph: GraphBatch, edit: GraphEdit | None = None) -> Tensor:
@@ -159,62 +129,31 @@ class EchoModel:
         return unlearned(graph, self.config)
 
     @torch.no_grad()
-    def sample_shapes(
-        self,
-        graph: GraphBatch,
-        boxes: Boxes,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        sampler: Sampler | None = None,
-        known: Tensor | None = None,
-        known_mask: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        guidance: float = 1.0,
-        noise: Tensor | None = None,
-        candidates: int | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
         """Shapes for all objects of S scenes (EchoScene 3.4); objects of one class and style become equal.
 
-        Arguments:
-            graph: S scenes, N nodes.
-            boxes: N boxes, whose sizes the shapes will fill.
-            known, known_mask: (N, 64, 64, 64) signed distances and (N,) bool; where true the shape is given and comes
-                back unchanged.
-            noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
-            candidates: draws per object, of which the most whole that bears what stands on it is kept (pieces of one
-                class and style together).
-            generator, steps, sampler, edit, guidance, progress: as for `sample_layout`.
+        Arguments as for `sample_layout`; the shapes will fill the sizes of the boxes.
 
         Returns:
             (N, 64, 64, 64) float32 truncated signed distances on the box-normalised grid, negative inside.
-
-        Raises:
-            ValueError: a graph, box, shape or argument that the model cannot work with; the message names it.
         """
         settings, coder = self.config.shape, self.model.autoencoder
         graph, boxes = self._checked(graph), self._of(graph, boxes)
-        known, known_mask = known_values(graph, known, known_mask, self.device)
-        given = None if known is None else self.model.shape.codes(coder.encode(known))
+        by = self._how(graph, how)
+        given = None if by.known is None else self.model.shape.codes(coder.encode(by.known))
         equal = equal_furniture(graph)
-        tries = 1 if noise is not None else candidates or settings.candidates
+        tries = 1 if by.noise is not None else by.candidates or settings.candidates
         width = max(1, min(tries, TOGETHER // graph.num_nodes))
         rounds = [min(width, tries - start) for start in range(0, tries, width)]
         grids, best = torch.empty(0), torch.empty(0)
         for number, count in enumerate(rounds):
-            starts = [
-                starting_noise((graph.num_nodes, settings.components), generator, noise, self.device)
-                for _ in range(count)
-            ]
-            if noise is None:
+            starts = [by.start(graph.num_nodes, settings.components, self.device) for _ in range(count)]
+            if by.noise is None:
                 starts = [settings.temperature * x[equal] for x in starts]
-            how = Sampling(
-                generator, steps, sampler, repeated(given, count), repeated(known_mask, count), guidance,
-                part_of(progress, number, len(rounds)),
-            )  # fmt: skip
-            predict = self._shape_predictor(graph, boxes.size, equal, edit, guidance, count)
-            codes = how.denoised(predict, torch.cat(starts), settings)
+            masks, told = repeated(by.known_mask, count), part_of(by.progress, number, len(rounds))
+            here = replace(by, known=repeated(given, count), known_mask=masks, progress=told)
+            predict = self._shape_predictor(graph, boxes.size, equal, by, count)
+            codes = here.denoised(predict, torch.cat(starts), settings)
             for draw in codes.chunk(count):
                 drawn = self._decoded(draw)
                 whole = group_means(merit(drawn, boxes, graph.triplets), equal) if tries > 1 else best
@@ -223,9 +162,9 @@ class EchoModel:
                     continue
                 better = whole > best
                 grids, best = torch.where(better[:, None, None, None], drawn, grids), torch.maximum(best, whole)
-        if known is None or known_mask is None:
+        if by.known is None or by.known_mask is None:
             return grids
-        return torch.where(known_mask[:, None, None, None], known, grids)
+        return torch.where(by.known_mask[:, None, None, None], by.known, grids)
 
     @torch.no_grad()
     def reconstruct(self, grids: Tensor) -> Tensor:
@@ -236,54 +175,27 @@ class EchoModel:
         return coder.decode(coder.encode(grids.to(self.device))).float()
 
     @torch.no_grad()
-    def sample_furniture(
-        self,
-        graph: GraphBatch,
-        boxes: Boxes,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        sampler: Sampler | None = None,
-        known: Tensor | None = None,
-        known_mask: Tensor | None = None,
-        styles: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        guidance: float = 1.0,
-        noise: Tensor | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
         """Descriptions of all pieces of furniture of S scenes (`echomodel.furniture.description`).
 
-        Arguments:
-            graph, boxes: N nodes and their boxes; only the sizes matter.
-            known, known_mask: (N, D) descriptions and (N,) bool; where true a piece is given and comes back unchanged.
-            styles: (N,) int64, nodes with one number of 0 or more are of one style, beside those that relations of
-                style join; None = nothing is known of styles.
-            noise: (N, D) starting noise in place of the generator's.
-            generator, steps, sampler, edit, guidance, progress: as for `sample_layout`.
+        Arguments as for `sample_layout`; only the sizes of the boxes matter.
 
         Returns:
             (N, D) float32; pieces of one class that relations of style or material join are equal.
-
-        Raises:
-            ValueError: a graph, box or argument that the model cannot work with; the message names it.
         """
-        settings = self.config.furniture
         graph, boxes = self._checked(graph), self._of(graph, boxes)
-        known, known_mask = known_values(graph, known, known_mask, self.device)
-        equal = equal_furniture(graph)
-        start = starting_noise((graph.num_nodes, self.description_width), generator, noise, self.device)
-        graph = with_whole_styles(graph, joined(graph, styles))
+        by, equal = self._how(graph, how), equal_furniture(graph)
+        start = by.start(graph.num_nodes, self.description_width, self.device)
+        graph = with_whole_styles(graph, joined(graph, by.styles))
         bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
-            self.model, graph, boxes.size, self.graph_latent(graph, edit), equal,
-            settings.temperature * start[equal] if noise is None else start,
-            Sampling(generator, steps, sampler, known, known_mask, guidance, progress),
-            bare_latent=None if guidance == 1.0 else self.graph_latent(bare),
+            self.model, graph, boxes.size, self.graph_latent(graph, by.edit), equal,
+            self.config.furniture.temperature * start[equal] if by.noise is None else start, by,
+            bare_latent=None if by.guidance == 1.0 else self.graph_latent(bare),
         )  # fmt: skip
 
     def _shape_predictor(
-        self, graph: GraphBatch, size: Tensor, equal: Tensor, edit: GraphEdit | None, guidance: float, count: int
+        self, graph: GraphBatch, size: Tensor, equal: Tensor, by: CompactSampling, count: int
     ) -> Predict:
         """The denoiser of `count` draws behind one another, each of all objects of the graph."""
 
@@ -292,10 +204,10 @@ class EchoModel:
             pairs = pairs_of(many, self.config.predicates)
             return shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
 
-        predict = of(graph, self.graph_latent(graph, edit))
-        if guidance != 1.0:
+        predict = of(graph, self.graph_latent(graph, by.edit))
+        if by.guidance != 1.0:
             bare = graph.with_triplets(graph.triplets[:0])
-            predict = guided(predict, of(bare, self.graph_latent(bare)), guidance)
+            predict = guided(predict, of(bare, self.graph_latent(bare)), by.guidance)
         first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
         return agreeing(predict, equal.repeat(count) + first)
 
@@ -305,6 +217,12 @@ class EchoModel:
         with torch.autocast(self.device.type, torch.bfloat16) if self.half_decode else nullcontext():
             grids = torch.cat([decode(latents(part)).float() for part in _rounded(codes, CODE).split(4)])
         return _rounded(grids, DISTANCE)
+
+    def _how(self, graph: GraphBatch, told: dict[str, Any]) -> CompactSampling:
+        """What a caller asks for, with what is known checked and on the model's device."""
+        how = CompactSampling(**told)
+        known, mask = known_values(graph, how.known, how.known_mask, self.device)
+        return replace(how, known=known, known_mask=mask)
 
     def _checked(self, graph: GraphBatch) -> GraphBatch:
         graph.check()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeGuard
+from typing import Any, Protocol, TypeGuard
 
-import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
 from echomodel.progress import StepListener
+from echomodel.randomness import Randomness
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,27 @@ class GraphEdit:
 
     before: Tensor
     added: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """How a model samples and what it is given: the keyword arguments of every `sample_...` of a `RoomModel`.
+
+    Arguments:
+        generator: source of all randomness, or one a scene.
+        steps: of the sampler, None = the model's own; those that there are not raise ValueError.
+        known, known_mask: what is sampled (boxes, distances or descriptions) of N nodes, and (N,) bool; where true it
+            is given and comes back unchanged.
+        edit: what was changed in the graph, None = nothing.
+        progress: called with (steps done, steps).
+    """
+
+    generator: Randomness
+    steps: int | None = None
+    known: Any = None
+    known_mask: Tensor | None = None
+    edit: GraphEdit | None = None
+    progress: StepListener | None = None
 
 
 def touched_nodes(graph: GraphBatch, edit: GraphEdit) -> Tensor:
@@ -58,42 +79,18 @@ class RoomModel(Protocol):
         """One sentence for every word of the graph that the weights do not know, and what becomes of it."""
         ...
 
-    def sample_layout(
-        self,
-        graph: GraphBatch,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        known: Boxes | None = None,
-        known_mask: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        progress: StepListener | None = None,
-    ) -> Boxes:
+    def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
         """Boxes of N objects in the frame of `Boxes`, the floor's middle at the origin (EchoScene 3.3).
 
         Arguments:
-            graph: S scenes, N nodes.
-            generator: source of all randomness.
-            steps: sampling steps, None = the model's own; raises ValueError for more than there are.
-            known, known_mask: N boxes and (N,) bool; where true the box is given and comes back unchanged.
-            edit: what was changed in the graph, None = nothing.
-            progress: called with (steps done, steps).
+            graph: S scenes, N nodes. how: fields of the model's `Sampling`.
         """
         ...
 
-    def sample_shapes(
-        self,
-        graph: GraphBatch,
-        boxes: Boxes,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        edit: GraphEdit | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
         """(N, R, R, R) float32 signed distances on the box-normalised grid, negative inside (EchoScene 3.4).
 
-        Raises ValueError for a model without a shape branch.
+        Arguments as for `sample_layout`. Raises ValueError for a model without a shape branch.
         """
         ...
 
@@ -111,20 +108,8 @@ class FurnitureModel(RoomModel, Protocol):
         """Numbers in a description."""
         ...
 
-    def sample_furniture(
-        self,
-        graph: GraphBatch,
-        boxes: Boxes,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        known: Tensor | None = None,
-        known_mask: Tensor | None = None,
-        styles: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
-        """Descriptions (N, D) float32 of N pieces of furniture, see `EchoModel.sample_furniture`."""
+    def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
+        """Descriptions (N, D) float32 of N pieces of furniture; arguments as for `sample_layout`."""
         ...
 
 

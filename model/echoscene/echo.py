@@ -8,23 +8,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.graph import GraphBatch
-from echomodel.protocols import touched_nodes
+from echomodel.protocols import GraphEdit, Sampling, touched_nodes
 from echomodel.text import TextEncoder, edge_text, encoder_named, node_text
 from echomodel.vocabulary import vocabulary
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import STRUCTURE, GraphChange, ReleasedModel
 from echoscene.weights import load_released
-
-if TYPE_CHECKING:
-    from echomodel.progress import StepListener
-    from echomodel.protocols import GraphEdit
 
 DECODED = 2  # shapes at a time: one takes 67 MB for every feature map of 64 channels
 
@@ -80,54 +76,34 @@ class ReleasedEcho:
         shape = config.shape is not None and config.vqvae is not None
         return frozenset(name for name, there in (("layout", config.layout is not None), ("shape", shape)) if there)
 
-    def sample_layout(
-        self,
-        graph: GraphBatch,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        known: Boxes | None = None,
-        known_mask: Tensor | None = None,
-        edit: GraphEdit | None = None,
-        progress: StepListener | None = None,
-    ) -> Boxes:
-        """Boxes by ancestral steps.
+    def sample_layout(self, graph: GraphBatch, **how: Any) -> Boxes:
+        """Boxes by ancestral steps, as many of the published 1,000 as `steps` says, evenly spread.
 
         Arguments:
-            steps: how many of the published 1,000 steps, evenly spread; None = all.
-            known, known_mask: boxes that are put in afterwards: the published sampler cannot be told of them.
-            others: as `EchoModel.sample_layout`.
+            how: fields of `Sampling`; known boxes are put in afterwards: the published sampler cannot be told of them.
 
         Raises:
             ValueError: no layout branch, no box statistics, too many steps, a category without a class, or no text
                 features.
         """
-        whole, change, objects = self._told(graph, edit)
-        boxes = self.model.sample_layout(whole, generator=generator, steps=steps, change=change, progress=progress)[
-            objects
-        ]
+        by = Sampling(**how)
+        assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
+        whole, change, objects = self._told(graph, by.edit)
+        boxes = self.model.sample_layout(
+            whole, generator=by.generator, steps=by.steps, change=change, progress=by.progress
+        )[objects]
         boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
-        if known is None or known_mask is None:
+        if by.known is None or by.known_mask is None:
             return boxes
-        return boxes.replaced(known_mask.to(self.model.device), known.to(self.model.device))
+        return boxes.replaced(by.known_mask.to(self.model.device), by.known.to(self.model.device))
 
     @torch.no_grad()
-    def sample_shapes(
-        self,
-        graph: GraphBatch,
-        boxes: Boxes,
-        *,
-        generator: torch.Generator,
-        steps: int | None = None,
-        edit: GraphEdit | None = None,
-        progress: StepListener | None = None,
-    ) -> Tensor:
+    def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **how: Any) -> Tensor:
         """Signed distances of all objects, turned so that their front is +Z and their surface lies at zero.
 
         Arguments:
             boxes: not used, the published shapes do not know their boxes.
-            steps: DDIM steps, None = the published 100.
-            others: as `EchoModel.sample_shapes`.
+            how: fields of `Sampling`; the published steps are 100 of DDIM, shapes that are known are not looked at.
 
         Returns:
             (N, R, R, R) float32, negative inside, in the published unit cube: stretch the mesh to its box.
@@ -135,9 +111,11 @@ class ReleasedEcho:
         Raises:
             ValueError: no shape branch, a category without a class, or no text features.
         """
-        whole, change, objects = self._told(graph, edit)
+        by = Sampling(**how)
+        assert isinstance(by.generator, torch.Generator)  # scenes of their own seeds are for compact weights
+        whole, change, objects = self._told(graph, by.edit)
         latents = self.model.sample_shapes(
-            whole, generator=generator, steps=steps or 100, change=change, progress=progress
+            whole, generator=by.generator, steps=by.steps or 100, change=change, progress=by.progress
         )[objects]
         return turned_back(torch.cat([self.model.vqvae.decode(part) for part in latents.split(DECODED)])) - LEVEL
 

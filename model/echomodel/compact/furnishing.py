@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from echomodel.compact.given import Sampling
+from echomodel.compact.given import CompactSampling
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import agreeing
@@ -44,7 +44,7 @@ def sample_descriptions(
     latent: Tensor,
     equal: Tensor,
     noise: Tensor,
-    how: Sampling,
+    how: CompactSampling,
     bare_latent: Tensor | None = None,
 ) -> Tensor:
     """Descriptions (N, D) of all pieces of S scenes.

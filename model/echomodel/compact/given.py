@@ -11,8 +11,8 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.config import Objective, Sampler
 from echomodel.graph import GraphBatch
-from echomodel.progress import StepListener
-from echomodel.randomness import Randomness, normal
+from echomodel.protocols import Sampling
+from echomodel.randomness import normal
 from echomodel.samplers import Predict, sample
 
 
@@ -28,20 +28,28 @@ class SamplerSettings(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Sampling:
-    """How nodes are sampled, whatever the branch; fields as the arguments of `EchoModel.sample_layout`.
+class CompactSampling(Sampling):
+    """How a compact model samples; what is given beside goes by these.
 
     Arguments:
-        known, known_mask: (N, ...) in the numbers that are denoised, and (N,) bool.
+        sampler: None = the branch's. rules: the rule set that the relations are meant in, `strict` or `sgfront`.
+        guidance: scale of classifier-free guidance towards the relations, 1 = off.
+        relation_guidance: strength of the pull of the rules' margins on denoised boxes at every step, 0 = off, None =
+            the branch's.
+        noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
+        candidates: draws of a shape, of which the most whole that bears what stands on it is kept (pieces of one class
+            and style together); None = the branch's.
+        styles: (N,) int64, nodes with one number of 0 or more are furniture of one style, beside those that relations
+            of style join; None = nothing is known of styles.
     """
 
-    generator: Randomness
-    steps: int | None = None
     sampler: Sampler | None = None
-    known: Tensor | None = None
-    known_mask: Tensor | None = None
+    rules: str = "strict"
     guidance: float = 1.0
-    progress: StepListener | None = None
+    relation_guidance: float | None = None
+    noise: Tensor | None = None
+    candidates: int | None = None
+    styles: Tensor | None = None
 
     def denoised(self, predict: Predict, noise: Tensor, settings: SamplerSettings) -> Tensor:
         """What becomes of `noise` (N, ...), by the branch's sampler and steps where none are asked for."""
@@ -49,6 +57,17 @@ class Sampling:
             self.sampler or settings.sampler, predict, noise, self.steps or settings.steps, settings.objective,
             known=self.known, known_mask=self.known_mask, generator=self.generator, progress=self.progress,
         )  # fmt: skip
+
+    def start(self, nodes: int, width: int, device: torch.device) -> Tensor:
+        """The noise (nodes, width) that is given, checked, or the generator's."""
+        if self.noise is None:
+            return normal((nodes, width), self.generator, device)
+        if tuple(self.noise.shape) != (nodes, width):
+            raise ValueError(f"noise is {tuple(self.noise.shape)}, expected {(nodes, width)}")
+        bad = ~torch.isfinite(self.noise).all(1)
+        if bool(bad.any()):
+            raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
+        return self.noise.to(device)
 
 
 def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: torch.device) -> tuple[Any, Tensor | None]:
@@ -75,18 +94,6 @@ def known_values(graph: GraphBatch, known: Any, mask: Tensor | None, device: tor
     if bool(bad.any()):
         raise ValueError(f"known shape of node {int(bad.nonzero()[0])} holds values that are not finite")
     return torch.where(mask.reshape(-1, *[1] * (known.ndim - 1)), known, torch.ones_like(known)), mask
-
-
-def starting_noise(shape: tuple[int, ...], generator: Randomness, noise: Tensor | None, device: torch.device) -> Tensor:
-    """The noise that is given, checked, or the generator's, of that shape."""
-    if noise is None:
-        return normal(shape, generator, device)
-    if tuple(noise.shape) != shape:
-        raise ValueError(f"noise is {tuple(noise.shape)}, expected {shape}")
-    bad = ~torch.isfinite(noise).all(1)
-    if bool(bad.any()):
-        raise ValueError(f"noise of node {int(bad.nonzero()[0])} is not finite")
-    return noise.to(device)
 
 
 def repeated(values: Tensor | None, count: int) -> Tensor | None:

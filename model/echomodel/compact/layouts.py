@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.compact.given import Sampling, starting_noise
+from echomodel.compact.given import CompactSampling
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
 from echomodel.compact.predictors import layout_predictor
@@ -22,39 +22,23 @@ from echomodel.vocabulary import vocabulary
 Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
 
 
-@dataclass(frozen=True, eq=False)
-class LayoutSampling:
-    """How layouts are sampled and what is given; fields as the arguments of `EchoModel.sample_layout`.
-
-    Arguments:
-        by: how every branch is sampled; what is known is here, in metres.
-    """
-
-    by: Sampling
-    rules: str
-    known: Boxes | None = None
-    edit: GraphEdit | None = None
-    relation_guidance: float | None = None
-    noise: Tensor | None = None
-
-
-def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: LayoutSampling) -> Boxes:
+def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: CompactSampling) -> Boxes:
     """Boxes (N) of S scenes, drawn from noise.
 
     Arguments:
         model: with a layout branch. latent: the latent graph of some scenes before and after an edit.
-        graph: checked and on the model's device.
+        graph: checked and on the model's device. how: to sample; what is known is checked.
 
     Raises:
         ValueError: rules that the model does not know.
     """
-    config, by = model.config.layout, how.by
+    config = model.config.layout
     scale = model.scale(graph.category)
     given = None if how.known is None else how.known.encode(scale)
     conditional = _predictor(model, graph, latent(graph, how.edit), how.rules)
-    if by.guidance != 1.0:
+    if how.guidance != 1.0:
         bare = graph.with_triplets(graph.triplets[:0])
-        conditional = guided(conditional, _predictor(model, bare, latent(bare, None), how.rules), by.guidance)
+        conditional = guided(conditional, _predictor(model, bare, latent(bare, None), how.rules), how.guidance)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
     if strength:
         conditional = relation_guided(
@@ -62,13 +46,13 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: La
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
             openings=_in_the_way(graph), category=graph.category, placements=graph.placements,
         )  # fmt: skip
-    noise = starting_noise((graph.num_nodes, 8), by.generator, how.noise, graph.category.device)
-    vectors = replace(by, known=given).denoised(conditional, noise, config)
+    noise = how.start(graph.num_nodes, 8, graph.category.device)
+    vectors = replace(how, known=given).denoised(conditional, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
-    if how.known is None or by.known_mask is None:
+    if how.known is None or how.known_mask is None:
         return boxes
-    return boxes.replaced(by.known_mask, how.known)
+    return boxes.replaced(how.known_mask, how.known)
 
 
 def _in_the_way(graph: GraphBatch) -> Tensor | None:
