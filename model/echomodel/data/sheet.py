@@ -1,4 +1,4 @@
-"""Contact sheets: small shaded pictures of meshes in a grid, drawn with a small depth buffer (numpy and pillow)."""
+"""Contact sheets: small shaded pictures of meshes in a grid, drawn point by point, and plans of rooms."""
 
 from __future__ import annotations
 
@@ -46,57 +46,21 @@ def thumbnail(mesh: trimesh.Trimesh, pixels: int = 160, *, yaw: float = 0.6, pit
         yaw, pitch: direction of view, radians; 0, 0 looks at the front (+Z) face.
     """
     side = pixels * 2  # drawn larger, then averaged down
+    points, face = trimesh.sample.sample_surface(mesh, 4 * side * side, seed=0)
     view = _view(yaw, pitch)
-    seen = np.asarray(mesh.vertices, float) @ view.T
-    low, high = seen.min(0), seen.max(0)
+    seen, corners = points @ view.T, np.asarray(mesh.vertices, float) @ view.T
+    low, high = corners.min(0), corners.max(0)
     size = max(high[0] - low[0], high[1] - low[1], 1e-9)
-    seen = (seen - (low + high) / 2) / size * (0.9 * side) * [1, -1, 1] + [side / 2, side / 2, 0]
-    face, depth = _rasterised(seen[mesh.faces], side)
-    hit = face >= 0
-    normal = mesh.face_normals[face[hit]] @ view.T
+    x, y = ((seen - (low + high) / 2) / size * (0.9 * side) * [1, -1, 1] + side / 2).astype(int).T[:2]
+    normal = mesh.face_normals @ view.T
     normal[normal[:, 2] < 0] *= -1
     light = np.maximum(normal @ (np.array([-0.35, 0.75, 0.6]) / np.linalg.norm([-0.35, 0.75, 0.6])), 0)
-    picture = np.full((side * side, 3), 250.0)
-    picture[hit] = _colours(mesh)[face[hit]] * (0.4 + 0.65 * light[:, None])
-    picture = _outlined(picture.reshape(side, side, 3), depth.reshape(side, side), 0.9 * side)
+    shaded = _colours(mesh) * (0.4 + 0.65 * light[:, None])
+    picture = np.full((side, side, 3), 250.0)
+    order = np.argsort(seen[:, 2])[:, None]  # what is nearer is drawn later, each point two pixels wide
+    picture[y[order] + [0, 1, 0, 1], x[order] + [0, 0, 1, 1]] = shaded[face[order]]
     image = Image.fromarray(picture.clip(0, 255).astype(np.uint8))
     return image.resize((pixels, pixels), Image.Resampling.BOX)
-
-
-def _rasterised(triangles: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nearest triangle (-1 = none) and its depth at every pixel of a square picture, by a depth buffer.
-
-    Arguments:
-        triangles: (m, 3, 3) float, corners in pixels; larger z is nearer.
-    """
-    low = np.ceil(triangles[..., :2].min(1) - 0.5).clip(0, side).astype(int)
-    span = np.maximum(np.floor(triangles[..., :2].max(1) - 0.5).clip(-1, side - 1).astype(int) - low + 1, 0)
-    a, b, c = triangles.transpose(1, 0, 2)
-    double_area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    count = span.prod(1) * (np.abs(double_area) > 1e-9)
-    nearest, depth = np.full(side * side, -1), np.full(side * side, -np.inf)
-    ends = np.cumsum(count)
-    start = 0
-    while start < len(count):  # some millions of (triangle, pixel) pairs at a time
-        base = ends[start - 1] if start else 0
-        stop = max(start + 1, int(np.searchsorted(ends, base + 2_000_000, side="right")))
-        n = count[start:stop]
-        t = np.repeat(np.arange(start, stop), n)
-        k = np.arange(len(t)) - np.repeat(np.cumsum(n) - n, n)
-        start = stop
-        if len(t) == 0:
-            continue
-        px, py = low[t, 0] + k % span[t, 0], low[t, 1] + k // span[t, 0]
-        x, y = px + 0.5 - a[t, 0], py + 0.5 - a[t, 1]
-        u = (x * (c[t, 1] - a[t, 1]) - y * (c[t, 0] - a[t, 0])) / double_area[t]
-        v = (y * (b[t, 0] - a[t, 0]) - x * (b[t, 1] - a[t, 1])) / double_area[t]
-        inside = (u >= 0) & (v >= 0) & (u + v <= 1)
-        t, u, v, pixel = t[inside], u[inside], v[inside], (py * side + px)[inside]
-        z = a[t, 2] + u * (b[t, 2] - a[t, 2]) + v * (c[t, 2] - a[t, 2])
-        np.maximum.at(depth, pixel, z)
-        front = z >= depth[pixel]
-        nearest[pixel[front]] = t[front]
-    return nearest, depth
 
 
 def _view(yaw: float, pitch: float) -> np.ndarray:
@@ -111,17 +75,6 @@ def _colours(mesh: trimesh.Trimesh) -> np.ndarray:
         return np.tile(np.array(PLAIN, float), (len(mesh.faces), 1))
     table = np.array([PALETTE[name] for name in MATERIALS], float)
     return table[np.asarray(mesh.face_attributes["material"])]
-
-
-def _outlined(picture: np.ndarray, depth: np.ndarray, size: float) -> np.ndarray:
-    """Darken pixels where the surface behind drops away, so that parts of one colour stay apart."""
-    for axis in (0, 1):
-        with np.errstate(invalid="ignore"):
-            step = np.abs(np.diff(depth, axis=axis)) > 0.03 * size
-        edge = np.zeros(depth.shape, bool)
-        edge[(slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))] = step
-        picture = np.where((edge & np.isfinite(depth))[..., None], picture * 0.6, picture)
-    return picture
 
 
 def contact_sheet(rows: Sequence[tuple[str, Sequence[trimesh.Trimesh]]], pixels: int = 120) -> Image.Image:
