@@ -86,6 +86,10 @@ class Look(BaseModel):
     up_axis: Annotated[Literal["Y", "Z"], BeforeValidator(_upper)] = row(
         "Y", FILES, "axis up, in assets too", everyday=True
     )
+    meters_per_unit: float = row(1.0, FILES, "unit of the files, in assets too", ge=1e-6, le=1e6)
+    room_path: str = row(
+        "/Room", FILES, "prim path of the room", words="path", pattern=r"^(/[A-Za-z_][A-Za-z0-9_]*)+$", max_length=200
+    )
     faces: int = row(FACES, FILES, "face budget of each mesh", ge=100)
     merge: Literal["parts", "bodies", "closed"] = row(
         "parts",
@@ -129,6 +133,20 @@ class RoomOptions(PlainModel, Look):
     text: str = row("", MODELS, 'what models shall be like, such as "mid-century oak" (extra: text)', words="words")
     collect: bool = row(False, MODELS, "take models along with their files instead of referring to them")
     preview: bool = row(True, FILES, "draw a picture of the room (extra: render)")
+    like: File | None = row(None, FILES, "stage whose unit, up axis and room's path stand for those that are not given")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_theirs(cls, fields: Any) -> Any:
+        """What `like` says becomes values of its own, which need the stage no more."""
+        if not isinstance(fields, dict) or not fields.get("like"):
+            return fields
+        from echousd.stage.files import open_stage
+        from echousd.stage.units import conventions
+
+        plain = {name: cls.model_fields[name].default for name in ("meters_per_unit", "up_axis", "room_path")}
+        own = {name: value for name, value in fields.items() if name != "like" and plain.get(name) != value}
+        return {**conventions(open_stage(fields["like"]), own.get("room_path")), **own}
 
     @model_validator(mode="after")
     def _models(self) -> RoomOptions:
@@ -173,7 +191,9 @@ def told(error: ValidationError, model: type[BaseModel]) -> str:
     if first["type"] == "value_error":
         return str(first["ctx"]["error"])
     if first["type"] == "string_pattern_mismatch":
-        what = "a name of letters, digits and _" if "A-Z" in first["ctx"]["pattern"] else "a hexadecimal digest"
+        pattern = first["ctx"]["pattern"]
+        what = "a name of letters, digits and _" if "A-Z" in pattern else "a hexadecimal digest"
+        what = "a path of names of letters, digits and _, such as /World/Room" if "/" in pattern else what
         return f"{where} is {first['input']!r:.100}, allowed: {what}"
     if first["type"] == "extra_forbidden":
         return f"{where} is no option, allowed: {', '.join(sorted(model.model_fields))}"

@@ -77,7 +77,7 @@ def _options(raw: Any) -> BatchOptions:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The fields of a `batch.toml`; sources and library are relative to it. Raises ValueError naming the file."""
+    """The fields of a `batch.toml`; sources, library and `like` are relative to it. Raises ValueError naming the file."""
     try:
         raw = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -86,8 +86,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     if isinstance(sources, list) and all(isinstance(source, str) for source in sources):
         raw["sources"] = [str(path.parent / source) for source in sources]
     options = raw.get("options")
-    if isinstance(options, dict) and isinstance(options.get("assets"), str) and options["assets"]:
-        options["assets"] = str((path.parent / options["assets"]).absolute())
+    if isinstance(options, dict):
+        for name in ("assets", "like"):
+            if isinstance(options.get(name), str) and options[name]:
+                options[name] = str((path.parent / options[name]).absolute())
     return raw
 
 

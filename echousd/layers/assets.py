@@ -11,6 +11,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade, Vt
 
 from echousd.layers.materials import write_looks, write_palettes
 from echousd.layers.physics import write_asset_physics
+from echousd.options import Look
 from echousd.shapes.finishes.harmonies import HARMONIES
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.joints import write_joints
@@ -19,6 +20,7 @@ from echousd.shapes.surface import Surface, surface
 from echousd.stage.files import new_stage
 from echousd.stage.paths import CLASSES, DESCRIPTION, GEO, MTL, class_path, coarse_name, payload_name, piece_path
 from echousd.stage.taxonomy import ade20k
+from echousd.stage.turning import move_room, rescale, turn_up
 
 LOD, HIGH, LOW, PROXY = "LOD", "high", "low", "proxy"  # a variant set and its variants, the default first
 
@@ -30,6 +32,16 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
     with Sdf.ChangeBlock():
         finish(layer)
     return layer
+
+
+def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
+    """A layer of ours with the unit, the up axis and the room's path that are asked for, changed in place.
+
+    Arguments:
+        theirs: as for `turn_up`.
+    """
+    rescale(layer, look.meters_per_unit, theirs)
+    return move_room(turn_up(layer, theirs) if look.up_axis == "Z" else layer, look.room_path)
 
 
 def as_class(stage: Usd.Stage, name: str) -> None:

@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Kind, Sdf
 
-from echousd.layers.assets import component_layer, geometry_layer
+from echousd.layers.assets import as_asked, component_layer, geometry_layer
+from echousd.options import Look
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.originals.original import Original
 from echousd.stage.files import layer_bytes
 from echousd.stage.paths import component_file, original_file, payload_file, payload_name, piece_name
-from echousd.stage.turning import turn_up
 
 PLACES, MODEL = "placed", "model"  # the prim that corrects unit, axes, pivot and front, and the model below it
 
 
 def files(
-    name: str, category: str, geometry: Geometry, data: Mapping[str, Any], folder: Path, up_axis: str = "Y"
+    name: str, category: str, geometry: Geometry, data: Mapping[str, Any], folder: Path, options: Look
 ) -> dict[str, bytes]:
     """Path in the room's folder -> content: the component, our collider where it has none, a converted model.
 
     Arguments:
         name: of the asset. category: its word. geometry: with an original. data: customLayerData.
         folder: where the component will lie, which the path of an original that stays where it is becomes relative to.
-        up_axis: of what is ours; the model itself stays as it is.
+        options: of what is ours; the model itself stays as it is.
     """
     original = geometry.original
     assert original is not None
@@ -38,9 +38,8 @@ def files(
     ours = {component_file(name): component}
     if not original.colliders:
         ours[payload_file(name)] = geometry_layer(name, {}, geometry, data)
-    if up_axis == "Z":
-        for layer in ours.values():
-            turn_up(layer, theirs=lambda path: path != f"./{payload_name(name)}")
+    for layer in ours.values():
+        as_asked(layer, options, theirs=lambda path: path != f"./{payload_name(name)}")
     found = {path: layer_bytes(layer, path[-5:]) for path, layer in ours.items()}
     return found | {original_file(name, path): content for path, content in original.files.items()}
 

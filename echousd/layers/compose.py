@@ -38,7 +38,6 @@ from echousd.stage.paths import (
     piece_path,
 )
 from echousd.stage.taxonomy import ade20k, word_of
-from echousd.stage.turning import turn_up
 from echousd.stage.write import graph_layer as write_graph_layer
 
 if TYPE_CHECKING:
@@ -305,8 +304,8 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
         if name in room.carried:
             return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)
-        word, axis = word_of(room.graph.node(user)), room.options.up_axis
-        return Asset(name, {}, component.files(name, word, geometry, data, folder, axis))
+        word = word_of(room.graph.node(user))
+        return Asset(name, {}, component.files(name, word, geometry, data, folder, room.options))
     if name in room.carried:
         carried = {piece_path("", name, part.name, part.body): tuple(part.slots) for part in geometry.parts}
         return Asset(name, carried, room.carried[name])
@@ -344,8 +343,8 @@ def _written(room: RoomData, name: str, category: str, style: str, geometry: Geo
 
 
 def _bytes(room: RoomData, layer: Sdf.Layer, path: str) -> bytes:
-    """A layer of the room as it lies on disk, with the room's up axis; `path` ends as its file does."""
-    return layer_bytes(turn_up(layer) if room.options.up_axis == "Z" else layer, path[-5:])
+    """A layer of the room as it lies on disk, in the conventions that are asked for; `path` ends as its file does."""
+    return layer_bytes(assets.as_asked(layer, room.options), path[-5:])
 
 
 def _asset_data(room: RoomData, name: str, geometry: Geometry) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from echousd.graph.files import STAGE_FORMS
 from echousd.naming import HOUSE as MARK
 from echousd.stage.files import layer_bytes, open_stage, write_whole
 from echousd.stage.read import find_rooms
-from echousd.stage.turning import turn_up
+from echousd.stage.turning import rescale, turn_up
 from echousd.stage.units import metres_per_unit, up_axis
 from echousd.stage.values import matrix
 
@@ -89,7 +89,9 @@ def write_house(root: Path, rooms: Sequence[Place], made: Mapping[str, Path], *,
     for room in rooms:
         file = made[room.name].relative_to(root.parent).as_posix()
         layer.GetPrimAtPath(f"/House/{room.name}").referenceList.prependedItems.append(Sdf.Reference(f"./{file}"))
-    if any(up_axis(open_stage(made[room.name])) == "Z" for room in rooms):
+    first = open_stage(made[rooms[0].name])
+    rescale(layer, metres_per_unit(first))
+    if up_axis(first) == "Z":
         turn_up(layer)
     layer.customLayerData = {MARK: 1, "generator": f"echousd {echousd.__version__}"}
     write_whole(root, layer_bytes(layer, ".usda"))
@@ -117,6 +119,7 @@ def _in_a_row(poses: Mapping[str, np.ndarray], made: Mapping[str, Path]) -> dict
         stage = open_stage(made[name])
         box = UsdGeom.BBoxCache(0, ["default"]).ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
         out[name] = pose.copy()
-        out[name][0, 3] += reach - box.GetMin()[0]
-        reach += box.GetMax()[0] - box.GetMin()[0] + GAP
+        low, high = (corner[0] * metres_per_unit(stage) for corner in (box.GetMin(), box.GetMax()))
+        out[name][0, 3] += reach - low
+        reach += high - low + GAP
     return out

@@ -19,7 +19,7 @@ from echousd.folder.within import inside
 from echousd.pending import check_written
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
-from echousd.stage.turning import turn_up
+from echousd.stage.turning import rescale, turn_up
 
 FURNITURE = "Q14745"  # Wikidata's number of what all of these are
 INSIDE = "usd"  # the folder between a package's name and its layer
@@ -94,10 +94,10 @@ def package(name: str, files: Mapping[str, bytes], *, author: str, source: str) 
 
 
 def _turned(scratch: Path, file: str, content: bytes) -> Sdf.Layer:
-    """A layer from its bytes, with Z up."""
+    """A layer from its bytes, in metres with Z up."""
     place = scratch / file
     place.write_bytes(content)
-    return turn_up(Sdf.Layer.OpenAsAnonymous(str(place)))
+    return turn_up(rescale(Sdf.Layer.OpenAsAnonymous(str(place)), 1.0))
 
 
 def _facts(main: Path, author: str, source: str) -> dict[str, Any]:

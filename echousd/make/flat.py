@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from pxr import Sdf, Usd
@@ -18,6 +19,7 @@ from echousd.stage import encoding as usd
 from echousd.stage.files import layer_bytes, open_stage, write_all
 from echousd.stage.layouts import VARIANTS, layout_names, showing_layout
 from echousd.stage.paths import DRESSING, OBJECTS, ROOM
+from echousd.stage.turning import move_room
 
 
 def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
@@ -31,10 +33,13 @@ def save_flat(room: RoomData, path: Path, *, force: bool = False) -> Path:
         raise ValueError(f"{path}: a flat room ends in .usda or .usdc, found {path.suffix or 'no ending'!r}")
     if path.exists() and not force:
         raise ValueError(f"{path}: exists; choose another file or use --force")
+    at = room.options.room_path
+    room = replace(room, options=room.options.replaced(room_path=ROOM))
     with tempfile.TemporaryDirectory(prefix="echousd-") as scratch:
         stage = open_stage(save_layers(room, Path(scratch) / room.name))
         package = Package(Reach.of(stage), images_beside(path))
         layer = _with_layouts({name: _flat(stage, name, package) for name in layout_names(stage) or ("",)})
+        move_room(layer, at)
     write_all({path: layer_bytes(layer, path.suffix), **package.files(path.parent)})
     return path
 

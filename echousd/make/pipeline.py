@@ -45,9 +45,7 @@ from echousd.shapes.sources.source import ShapeRequest
 from echousd.shapes.styles import asset_names, style_groups
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.stage.paths import ROOM
-from echousd.stage.read import find_rooms
-from echousd.stage.units import unlike
+from echousd.stage.units import conventions
 from echousd.tensors import graph_batch
 
 if TYPE_CHECKING:
@@ -112,7 +110,7 @@ def generate(
         file, beside = Path(graph).name, Path(graph).parent
         with timer.stage("read"):
             read = Path(graph)
-            graph, other = _read(read, room, asked.up_axis)
+            graph, other = _read(read, room, asked)
             graph, held = with_earlier_locks(graph, earlier)
             graph, homeless = with_locked_places(graph, None if room else read, earlier)
     else:
@@ -211,10 +209,17 @@ def generate(
     return made_room
 
 
-def _read(file: Path, room: str | None, up: str) -> tuple[SceneGraph, str]:
-    """The graph in a file, and how its stage differs from a room of ours, "" where it does not."""
+def _read(file: Path, room: str | None, asked: RoomOptions) -> tuple[SceneGraph, str]:
+    """The graph in a file, and what of its stage's conventions is not kept, "" where all are."""
     if not file.is_file() or file.suffix.lower() not in STAGE_FORMS:
         return load_graph(file, room), ""
     stage = open_stage(file)
-    paths = [str(prims.room.GetPath()) for prims in find_rooms(stage)]
-    return read_graph(stage, room), unlike(stage, paths[0] if len(paths) == 1 else ROOM, up)
+    graph, theirs = read_graph(stage, room), conventions(stage, room)
+    if room is not None:  # one of several, which a house has where it wants them
+        theirs.pop("room_path")
+    differs = [
+        f"{name} {value!r}, the room {getattr(asked, name)!r}"
+        for name, value in theirs.items()
+        if value != getattr(asked, name)
+    ]
+    return graph, f"{file.name} has {'; '.join(differs)} (like={file.name} keeps them)" if differs else ""

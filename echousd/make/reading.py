@@ -25,12 +25,13 @@ from echousd.shapes.geometry import LICENCE, Collider, Geometry, Origin, Part
 from echousd.shapes.joints import read_joints
 from echousd.shapes.masses import read_mass
 from echousd.shapes.originals.original import Original
-from echousd.shapes.upright import as_y_up, stands_z_up
+from echousd.shapes.upright import in_our_frame, stands_z_up
 from echousd.stage.contents import Z_TO_Y, triangulated
 from echousd.stage.files import open_stage
 from echousd.stage.forms import forms
 from echousd.stage.graphs import read_graph
 from echousd.stage.paths import DESCRIPTION, GEO, OBJECTS, asset_files, component_file, piece_name, piece_of
+from echousd.stage.units import metres_per_unit
 from echousd.stage.values import matrix, reading
 
 
@@ -74,11 +75,12 @@ def read_room(root: str | Path) -> SavedRoom:
     carried: dict[str, Mapping[str, bytes]] = {}
     assets: dict[str, str] = {}
     made: dict[str, Geometry] = {}
-    z_up = stands_z_up(stage.GetPrimAtPath("/Room"))
+    at = stage.GetPrimAtPath(manifest["room_path"])
+    objects, z_up, metres = f"{at.GetPath()}/{OBJECTS.rpartition('/')[2]}", stands_z_up(at), metres_per_unit(stage)
     for node in graph.nodes:
         asset = manifest["assets"].get(node.name)
         read = read_original if "asset" in manifest.get("meshes", {}).get(asset, {}) else _geometry
-        where = f"{OBJECTS}/{node.name}"
+        where = f"{objects}/{node.name}"
         try:
             found = made.get(asset) or read(stage.GetPrimAtPath(where), asset, node.category, manifest)
         except (TypeError, ValueError, IndexError, AttributeError, ArithmeticError, Tf.ErrorException) as error:
@@ -91,7 +93,7 @@ def read_room(root: str | Path) -> SavedRoom:
         if asset is None or found is None:
             raise ValueError(f"{root}: object {node.name!r} has no mesh that echousd made; generate the room again")
         if asset not in made:
-            found = made[asset] = as_y_up(found) if z_up else found
+            found = made[asset] = in_our_frame(found, metres, z_up=z_up)
             if shelf is not None and f"assets/{asset}" in shelf.keys:
                 carried[asset] = asset_from(shelf, asset)
             else:
@@ -103,34 +105,35 @@ def read_room(root: str | Path) -> SavedRoom:
         assets[node.name], geometry[node.name] = asset, found
     bounds = np.array([geometry[name].mesh.bounds for name in graph.names])
     sizes = torch.tensor(bounds[:, 1] - bounds[:, 0], dtype=torch.float32)
-    boxes = _boxes(stage, graph, sizes)
-    return SavedRoom(graph, boxes, _layouts(stage, graph, sizes) or (boxes,), geometry, assets, carried, manifest)
+    boxes = _boxes(stage, objects, graph, sizes)
+    layouts = _layouts(stage, objects, graph, sizes) or (boxes,)
+    return SavedRoom(graph, boxes, layouts, geometry, assets, carried, manifest)
 
 
-def _boxes(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> Boxes:
-    """Boxes of the objects as the stage places them now."""
-    position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath("/Room")
+def _boxes(stage: Usd.Stage, objects: str, graph: SceneGraph, size: torch.Tensor) -> Boxes:
+    """Boxes of the objects below a path as the stage places them now."""
+    position, yaw, cache, room = [], [], UsdGeom.XformCache(), stage.GetPrimAtPath(objects).GetParent()
     turn, ahead = (Z_TO_Y, (0, -1, 0)) if stands_z_up(room) else (np.eye(3), (0, 0, 1))
     for name in graph.names:
-        prim = stage.GetPrimAtPath(f"{OBJECTS}/{name}")
+        prim = stage.GetPrimAtPath(f"{objects}/{name}")
         with reading(stage):
             pose, _ = cache.ComputeRelativeTransform(prim, room)
         matrix(pose, prim)
         front, place = (np.array(v) @ turn.T for v in (pose.TransformDir(ahead), pose.ExtractTranslation()))
-        position.append(place)
+        position.append(place * metres_per_unit(stage))
         yaw.append(np.arctan2(front[0], front[2]))
     return Boxes(size, *(torch.tensor(np.array(v), dtype=torch.float32) for v in (position, yaw)))
 
 
-def _layouts(stage: Usd.Stage, graph: SceneGraph, size: torch.Tensor) -> tuple[Boxes, ...]:
+def _layouts(stage: Usd.Stage, objects: str, graph: SceneGraph, size: torch.Tensor) -> tuple[Boxes, ...]:
     """Boxes under every variant of `layout`; the stage is left as it was."""
-    variants = stage.GetPrimAtPath("/Room").GetVariantSet("layout")
+    variants = stage.GetPrimAtPath(objects).GetParent().GetVariantSet("layout")
     names = [name for name in variants.GetVariantNames() if name.startswith("layout_")]
     found = []
     for name in sorted(names, key=lambda name: (len(name), name)):
         with Usd.EditContext(stage, stage.GetSessionLayer()):
             variants.SetVariantSelection(name)
-            found.append(_boxes(stage, graph, size))
+            found.append(_boxes(stage, objects, graph, size))
             variants.ClearVariantSelection()
     return tuple(found)
 

@@ -12,7 +12,7 @@ from echousd.make.finished import Room
 from echousd.make.verdicts import relation_verdicts
 from echousd.reproducible import rounded_boxes
 from echousd.settle import SettleReport, settle_layouts
-from echousd.stage.paths import OBJECTS
+from echousd.stage.paths import OBJECTS, ROOM
 
 UPRIGHT = 1.0  # degrees: what leans further at rest is no pose that a layout can hold
 
@@ -25,7 +25,7 @@ def settled(room: Room) -> Room:
 
     Raises SettleUnavailable without MuJoCo (extra `sim`).
     """
-    reports = settle_layouts(room.stage)
+    reports = settle_layouts(_as_ours(room).stage)
     if all(report.ok for report in reports):
         return room
     layouts = room.layouts or (room.boxes,)
@@ -39,10 +39,15 @@ def settled(room: Room) -> Room:
         )
         notes = (*room.notes, *(f"{name} stands where it comes to rest" for name in moved))
         room = replace(room, boxes=found[0], layouts=found, outcomes=outcomes, notes=notes)
-        reports = settle_layouts(room.stage)
+        reports = settle_layouts(_as_ours(room).stage)
     told = [replace(report, layout="").sentences for report in reports]
     outcomes = tuple(replace(one, restless=each) for one, each in zip(room.outcomes, told, strict=True))
     return replace(room, outcomes=outcomes)
+
+
+def _as_ours(room: Room) -> Room:
+    """The room in metres, with +Y up, at `/Room`, whatever its files shall have."""
+    return replace(room, options=room.options.replaced(meters_per_unit=1.0, up_axis="Y", room_path=ROOM))
 
 
 def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list[str]]:
@@ -54,7 +59,7 @@ def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list
         row = rows.get(motion.path)
         if row is None or room.graph.nodes[row].locked or room.graph.nodes[row].position is not None:
             continue
-        place = _in_room(room, motion.place)
+        place = motion.place
         lean = np.degrees(np.arccos(np.clip(place[1, 1], -1, 1)))
         if lean > UPRIGHT:
             continue
@@ -63,11 +68,3 @@ def _rested(room: Room, boxes: Boxes, report: SettleReport) -> tuple[Boxes, list
         names.append(motion.name)
     made = Boxes(boxes.size, *(torch.as_tensor(v, dtype=torch.float32) for v in (position, yaw)))
     return rounded_boxes(room.graph, made), names
-
-
-def _in_room(room: Room, place: np.ndarray) -> np.ndarray:
-    """(4, 4) float: a pose in the world of the room's stage, in the room's frame."""
-    if room.options.up_axis == "Y":
-        return place
-    turn = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])  # (x, y, z) with Z up -> (x, z, -y)
-    return np.asarray(turn @ place @ turn.T)

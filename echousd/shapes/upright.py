@@ -1,4 +1,4 @@
-"""Rooms whose prims have +Z up, read as if they had +Y up, which everything here reckons with."""
+"""Rooms of other units and up axes, read as if they had metres and +Y up, which everything here reckons with."""
 
 from __future__ import annotations
 
@@ -20,22 +20,29 @@ def stands_z_up(room: Usd.Prim) -> bool:
     return bool(abs(own[1, 2]) > abs(own[1, 1]))
 
 
-def as_y_up(geometry: Geometry) -> Geometry:
-    """A piece with +Z up, -Y its front, in the object's frame: +Y up, +Z its front; joints have no places when read."""
-    parts = tuple(replace(part, mesh=_turned(part.mesh)) for part in geometry.parts)
-    colliders = tuple(replace(collider, mesh=_turned(collider.mesh)) for collider in geometry.colliders)
+def in_our_frame(geometry: Geometry, metres: float, *, z_up: bool) -> Geometry:
+    """A piece in the object's frame: metres, +Y up, +Z its front; joints have no places when read.
+
+    Arguments:
+        metres: per unit in which it was read. z_up: read with +Z up, -Y its front.
+    """
+    if metres == 1.0 and not z_up:
+        return geometry
+    turn = Z_TO_Y if z_up else np.eye(3)
+    parts = tuple(replace(part, mesh=_brought(part.mesh, metres * turn)) for part in geometry.parts)
+    colliders = tuple(replace(collider, mesh=_brought(collider.mesh, metres * turn)) for collider in geometry.colliders)
     original = geometry.original
     if original is not None:
         pose = np.eye(4)
-        pose[:3, :3] = Z_TO_Y
+        pose[:3, :3] = metres * turn
         original = replace(original, pose=pose @ original.pose)
     mass = geometry.mass
     if mass is not None:
-        mass = Mass(mass.mass, Z_TO_Y @ mass.centre, mass.inertia, Z_TO_Y @ mass.axes)
+        mass = Mass(mass.mass, metres * turn @ mass.centre, metres**2 * mass.inertia, turn @ mass.axes)
     return replace(geometry, parts=parts, colliders=colliders, mass=mass, original=original)
 
 
-def _turned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+def _brought(mesh: trimesh.Trimesh, to_ours: np.ndarray) -> trimesh.Trimesh:
     out = mesh.copy()
-    out.vertices = np.asarray(mesh.vertices) @ Z_TO_Y.T
+    out.vertices = np.asarray(mesh.vertices) @ to_ours.T
     return out

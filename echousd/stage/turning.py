@@ -1,4 +1,7 @@
-"""Layers with +Y up made layers with +Z up, prim by prim: points, places, masses, joints, cameras and lights."""
+"""Layers of ours (metres, +Y up, the room at `/Room`) made layers of other conventions, prim by prim.
+
+Points, places, masses, joints, cameras and lights change with the unit and the up axis; no prim gets a scale for it.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from typing import Any
 
 import numpy as np
 from pxr import Gf, Sdf, Vt
+
+from echousd.stage.paths import ROOM
 
 # (x, y, z) with Y up -> (x, -z, y) with Z up; what looked along +Z looks along -Y. Of row vectors, as USD's matrices.
 TURN = Gf.Matrix4d().SetRotate(Gf.Rotation(Gf.Vec3d(1, 0, 0), 90.0))
@@ -19,7 +24,83 @@ PLACES = ("physics:centerOfMass", "physics:localPos0", "physics:localPos1", "phy
 FRAMES = ("physics:principalAxes", "physics:localRot0", "physics:localRot1")
 AXES = {"Y": "Z", "Z": "Y"}
 OPS = {"rotateY": ("rotateZ", 1.0), "rotateZ": ("rotateY", -1.0), "rotateX": ("rotateX", 1.0)}
+LENGTHS = {  # attribute -> power of the unit that it is given in
+    "points": 1, "velocities": 1, "accelerations": 1, "widths": 1, "extent": 1, "extentsHint": 1,
+    "clippingRange": 1, "focalLength": 1, "focusDistance": 1, "horizontalAperture": 1, "verticalAperture": 1,
+    "inputs:radius": 1, "inputs:width": 1, "inputs:height": 1, "inputs:length": 1,
+    "physics:centerOfMass": 1, "physics:localPos0": 1, "physics:localPos1": 1, "physics:gravityMagnitude": 1,
+    "physics:diagonalInertia": 2, "drive:angular:physics:damping": 2, "physics:density": -3,
+}  # fmt: skip
+LIMITS = ("physics:lowerLimit", "physics:upperLimit")  # lengths of what slides, else degrees
 SAYS_Y, SAYS_Z = "+Y up, +Z is the front", "+Z up, -Y is the front"
+
+
+def rescale(layer: Sdf.Layer, metres: float, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
+    """Give a layer of ours another unit, in place, and return it; one in that unit stays as it is.
+
+    Arguments:
+        metres: per unit. theirs: as for `turn_up`.
+    """
+    root = layer.pseudoRoot
+    units = (root.GetInfo("metersPerUnit") if root.HasInfo("metersPerUnit") else 1.0) / metres
+    if units == 1.0:
+        return layer
+    with Sdf.ChangeBlock():
+        for spec in _prims(layer):
+            for attribute in spec.attributes:
+                if attribute.default is not None:
+                    _rescale(attribute, spec, units, whole=any(_is_theirs(one, theirs) for one in spec.nameChildren))
+        root.SetInfo("metersPerUnit", metres)
+    return layer
+
+
+def _rescale(attribute: Sdf.AttributeSpec, spec: Sdf.PrimSpec, units: float, *, whole: bool) -> None:
+    """The value of an attribute in another unit, of which the present one has so many.
+
+    Arguments:
+        whole: below the prim stands somebody else's model, whose points its transform brings to ours.
+    """
+    name, value = attribute.name, attribute.default
+    if name == "xformOp:transform":
+        scaled = value * Gf.Matrix4d().SetScale(units)
+        attribute.default = scaled if whole else Gf.Matrix4d(value).SetTranslateOnly(scaled.ExtractTranslation())
+        return
+    power = LENGTHS.get(name, 0)
+    outside = spec.layer.GetPrimAtPath(spec.path.StripAllVariantSelections())
+    kind = spec.typeName or (outside.typeName if outside else "")
+    if name.startswith("xformOp:translate") or (name in LIMITS and kind == "PhysicsPrismaticJoint"):
+        power = 1
+    if name == "inputs:intensity" and kind == "SphereLight":
+        power = 2  # of what is normalized: radiance times area
+    if not power:
+        return
+    if isinstance(value, Vt.Vec3fArray):
+        attribute.default = Vt.Vec3fArray.FromNumpy(np.array(value) * np.float32(units**power))
+    elif isinstance(value, float):
+        attribute.default = value * units**power
+    else:
+        attribute.default = type(value)(*(round(v * units**power, 9) for v in value))
+
+
+def move_room(layer: Sdf.Layer, path: str) -> Sdf.Layer:
+    """Put what a layer of ours says of `/Room` at another path, in place, and return it; targets follow.
+
+    Where the layer defines the room, it defines the prims above it as well.
+    """
+    room = layer.GetPrimAtPath(ROOM)
+    if path == ROOM or room is None:
+        return layer
+    moved = Sdf.Layer.CreateAnonymous(".usda")
+    moved.TransferContent(layer)
+    del moved.rootPrims[room.name]
+    Sdf.CreatePrimInLayer(moved, path)
+    Sdf.CopySpec(layer, ROOM, moved, path)
+    for above in Sdf.Path(path).GetParentPath().GetPrefixes() if room.specifier == Sdf.SpecifierDef else ():
+        spec = moved.GetPrimAtPath(above)
+        spec.specifier, spec.typeName, spec.kind = Sdf.SpecifierDef, "Xform", "assembly"
+    moved.defaultPrim = Sdf.Path(path).GetPrefixes()[0].name
+    layer.TransferContent(moved)
+    return layer
 
 
 def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
@@ -33,13 +114,8 @@ def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False
     root = layer.pseudoRoot
     if root.HasInfo("upAxis") and root.GetInfo("upAxis") == "Z":
         return layer
-    paths: list[Sdf.Path] = []
-    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
     with Sdf.ChangeBlock():
-        for path in paths:
-            spec = layer.GetPrimAtPath(path) if path.IsPrimPath() or path.IsPrimVariantSelectionPath() else None
-            if spec is None:
-                continue
+        for spec in _prims(layer):
             for attribute in list(spec.attributes):
                 _turn(attribute)
             _turn_ops(spec)
@@ -49,6 +125,14 @@ def turn_up(layer: Sdf.Layer, theirs: Callable[[str], bool] = lambda path: False
                 spec.SetInfo("documentation", spec.GetInfo("documentation").replace(SAYS_Y, SAYS_Z))
         root.SetInfo("upAxis", "Z")
     return layer
+
+
+def _prims(layer: Sdf.Layer) -> list[Sdf.PrimSpec]:
+    """All prims that a layer speaks of, those in variants too."""
+    paths: list[Sdf.Path] = []
+    layer.Traverse(Sdf.Path.absoluteRootPath, paths.append)
+    prims = [path for path in paths if path.IsPrimPath() or path.IsPrimVariantSelectionPath()]
+    return [*filter(None, map(layer.GetPrimAtPath, prims))]  # the path of a variant set is of that kind, too
 
 
 def _turn(attribute: Sdf.AttributeSpec) -> None:

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 
 from pxr import Sdf, Usd, UsdGeom
 
-from echousd.stage.paths import ROOM
-
 METRES = "metersPerUnit"
 UP_AXIS = "upAxis"
 
@@ -35,18 +33,26 @@ def set_units(layer: Sdf.Layer, stage: Usd.Stage) -> None:
             layer.pseudoRoot.SetInfo(key, value)
 
 
-def unlike(stage: Usd.Stage, path: str, up: str) -> str:
-    """A sentence where a stage that holds a room at a path is in other units, axis or path than a room of ours is.
+def conventions(stage: Usd.Stage, path: str | None = None) -> dict[str, float | str]:
+    """What a stage says of its unit, its up axis and the path of its room, by the names of a room's options.
 
     Arguments:
-        up: axis of ours. What the stage leaves open differs in nothing.
+        path: of the room; None = of the only one, which a stage without graphs leaves open.
+
+    Raises ValueError for several rooms.
     """
-    metres = metres_per_unit(stage) if _speaker(stage, METRES) else 1.0
-    axis = up_axis(stage) if _speaker(stage, UP_AXIS) else up
-    if (round(metres, 9), axis, path) == (1.0, up, ROOM):
-        return ""
-    name = stage.GetRootLayer().GetDisplayName()
-    return f"{name} has units of {metres:g} m, {axis} up, at {path}; the room has metres, {up} up (up_axis), at {ROOM}"
+    from echousd.stage.read import find_rooms
+
+    said: dict[str, float | str] = {}
+    if _speaker(stage, METRES):
+        said["meters_per_unit"] = round(metres_per_unit(stage), 9)
+    if _speaker(stage, UP_AXIS):
+        said["up_axis"] = up_axis(stage)
+    paths = [str(prims.room.GetPath()) for prims in find_rooms(stage)] if path is None else [path]
+    if len(paths) > 1:
+        file, named = stage.GetRootLayer().realPath, ", ".join(paths)
+        raise ValueError(f"{file}: {len(paths)} rooms, name one (room_path): {named}")
+    return {**said, **({"room_path": paths[0]} if paths else {})}
 
 
 def unit_faults(stage: Usd.Stage) -> Iterator[tuple[str, bool]]:

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from pxr import Sdf
+from pxr import Sdf, UsdGeom
 from small_room import BARE, StandIn, small_graph
 
 import echousd
@@ -250,26 +250,51 @@ def test_windows_are_proposed_beside_a_stated_door():
     assert again.graph.room.openings == room.graph.room.openings
 
 
-@pytest.mark.parametrize(
-    ("metres", "axis", "path", "said"),
-    [
-        (1.0, "Y", "/Room", ""),
-        (None, None, "/Room", ""),
-        (0.01, "Y", "/Room", "units of 0.01 m, Y up, at /Room"),
-        (1.0, "Z", "/Room", "units of 1 m, Z up, at /Room"),
-        (0.01, "Z", "/World/Flat/Living", "units of 0.01 m, Z up, at /World/Flat/Living"),
-    ],
-)
-def test_a_room_says_which_conventions_of_its_stage_it_does_not_keep(tmp_path, metres, axis, path, said):
-    layer = Sdf.Layer.CreateNew(str(tmp_path / "flat.usda"))
-    echousd.write_graph(small_graph(), layer, path)
-    for above in Sdf.Path(path).GetParentPath().GetPrefixes():
-        layer.GetPrimAtPath(above).specifier = Sdf.SpecifierDef
+def their_stage(file, metres, axis, *paths):
+    """A stage of somebody else's with a graph at each path."""
+    layer = Sdf.Layer.CreateNew(str(file))
+    for path in paths:
+        echousd.write_graph(small_graph(), layer, path)
+        for above in Sdf.Path(path).GetParentPath().GetPrefixes():
+            layer.GetPrimAtPath(above).specifier = Sdf.SpecifierDef
     for key, value in (("metersPerUnit", metres), ("upAxis", axis)):
         layer.pseudoRoot.ClearInfo(key)
         if value is not None:
             layer.pseudoRoot.SetInfo(key, value)
     layer.Save()
-    room = echousd.generate(tmp_path / "flat.usda", model=StandIn(), shapes="boxes", place=False, **BARE)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("metres", "axis", "path", "said"),
+    [
+        (1.0, "Y", "/Room", ""),
+        (None, None, "/Room", ""),
+        (0.01, "Y", "/Room", "meters_per_unit 0.01, the room 1.0"),
+        (1.0, "Z", "/Room", "up_axis 'Z', the room 'Y'"),
+        (1.0, "Y", "/World/Flat/Living", "room_path '/World/Flat/Living', the room '/Room'"),
+    ],
+)
+def test_a_room_says_which_conventions_of_its_stage_it_does_not_keep(tmp_path, metres, axis, path, said):
+    file = their_stage(tmp_path / "flat.usda", metres, axis, path)
+    made = {"model": StandIn(), "shapes": "boxes", "place": False, **BARE}
+    room = echousd.generate(file, **made)
     found = [note for note in room.notes if note.startswith("flat.usda")]
-    assert found == ([f"flat.usda has {said}; the room has metres, Y up (up_axis), at /Room"] if said else [])
+    assert found == ([f"flat.usda has {said} (like=flat.usda keeps them)"] if said else [])
+    kept = echousd.generate(file, like=file, **made)
+    assert not [note for note in kept.notes if note.startswith("flat.usda")]
+    stage = kept.stage
+    assert UsdGeom.GetStageMetersPerUnit(stage) == (metres or 1.0)
+    assert UsdGeom.GetStageUpAxis(stage) == (axis or "Y")
+    assert [*echousd.read_rooms(stage)] == [path]
+
+
+def test_options_that_are_stated_are_not_those_of_the_other_stage(tmp_path):
+    options = echousd.RoomOptions(like=their_stage(tmp_path / "a.usda", 0.01, "Z", "/World/Living"), room_path="/Flat")
+    assert (options.meters_per_unit, options.up_axis, options.room_path, options.like) == (0.01, "Z", "/Flat", None)
+    two = their_stage(tmp_path / "two.usda", 0.01, "Z", "/World/Living", "/World/Study")
+    with pytest.raises(ValueError, match=r"two.usda: 2 rooms, name one \(room_path\): /World/Living, /World/Study"):
+        echousd.RoomOptions(like=two)
+    assert echousd.RoomOptions(like=two, room_path="/World/Study").meters_per_unit == 0.01
+    with pytest.raises(ValueError, match="room_path is 'World', allowed: a path of names of letters, digits and _"):
+        echousd.RoomOptions(room_path="World")

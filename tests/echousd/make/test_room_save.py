@@ -259,12 +259,20 @@ def test_preview_that_a_killed_run_left_half_written_goes(tmp_path):
     assert all(path.exists() for path in mine)
 
 
-def test_z_up_over_an_edited_y_up_root_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"up_axis": "Z"}, "edited by hand, upAxis Y; a room with Z needs another folder"),
+        ({"meters_per_unit": 0.01}, r"edited by hand, metersPerUnit 1.0; a room with 0.01 needs another folder"),
+        ({"room_path": "/Flat/Living"}, "edited by hand, defaultPrim Room; a room with Flat needs another folder"),
+    ],
+)
+def test_other_conventions_over_an_edited_root_are_refused(tmp_path, options, said):
     folder = tmp_path / "bedroom"
     root = make(seed=1).save(folder, preview=False)
     root.write_text(root.read_text().replace("customLayerData = {", "customLayerData = {\n        bool mine = 1", 1))
-    with pytest.raises(ValueError, match="edited by hand and Y-up; a Z-up room needs another folder"):
-        make(seed=1, up_axis="Z").save(folder, preview=False)
+    with pytest.raises(ValueError, match=said):
+        make(seed=1, **options).save(folder, preview=False)
 
 
 def test_samples_are_one_variant_set_of_the_same_furniture(tmp_path):
@@ -303,9 +311,9 @@ def test_flat_room_is_one_file_that_stands_alone(tmp_path, ending):
         save_flat(room, tmp_path / "room.obj")
 
 
-def shown(stage, layout):
+def shown(stage, layout, room="/Room"):
     """What a stage shows in a layout: path -> place, path of a mesh -> its material."""
-    stage.GetPrimAtPath("/Room").GetVariantSet("layout").SetVariantSelection(layout)
+    stage.GetPrimAtPath(room).GetVariantSet("layout").SetVariantSelection(layout)
     cache, places, looks = UsdGeom.XformCache(), {}, {}
     for prim in stage.Traverse():
         if UsdGeom.Xformable(prim) and prim.GetTypeName() != "Camera":
@@ -318,13 +326,14 @@ def shown(stage, layout):
 
 @pytest.mark.parametrize("dress", ["none", "some"])
 def test_layouts_of_a_flat_room_look_as_those_of_its_folder(tmp_path, dress):
-    room = make(seed=1, layouts=2, walls=True, dress=dress, up_axis="Z")
+    theirs = {"up_axis": "Z", "meters_per_unit": 0.01, "room_path": "/Flat/Living"}
+    room = make(seed=1, layouts=2, walls=True, dress=dress, **theirs)
     stages = [opened(room.save(tmp_path / "room", preview=False)), opened(save_flat(room, tmp_path / "flat.usda"))]
-    found = [[shown(stage, layout) for layout in ("layout_0", "layout_1")] for stage in stages]
+    found = [[shown(stage, layout, "/Flat/Living") for layout in ("layout_0", "layout_1")] for stage in stages]
     assert found[0] == found[1]
     (first, _), (second, _) = found[1]
-    assert first["/Room/Lights/lamp_lamp"] != second["/Room/Lights/lamp_lamp"]
-    assert any(path.startswith("/Room/Dressing/") for path in second) is (dress == "some")
+    assert first["/Flat/Living/Lights/lamp_lamp"] != second["/Flat/Living/Lights/lamp_lamp"]
+    assert any(path.startswith("/Flat/Living/Dressing/") for path in second) is (dress == "some")
 
 
 def test_room_is_shown_in_notebooks():

@@ -1,4 +1,4 @@
-"""Rooms with +Z up hold what those with +Y up hold, turned at its source: no prim stands for the turn."""
+"""Rooms of other units, up axes and paths hold what ours hold, changed at its source: no prim stands for the change."""
 
 import numpy as np
 import pytest
@@ -13,10 +13,12 @@ from echousd.exporting import export
 from echousd.graph import RoomSpec
 from echousd.make.reading import read_room
 from echousd.options import RoomOptions
-from echousd.stage.turning import turn_up
+from echousd.stage.read import find_rooms
+from echousd.stage.turning import rescale, turn_up
 
 TURN = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # Y up -> Z up
 DOOR = Opening("door", "door", 3, 0.4, 0.9, 2.0, hinge="right")
+THEIRS = {"up_axis": "Z", "meters_per_unit": 0.01, "room_path": "/World/Flat/Living"}
 WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)
 
 
@@ -24,8 +26,9 @@ WINDOW = Opening("window", "window", 0, 0.8, 1.4, 1.3, 0.9)
 def roots(tmp_path_factory):
     graph = small_graph().replaced(room=RoomSpec("bedroom", size=(4.0, 3.4), openings=(DOOR, WINDOW)))
     found = {}
-    for up in ("Y", "Z"):
-        options = RoomOptions(up_axis=up, walls=True, dress="some")
+    asked = {"Y": {}, "Z": {"up_axis": "Z"}, "theirs": THEIRS}
+    for up, said in asked.items():
+        options = RoomOptions(walls=True, dress="some", **said)
         room = echousd.generate(graph, seed=3, model=StandIn(), place=False, shapes="boxes", options=options)
         found[up] = room.save(tmp_path_factory.mktemp(up) / "bedroom", preview=False)
     return found
@@ -84,29 +87,91 @@ def test_every_prim_is_where_it_was_turned(roots):
     assert {"Mesh", "Xform", "Camera", "DomeLight", "RectLight", "DistantLight", "SphereLight", "joint"} <= kinds
 
 
-def test_it_passes_check_and_is_read_and_edited_like_the_other(roots, tmp_path):
-    assert not check(roots["Z"]).errors
-    y_up, z_up = (read_room(roots[up]) for up in ("Y", "Z"))
+def bounds(stage, room):
+    """Path in the room -> corners (2, 3) in metres, +Z up, of everything that has a form; what bodies weigh as well."""
+    metres, turn = UsdGeom.GetStageMetersPerUnit(stage), np.eye(3) if UsdGeom.GetStageUpAxis(stage) == "Z" else TURN
+    boxes, cache = UsdGeom.BBoxCache(0, ["default", "guide"], useExtentsHint=False), UsdGeom.XformCache()
+    found = {}
+    for prim in stage.Traverse():
+        path = str(prim.GetPath()).removeprefix(room)
+        if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdLux.BoundableLightBase):
+            box = boxes.ComputeWorldBound(prim).ComputeAlignedRange()
+            found[path] = np.sort(np.array([box.GetMin(), box.GetMax()]) @ turn.T * metres, 0)
+        if prim.IsA(UsdGeom.Camera):
+            seen = UsdGeom.Camera(prim).GetCamera().frustum
+            found[path] = np.array([seen.nearFar.min * metres, seen.nearFar.max * metres, seen.window.max[0]])
+        if prim.HasAPI(UsdPhysics.MassAPI):
+            mass = UsdPhysics.MassAPI(prim)
+            centre = cache.GetLocalToWorldTransform(prim).Transform(Gf.Vec3d(mass.GetCenterOfMassAttr().Get()))
+            moments = np.array(mass.GetDiagonalInertiaAttr().Get()) * metres**2
+            found[f"{path}.mass"] = np.array([turn @ np.array(centre) * metres, moments])
+        if prim.IsA(UsdPhysics.PrismaticJoint):
+            found[path] = UsdPhysics.PrismaticJoint(prim).GetUpperLimitAttr().Get() * metres
+        if prim.IsA(UsdPhysics.Scene):
+            found[path] = UsdPhysics.Scene(prim).GetGravityMagnitudeAttr().Get() * metres
+        if prim.IsA(UsdLux.SphereLight):  # of which the size does not tell how much it shines
+            found[f"{path}.power"] = UsdLux.SphereLight(prim).GetIntensityAttr().Get() * metres**2
+    return found
+
+
+def test_with_another_unit_and_path_everything_is_as_large_as_it_was(roots):
+    ours, theirs = (articulated(roots[up]) for up in ("Y", "theirs"))
+    assert (UsdGeom.GetStageMetersPerUnit(theirs), UsdGeom.GetStageUpAxis(theirs)) == (0.01, "Z")
+    assert str(theirs.GetDefaultPrim().GetPath()) == "/World"
+    assert [str(prims.room.GetPath()) for prims in find_rooms(theirs)] == ["/World/Flat/Living"]
+    layers = [layer for layer in theirs.GetUsedLayers() if not layer.anonymous]
+    assert {layer.pseudoRoot.GetInfo("metersPerUnit") for layer in layers} == {0.01}
+    assert not any("xformOp:scale" in layer.ExportToString() for layer in layers)
+    wanted, found = bounds(ours, "/Room"), bounds(theirs, "/World/Flat/Living")
+    assert {path for path in wanted if path.endswith((".mass", ".power"))}
+    assert found.keys() == wanted.keys()
+    for path, value in wanted.items():
+        np.testing.assert_allclose(found[path], value, atol=1e-5, rtol=1e-5, err_msg=path)
+
+
+def test_joints_of_drawers_slide_as_far_in_another_unit():
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    for kind, limit in ((UsdPhysics.PrismaticJoint, 0.4), (UsdPhysics.RevoluteJoint, 90.0)):
+        kind.Define(stage, f"/{kind.__name__}").CreateUpperLimitAttr(limit)
+    rescale(layer, 0.01)
+    assert stage.GetPrimAtPath("/PrismaticJoint").GetAttribute("physics:upperLimit").Get() == pytest.approx(40.0)
+    assert stage.GetPrimAtPath("/RevoluteJoint").GetAttribute("physics:upperLimit").Get() == 90.0
+    once = layer.ExportToString()
+    assert rescale(layer, 0.01).ExportToString() == once
+
+
+@pytest.mark.parametrize("other", ["Z", "theirs"])
+def test_it_passes_check_and_is_read_and_edited_like_the_other(roots, tmp_path, other):
+    assert not check(roots[other]).errors
+    y_up, z_up = (read_room(roots[up]) for up in ("Y", other))
     np.testing.assert_allclose(z_up.boxes.position, y_up.boxes.position, atol=1e-5)
     np.testing.assert_allclose(z_up.boxes.yaw, y_up.boxes.yaw, atol=1e-5)
     for name, geometry in y_up.geometry.items():
         np.testing.assert_allclose(z_up.geometry[name].mesh.bounds, geometry.mesh.bounds, atol=1e-6)
         if geometry.mass is not None:
             np.testing.assert_allclose(z_up.geometry[name].mass.centre, geometry.mass.centre, atol=1e-6)
-    for up, root in roots.items():
+    for up, root in ((up, roots[up]) for up in ("Y", other)):
         graph = read_room(root).graph.relate("wardrobe", "bigger_than", "lamp").add_node("stool", "nightstand")
         made = echousd.edit(root, graph, model=StandIn(), shapes="boxes")
         made.save(tmp_path / up / "bedroom", preview=False)
-    y_up, z_up = (read_room(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", "Z"))
+    y_up, z_up = (read_room(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", other))
     np.testing.assert_allclose(z_up.boxes.position, y_up.boxes.position, atol=1e-5)
-    wanted, found = (articulated(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", "Z"))
-    assert [p.GetPath() for p in wanted.Traverse()] == [p.GetPath() for p in found.Traverse()]
+    wanted, found = (articulated(tmp_path / up / "bedroom" / "bedroom.usda") for up in ("Y", other))
+    room = str(find_rooms(found)[0].room.GetPath())
+    above = len(Sdf.Path(room).GetPrefixes()) - 1
+    paths = [str(prim.GetPath()).replace(room, "/Room", 1) for prim in found.Traverse()]
+    assert [str(prim.GetPath()) for prim in wanted.Traverse()] == paths[above:]
 
 
-def test_a_glb_is_the_same(roots, tmp_path):
-    y_up, z_up = (read_gltf(export(root, tmp_path / f"{up}.glb")) for up, root in roots.items())
-    assert [node["name"] for node in y_up.tree["nodes"]] == [node["name"] for node in z_up.tree["nodes"]]
-    for one, two in zip(y_up.by_id().values(), z_up.by_id().values(), strict=True):
+@pytest.mark.parametrize("other", ["Z", "theirs"])
+def test_a_glb_is_the_same(roots, tmp_path, other):
+    y_up, z_up = (read_gltf(export(roots[up], tmp_path / f"{up}.glb")) for up in ("Y", other))
+    names = [[node["name"] for node in gltf.tree["nodes"]] for gltf in (y_up, z_up)]
+    assert {*names[0]} - {"Room"} <= {*names[1]}
+    there = {path.replace(THEIRS["room_path"], "/Room", 1): number for path, number in z_up.by_id().items()}
+    for one, two in ((number, there[path]) for path, number in y_up.by_id().items()):
         corners = [gltf.triangles(number).reshape(-1, 3) for gltf, number in ((y_up, one), (z_up, two))]
         np.testing.assert_allclose(*([at.min(0), at.max(0)] for at in corners if len(at)), atol=1e-4)
 
