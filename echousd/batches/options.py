@@ -77,7 +77,7 @@ def _options(raw: Any) -> BatchOptions:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The fields of a `batch.toml`; sources, library and `like` are relative to it. Raises ValueError naming the file."""
+    """The fields of a `batch.toml`; all its paths are relative to it. Raises ValueError naming the file."""
     try:
         raw = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -1,6 +1,7 @@
 """Options that a batch takes from `generate`: what of a library is allowed, what has no place, what comes to rest."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -104,10 +105,10 @@ def test_what_has_no_place_is_left_out_if_wanted(source, tmp_path):
 
 def test_rooms_come_to_rest_if_wanted(source, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
-    from echousd.make import pipeline
+    from echousd.make import resting
 
-    calm = pipeline.settled
-    monkeypatch.setattr(pipeline, "settled", lambda room: replace(calm(room), notes=("lamp came to rest",)))
+    calm = resting.settled
+    monkeypatch.setattr(resting, "settled", lambda room: replace(calm(room), notes=("lamp came to rest",)))
     made(source, tmp_path / "run", settle=True)
     (row,) = read_journals(tmp_path / "run").values()
     assert "lamp came to rest" in row["notes"]
@@ -158,3 +159,6 @@ def test_any_option_is_set_by_its_name(echousd_command, tmp_path):
     path.write_text('[sample]\nbedroom = 1\n[options]\nassets = "lib.parquet"\nlicenses = "CC0"\nstretch = 1.3\n')
     options = request_of(read_toml(path), str(path)).options
     assert (options.assets, options.licenses, options.stretch) == (str(tmp_path / "lib.parquet"), "CC0", 1.3)
+    path.write_text('[sample]\nbedroom = 1\n[options]\nlike = "flat.usda"\n')
+    with pytest.raises(ValueError, match=re.escape(f"{tmp_path / 'flat.usda'}: no such file")):
+        request_of(read_toml(path), str(path))
