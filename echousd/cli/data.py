@@ -82,6 +82,33 @@ def rooms_command(
     write_rooms(out, generate_rooms(count, seed, room_type=kind))
 
 
+@data_app.command("search")
+def search(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the rooms; run again to go on.")],
+    graphs: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
+    seed: Seed = 0,
+    drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
+    model: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
+    jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
+) -> None:
+    """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
+
+    Example: echousd data search --graphs 200 --seed 7 -o data/found
+    """
+    from echousd.cli.terminal import Terminal
+    from echousd.place.examples import GRAPHS, ExamplesPlan, search_examples
+
+    console = Terminal(stderr=True)
+
+    def report(row: dict[str, float]) -> None:
+        console.print("  ".join(f"{name} {value}" for name, value in row.items()))
+
+    plan = ExamplesPlan(seed, drafts, model)
+    found = search_examples(out, plan, shards=-(-graphs // GRAPHS), jobs=jobs, minutes=minutes, report=report)
+    console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
+
+
 @data_app.command("plot")
 def plot(
     rooms: Rooms,

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echousd.graph import SceneGraph
 from echousd.place.geometry import COLUMNS
 
 if TYPE_CHECKING:
     from echomodel.rules.placements import Spread, Stated, Walls
+    from echousd.graph import SceneGraph
 
 
 def stated_placements(graph: SceneGraph) -> tuple[Stated, ...]:

@@ -8,14 +8,16 @@ divided by `TRUNCATION` and clipped to [-1, 1].
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import trimesh
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from echomodel.triangles import area_normals
+
+if TYPE_CHECKING:
+    import trimesh
 
 RESOLUTION = 64
 FILLED = 60  # voxels that the object's box covers on each axis
@@ -77,6 +79,7 @@ def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
 
     Raises ValueError when the grid holds no surface.
     """
+    import trimesh
     from skimage.measure import marching_cubes
 
     values = np.asarray(grid, np.float32)
@@ -100,6 +103,8 @@ def mesh_from_tsdf(grid: Any) -> trimesh.Trimesh:
 
 def _distance_to_triangles(triangles: np.ndarray, points: int) -> np.ndarray:
     """Unsigned distance of every voxel centre to the triangles, exact near the surface, `inf` beyond the truncation."""
+    import trimesh
+
     edges = area_normals(triangles)
     area = np.linalg.norm(edges, axis=1) / 2
     if area.sum() <= 0:

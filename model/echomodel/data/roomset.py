@@ -1,5 +1,7 @@
 """Sets of labelled rooms on disk: sharded, memory-mapped, about half a kilobyte a room, read as rooms or as batches.
 
+A packed set is one compressed file (`pack_rooms`), about 0.15 kB a room, in millimetres; it is labelled when it is read.
+
 A folder holds `rooms.json` (what the set is, written last) and shards `rooms-0000.bin`: a header, then five tables, one
 entry per room, object, floor corner, opening and ordered pair of objects. A pair carries one bit per predicate and rule
 set.
@@ -7,10 +9,12 @@ set.
 
 from __future__ import annotations
 
+import json
 import os
+import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +25,6 @@ from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rooms.generator import generate_rooms, untidied
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
-
-if TYPE_CHECKING:
-    pass
 
 MAGIC = b"ECHOROM3"
 MAGIC_OF_16 = b"ECHOROM2"  # earlier sets: 16 bits per pair and rule set
@@ -46,6 +47,7 @@ TABLES = (("rooms", ROOM), ("objects", OBJECT), ("corners", CORNER), ("openings"
 ROOMS_PER_SHARD = 1000
 HELD_OUT_EVERY = 20  # every twentieth room is kept out of training
 DIGITS = 4  # a tenth of a millimetre
+MILLIMETRES, STEPS = 1000.0, {"yaw": 1e4}  # steps to the unit of the numbers of a packed set
 
 
 def build_rooms(
@@ -105,42 +107,98 @@ def write_shard(
     """Label rooms (by all rule sets) and write them as one shard, complete or not at all; `first` is the number of the
     first room in its set, `untidy` says which were shaken (none where it is empty). Raises `UnknownWord` for a category
     or room type that the vocabulary does not hold."""
-    words, path = vocabulary(), Path(path)
-    rooms = [_rounded(room) for room in rooms]
-    labels = {rules: label_rooms(rooms, rules=rules) for rules in RULES}
-    tables: dict[str, list[np.ndarray]] = {name: [] for name, _ in TABLES}
+    path, rooms = Path(path), [_rounded(room) for room in rooms]
+    joined = _tables_of(rooms, [_held_out(first + k) for k in range(len(rooms))], untidy) | {"pairs": _pairs(rooms)}
+    with whole_file(path) as beside, beside.open("wb") as file:
+        file.write(MAGIC + np.array([len(joined[name]) for name, _ in TABLES], "<u8").tobytes())
+        for name, _ in TABLES:
+            file.write(joined[name].tobytes())
+
+
+def pack_rooms(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], held_out: Sequence[bool], info: dict) -> None:
+    """Write rooms as one packed set, complete or not at all, that `RoomSet` reads.
+
+    Arguments:
+        held_out: which of them no training may see. info: what the set says of itself.
+
+    Raises `UnknownWord` as `write_shard`, and ValueError for a number that is no whole count of millimetres below 2^15.
+    """
+    names = {kind: [row.name for row in getattr(vocabulary(), kind)] for kind in ("categories", "room_types")}
+    note = {"kind": "rooms", "seed": 0, **info, "rooms": len(rooms), **names}
+    columns: dict[str, np.ndarray] = {"note": np.frombuffer(json.dumps(note).encode(), np.uint8)}
+    for name, table in _tables_of(rooms, held_out).items():
+        for field in table.dtype.names or ("",):
+            column = table[field] if field else table
+            if column.dtype.kind == "f":
+                column = np.round(column * STEPS.get(field, MILLIMETRES))
+                if np.abs(column).max(initial=0) >= 2**15:
+                    raise ValueError(f"{name}.{field} reaches {np.abs(column).max()} steps, a packed set holds 32767")
+                column = column.astype("<i2")
+            columns[f"{name}.{field}"] = column
+    with whole_file(path) as beside, beside.open("wb") as file:
+        np.savez_compressed(file, **columns)  # type: ignore[arg-type]
+
+
+def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
+    """What a packed set says of itself, and its tables without labels; raises ValueError for other files."""
+    tables: dict[str, np.ndarray] = {}
+    try:
+        with np.load(path, allow_pickle=False) as held:
+            note = json.loads(held["note"].tobytes())
+            for name, dtype in TABLES[:-1]:
+                parts = {field: held[f"{name}.{field}"] for field in dtype.names or ("",)}
+                tables[name] = table = np.zeros(len(next(iter(parts.values()))), dtype)
+                for field, column in parts.items():
+                    into = table[field] if field else table
+                    into[...] = column / STEPS.get(field, MILLIMETRES) if into.dtype.kind == "f" else column
+        pairs = int((tables["rooms"]["objects"].astype(np.int64) ** 2).sum())
+        return note, tables | {"pairs": np.zeros((pairs, len(RULES)), PAIR.base)}
+    except (OSError, KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise ValueError(f"{path}: not a packed set of rooms ({error})") from None
+
+
+def _tables_of(
+    rooms: Sequence[RoomBoxes], held_out: Sequence[bool], untidy: Sequence[bool] = ()
+) -> dict[str, np.ndarray]:
+    """The tables of some rooms but for their pairs."""
+    words = vocabulary()
+    tables: dict[str, list[np.ndarray]] = {name: [] for name, _ in TABLES[:-1]}
     for k, room in enumerate(rooms):
         n = len(room)
         entry = (n, len(room.floor_polygon), len(room.openings), n * n, words.room_type_id(room.room_type),
-                 _held_out(first + k), bool(untidy and untidy[k]), room.height)  # fmt: skip
+                 held_out[k], bool(untidy and untidy[k]), room.height)  # fmt: skip
         objects = np.zeros(n, OBJECT)
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
         objects["size"], objects["position"], objects["yaw"] = room.size, room.position, room.yaw
-        pairs = np.zeros((n * n, len(RULES)), PAIR.base)
-        for column, rules in enumerate(RULES):
-            subject, predicate, object_ = labels[rules][k].T
-            if predicate.max(initial=0) >= BITS:
-                word = words.predicates[predicate.max()].name
-                raise ValueError(f"predicate {word} has number {predicate.max()}: a room set holds those below {BITS}")
-            np.bitwise_or.at(pairs[:, column], subject * n + object_, (1 << predicate).astype(PAIR.base))
         tables["rooms"].append(np.array([entry], ROOM))
         tables["objects"].append(objects)
         tables["corners"].append(np.asarray(room.floor_polygon, "<f4"))
         tables["openings"].append(np.array([_entry(opening) for opening in room.openings], OPENING))
-        tables["pairs"].append(pairs)
-    joined = [np.ascontiguousarray(np.concatenate(tables[name])).astype(dtype.base) for name, dtype in TABLES]
-    with whole_file(path) as beside, beside.open("wb") as file:
-        file.write(MAGIC + np.array([len(table) for table in joined], "<u8").tobytes())
-        for table in joined:
-            file.write(table.tobytes())
+    return {name: np.ascontiguousarray(np.concatenate(tables[name])).astype(dtype.base) for name, dtype in TABLES[:-1]}
+
+
+def _pairs(rooms: Sequence[RoomBoxes]) -> np.ndarray:
+    """(P, rule sets) uint32, the relations of all ordered pairs of the rooms, labelled anew."""
+    counts = np.array([len(room) for room in rooms], np.int64)
+    first = np.cumsum(counts**2) - counts**2
+    pairs = np.zeros((int((counts**2).sum()), len(RULES)), PAIR.base)
+    for column, rules in enumerate(RULES):
+        for k, found in enumerate(label_rooms(rooms, rules=rules)):
+            subject, predicate, object_ = found.T
+            if predicate.max(initial=0) >= BITS:
+                word = vocabulary().predicates[predicate.max()].name
+                raise ValueError(f"predicate {word} has number {predicate.max()}: a room set holds those below {BITS}")
+            at = first[k] + subject * counts[k] + object_
+            np.bitwise_or.at(pairs[:, column], at, (1 << predicate).astype(PAIR.base))
+    return pairs
 
 
 class RoomSet:
     """A set of labelled rooms on disk, read through memory maps.
 
     Arguments:
-        directory: folder with `rooms.json` and its shards.
+        directory: folder with `rooms.json` and its shards, or a packed set, which is held in memory.
 
     Attributes: `held_out`, `untidy` (n,) bool, `counts` (n,) objects per room, `info`, what `rooms.json` says. Raises
     ValueError for a folder without a finished set or with a damaged shard.
@@ -148,17 +206,24 @@ class RoomSet:
 
     def __init__(self, directory: str | os.PathLike[str]) -> None:
         self.directory = Path(directory)
-        index = self.directory / "rooms.json"
-        if not index.exists():
-            hint = "unfinished set, run the build again" if (self.directory / "plan.json").exists() else "no rooms.json"
-            raise ValueError(f"{self.directory}: not a room set ({hint})")
-        self.info: dict = read_note(index, rooms=int)
+        packed: list[dict[str, np.ndarray]] = []
+        if self.directory.is_file():
+            self.info, held = _unpacked(self.directory)
+            packed = [held]
+        else:
+            index = self.directory / "rooms.json"
+            if not index.exists():
+                unfinished = (self.directory / "plan.json").exists()
+                hint = "unfinished set, run the build again" if unfinished else "no rooms.json"
+                raise ValueError(f"{self.directory}: not a room set ({hint})")
+            self.info = read_note(index, rooms=int)
         words = vocabulary()
         # sets of before named their categories alone
         here = {kind: [row.name for row in getattr(words, kind)] for kind in ("categories", "room_types")}
         self._names: dict[str, list[str]] = {kind: self.info.get(kind, here[kind]) for kind in here}
         most = {kind: len(names) for kind, names in self._names.items()}
-        self._shards = [_tables(path, most) for path in sorted(self.directory.glob("rooms-*.bin"))]
+        self._shards = [checked(self.directory, held, most) for held in packed]
+        self._shards += [_tables(path, most) for path in sorted(self.directory.glob("rooms-*.bin"))]
         rooms = [shard["rooms"] for shard in self._shards]
         count = sum(map(len, rooms))
         if count != self.info["rooms"]:
@@ -173,6 +238,8 @@ class RoomSet:
         self.held_out = self._table["held_out"].astype(bool)
         self.untidy = self._table["untidy"].astype(bool)
         self.counts = self._table["objects"].astype(np.int64)
+        for tables in packed:
+            tables["pairs"][:] = _pairs([self.room(k) for k in range(len(self))])
 
     def __len__(self) -> int:
         return len(self._table)
@@ -264,6 +331,11 @@ def _tables(path: Path, most: Mapping[str, int]) -> dict[str, np.ndarray]:
         out[name] = np.frombuffer(raw, dtype.base, int(number) * int(np.prod(dtype.shape)), start)
         out[name] = out[name].reshape(int(number), *dtype.shape)
         start += int(number) * dtype.itemsize
+    return checked(path, out, most)
+
+
+def checked(path: Path, out: dict[str, np.ndarray], most: Mapping[str, int]) -> dict[str, np.ndarray]:
+    """The tables of one shard; raises ValueError where they contradict one another."""
     rooms = out["rooms"]
     wrong = [name for name in list(out)[1:] if rooms[name].sum(dtype=np.uint64) != len(out[name])]
     wrong += [] if (rooms["pairs"] == rooms["objects"].astype(np.uint64) ** 2).all() else ["pairs"]
@@ -313,13 +385,13 @@ def claim(folder: Path, plan: dict) -> None:
 
 
 def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
-    """Rooms of a rooms file, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
+    """Rooms of a rooms file, of a packed set, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
 
     Raises ValueError for anything else.
     """
     if not path.exists():
         raise ValueError(f"{path}: no such file or folder")
-    if path.is_dir():
+    if path.is_dir() or path.suffix == ".npz":
         rooms = RoomSet(path / "rooms" if (path / "rooms").is_dir() else path)
         numbers = rooms.held_out.nonzero()[0] if held_out else range(len(rooms))
         return [rooms.room(int(k)) for k in numbers[:limit]]

@@ -6,15 +6,18 @@ import importlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from echomodel.furniture.assembly import MATERIALS, box_uv, mesh_of, tsdf_of
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.solids import Joint, Solid
 from echomodel.furniture.style import Style, sample_size
 from echomodel.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    import trimesh
 
 __all__ = ["MATERIALS", "Choices", "Style", "box_uv", "furniture", "mesh_of", "sample_size", "solids", "tsdf_of"]
 

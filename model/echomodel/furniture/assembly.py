@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from echomodel.furniture.solids import FINEST, Joint, Solid, Tube
 from echomodel.triangles import area_normals
 from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, truncated, voxels_from_points
+
+if TYPE_CHECKING:
+    import trimesh
 
 THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so that marching cubes still finds it
 THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
@@ -70,6 +73,8 @@ def mesh_of(solids: Sequence[Solid], size: np.ndarray | None = None, *, round: b
     `face_attributes["part"]` (m,) int numbers the solids, `face_attributes["material"]` (m,) int indexes `MATERIALS`,
     `face_attributes["uv"]` (m, 3, 2) float holds texture coordinates per corner, box-projected, in metres.
     """
+    import trimesh
+
     pieces = pieces_of(solids, size, round=round)
     offsets = np.cumsum([0] + [len(piece.vertices) for piece in pieces])
     faces = [piece.faces + offset for piece, offset in zip(pieces, offsets, strict=False)]

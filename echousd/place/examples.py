@@ -1,0 +1,177 @@
+"""Rooms to learn from: furniture and floors of the room generator, told sparsely, as the best of several searches.
+
+The starts of a room are the generator's own arrangement and drafts of the network. What misses a term of the objective
+after every search is left out; of the others the cheapest is kept.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.data.roomset import RoomSet, claim, pack_rooms
+from echomodel.files import write_text
+from echomodel.graph import GraphBatch
+from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
+from echomodel.rooms.generator import generate_rooms
+from echomodel.rules import label_rooms
+from echomodel.rules.telling import told_of_room
+from echousd.place.placing import place_boxes
+from echousd.place.search import price
+
+if TYPE_CHECKING:
+    from echomodel.echo import EchoModel
+    from echomodel.roomboxes import RoomBoxes
+
+GRAPHS = 40  # of a shard
+HALLS = 0.12  # share of large rooms of several zones
+TOLD = (0.5, 2.0)  # relations an object, as people tell them
+HELD_OUT_EVERY = 20
+COLUMNS = ("shard", "graphs", "kept", "objects", "from_generator", "faults_generator", "cpu_seconds")
+
+
+@dataclass(frozen=True)
+class ExamplesPlan:
+    """What a folder of examples is filled with: the world's seed, drafts of the network a room, its weights ("" = none,
+    None = those that ship)."""
+
+    seed: int
+    drafts: int = 2
+    weights: str | None = None
+
+
+def search_examples(
+    folder: Path, plan: ExamplesPlan, *, shards: int, jobs: int = 1, minutes: float | None = None,
+    report: Callable[[dict[str, float]], None] | None = None,
+) -> RoomSet:  # fmt: skip
+    """Fill a folder with shards of rooms found by search, and join them in its `rooms.npz`; run again to go on.
+
+    Arguments:
+        shards: how many there shall be; complete ones are kept. jobs: processes.
+        minutes: time after which no further shard is begun.
+        report: called with each row of the folder's `log.csv`.
+
+    Raises ValueError for a folder that was begun with another plan, or when nothing was found.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    claim(folder, {"kind": "rooms found by search", "seed": plan.seed, "drafts": plan.drafts})
+    left = [number for number in range(shards) if not _shard(folder, number).exists()]
+    until = None if minutes is None else time.time() + 60 * minutes
+    work = partial(_search_shard, folder, plan, until)
+    log = folder / "log.csv"
+    if not log.exists():
+        write_text(log, ",".join(COLUMNS) + "\n")
+    pool = get_context("spawn").Pool(jobs) if jobs > 1 else None
+    try:
+        for row in pool.imap_unordered(work, left) if pool else map(work, left):
+            if row is not None:
+                with log.open("a", newline="") as file:
+                    csv.DictWriter(file, COLUMNS).writerow(row)
+                if report:
+                    report(row)
+    finally:
+        if pool:
+            pool.terminate()
+    return joined(folder)
+
+
+def joined(folder: Path) -> RoomSet:
+    """All complete shards of a folder as one packed set, its `rooms.npz`; raises ValueError where there is none."""
+    sets = [RoomSet(path) for path in sorted(folder.glob("found-*.npz"))]
+    if not sets:
+        raise ValueError(f"{folder}: no shard of rooms is complete")
+    rooms = [one.room(k) for one in sets for k in range(len(one))]
+    info = {"kind": "rooms found by search", "seed": sets[0].info["seed"]}
+    pack_rooms(folder / "rooms.npz", rooms, np.concatenate([one.held_out for one in sets]).tolist(), info)
+    return RoomSet(folder / "rooms.npz")
+
+
+def _shard(folder: Path, number: int) -> Path:
+    return folder / f"found-{number:05d}.npz"
+
+
+def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number: int) -> dict[str, float] | None:
+    """Search the rooms of one shard and write it; its row of the log, None where the time is over."""
+    if until is not None and time.time() > until:
+        return None
+    torch.set_num_threads(1)
+    started = time.process_time()
+    first = number * GRAPHS
+    drawn = generate_rooms(GRAPHS, plan.seed, start=first, halls=HALLS)
+    luck = np.random.Generator(np.random.PCG64([plan.seed, number, 5]))
+    labels = label_rooms(drawn, rules="strict")
+    told = [
+        told_of_room(relations, room, float(luck.uniform(*TOLD)), seed=int(luck.integers(2**31)))
+        for relations, room in zip(labels, drawn, strict=True)
+    ]
+    starts = [[Boxes.from_room(room)] for room in drawn]
+    if plan.drafts and plan.weights != "":
+        for more, found in zip(starts, _drafts(plan, drawn, told, number), strict=True):
+            more += found
+    kept, numbers, own, faults = [], [], 0, 0
+    for k, (room, triplets, begun) in enumerate(zip(drawn, told, starts, strict=True)):
+        found = [(cost, n, done) for n, start in enumerate(begun) if (it := _searched(room, triplets, start)) for cost, done in [it]]
+        faults += len(_missed(room, triplets))
+        if found:
+            _, which, best = min(found, key=lambda one: one[:2])
+            kept.append(best)
+            numbers.append(first + k)
+            own += which == 0
+    held = [n % HELD_OUT_EVERY == HELD_OUT_EVERY - 1 for n in numbers]
+    pack_rooms(_shard(folder, number), kept, held, {"kind": "rooms found by search", "seed": plan.seed})
+    row = (number, GRAPHS, len(kept), sum(map(len, kept)), own, faults, round(time.process_time() - started, 1))
+    return dict(zip(COLUMNS, row, strict=True))
+
+
+def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], number: int) -> list[list[Boxes]]:
+    """Boxes that the network draws of some rooms from noise, `plan.drafts` of each."""
+    model, counts = _model(plan.weights), [len(room) for room in rooms]
+    graph = GraphBatch.pack([GraphBatch.from_room(r, triplets=t) for r, t in zip(rooms, told, strict=True)])
+    out: list[list[Boxes]] = [[] for _ in rooms]
+    for draft in range(plan.drafts):
+        generator = torch.Generator().manual_seed(plan.seed * 1_000_003 + number * 101 + draft)
+        boxes = model.sample_layout(graph, generator=generator, relation_guidance=0.0)
+        columns = (values.split(counts) for values in (boxes.size, boxes.position, boxes.yaw))
+        for mine, size, position, yaw in zip(out, *columns, strict=True):
+            mine.append(Boxes(size, position, yaw))
+    return out
+
+
+_MODELS: dict[str | None, EchoModel] = {}
+
+
+def _model(weights: str | None) -> EchoModel:
+    from echomodel.loading import load_model
+
+    if weights not in _MODELS:
+        _MODELS[weights] = load_model(weights)  # type: ignore[assignment]
+    return _MODELS[weights]
+
+
+def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[float, RoomBoxes] | None:
+    """The room as placing leaves it from a start, and what it costs; None where anything is still missed."""
+    done = place_boxes(
+        room.categories, start.size.double().numpy(), start.position.double().numpy(), start.yaw.double().numpy(),
+        triplets, floor_polygon=room.floor_polygon, height=room.height, openings=room.openings,
+    )  # fmt: skip
+    made = replace(room, size=done.size, position=done.position, yaw=done.yaw, relations=None)
+    if done.collisions or done.outside or (done.verdict == 0).any() or _missed(made, triplets):
+        return None
+    plan = plan_of(made, made.categories, made.floor_polygon, made.openings, triplets, height=made.height)
+    with torch.no_grad():
+        return sum(float(price(term, seen, plan).sum()) for term in TERMS if len((seen := term.find(plan)).who)), made
+
+
+def _missed(room: RoomBoxes, triplets: np.ndarray) -> list:
+    plan = plan_of(room, room.categories, room.floor_polygon, room.openings, triplets, height=room.height)
+    return faults_of(plan, KINDS) + unreached(plan)
