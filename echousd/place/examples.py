@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from echomodel.echo import EchoModel
     from echomodel.roomboxes import RoomBoxes
 
-GRAPHS = 40  # of a shard
+GRAPHS = 20  # of a shard
 HALLS = 0.12  # share of large rooms of several zones
 TOLD = (0.5, 2.0)  # relations an object, as people tell them
 HELD_OUT_EVERY = 20
@@ -120,10 +120,10 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
             more += found
     kept, numbers, own, faults = [], [], 0, 0
     for k, (room, triplets, begun) in enumerate(zip(drawn, told, starts, strict=True)):
-        found = [(cost, n, done) for n, start in enumerate(begun) if (it := _searched(room, triplets, start)) for cost, done in [it]]
+        found = [(*it, n) for n, start in enumerate(begun) if (it := _searched(room, triplets, start))]
         faults += len(_missed(room, triplets))
         if found:
-            _, which, best = min(found, key=lambda one: one[:2])
+            _, best, which = min(found, key=lambda one: one[0])
             kept.append(best)
             numbers.append(first + k)
             own += which == 0
@@ -164,7 +164,8 @@ def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[floa
         room.categories, start.size.double().numpy(), start.position.double().numpy(), start.yaw.double().numpy(),
         triplets, floor_polygon=room.floor_polygon, height=room.height, openings=room.openings,
     )  # fmt: skip
-    made = replace(room, size=done.size, position=done.position, yaw=done.yaw, relations=None)
+    turned = (done.yaw + np.pi) % (2 * np.pi) - np.pi
+    made = replace(room, size=done.size, position=done.position, yaw=turned, relations=None)
     if done.collisions or done.outside or (done.verdict == 0).any() or _missed(made, triplets):
         return None
     plan = plan_of(made, made.categories, made.floor_polygon, made.openings, triplets, height=made.height)

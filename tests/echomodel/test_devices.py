@@ -38,7 +38,7 @@ CONFIG = from_dict(
     CompactConfig,
     {
         "latent": {"width": 8, "layers": 1},
-        "layout": {"width": 16, "layers": 2, "drafts": 1, "steps": 2, "guidance_rounds": 1},
+        "layout": {"width": 16, "layers": 2, "drafts": 1, "sides": True, "steps": 2, "guidance_rounds": 1},
         "autoencoder": {"width": 8, "blocks": 1},
         "shape": {
             "width": 16, "layers": 1, "heads": 2, "components": 8, "tokens": 2, "echo_width": 8, "echo_layers": 1,
@@ -127,7 +127,8 @@ def stages(packed: PackedRooms, model: CompactModel) -> dict:
     latents = torch.randn(3 * len(CONFIG.categories), 6, 16, 16, 16, generator=torch.Generator().manual_seed(0)).half()
     sizes = torch.ones(len(latents), 3)
     shapes = EncodedShapes(latents, sizes, len(CONFIG.categories), torch.tensor([0, 1]), torch.tensor([2]))
-    layout, shape = LayoutStage(packed, packed, 40, 0.5, (), 0.3), ShapeStage(packed, shapes, 24)
+    layout = LayoutStage(packed, packed, 40, 0.5, (), 0.3, physics_weight=1.0)
+    shape = ShapeStage(packed, shapes, 24)
     return {
         "layout": layout,
         "shape": shape,

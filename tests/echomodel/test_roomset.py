@@ -1,11 +1,14 @@
 """Room sets on disk: equal bytes per seed, resumed builds, rooms and batches that equal what was written."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from echomodel.data import roomset
 from echomodel.data.build import build_data
-from echomodel.data.roomset import RoomSet, build_rooms
+from echomodel.data.roomset import RoomSet, build_rooms, pack_rooms
 from echomodel.rooms.generator import generate_rooms, untidied
 from echomodel.rules import label_relations
 
@@ -52,6 +55,28 @@ def test_equal_seeds_give_equal_bytes_also_after_an_interruption(folder, tmp_pat
     build_rooms(tmp_path / "other", 24, 4, 5)
     name = "rooms-0000.bin"
     assert (tmp_path / "other" / name).read_bytes() != (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_packed_set_is_its_rooms_in_millimetres(folder, tmp_path):
+    whole, path = RoomSet(folder), tmp_path / "rooms.npz"
+    rooms = [whole.room(k) for k in range(len(whole))]
+    pack_rooms(path, rooms, whole.held_out.tolist(), {"seed": 3})
+    packed = RoomSet(path)
+    assert np.array_equal(packed.held_out, whole.held_out)
+    assert path.stat().st_size < 300 * len(rooms)
+    for number, true in enumerate(rooms):
+        read = packed.room(number)
+        assert (read.categories, read.styles, read.room_type) == (true.categories, true.styles, true.room_type)
+        assert np.abs(read.position - true.position).max() <= 0.5001e-3
+        assert [o.name for o in read.openings] == [o.name for o in true.openings]
+        assert np.array_equal(packed.relations(number), label_relations(read, rules="strict"))
+    far = replace(rooms[0], position=rooms[0].position + 40)
+    with pytest.raises(ValueError, match=r"objects.position reaches \d+.* steps, a packed set holds 32767"):
+        pack_rooms(path, [far], [False], {})
+    for content, said in ((b"PK", "not a packed set of rooms"), (pickle.dumps({}), "not a packed set of rooms")):
+        (tmp_path / "bad.npz").write_bytes(content)
+        with pytest.raises(ValueError, match=f"bad.npz: {said}"):
+            RoomSet(tmp_path / "bad.npz")
 
 
 def test_bad_folders_are_told(folder, tmp_path):

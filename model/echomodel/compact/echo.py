@@ -47,6 +47,19 @@ class EchoLayer(nn.Module):
         return x + self.mlp(self.norm_mlp(x))
 
 
+class Alone(nn.Module):
+    """An echo layer's perceptron without its echo, for the ablation; as deep and a little wider."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.norm = nn.LayerNorm(width)
+        self.mlp = nn.Sequential(nn.Linear(width, 4 * width), nn.SiLU(), nn.Linear(4 * width, width))
+
+    def forward(self, x: Tensor, pairs: Pairs, modulation: Tensor) -> Tensor:
+        scale, shift = modulation.chunk(2, dim=1)
+        return x + self.mlp(self.norm(x) * (1 + scale) + shift)
+
+
 class _PairMessages(torch.autograd.Function):
     """sum_j silu(a_i + b_j + e_ij), keeping one tensor over pairs for the backward pass instead of four."""
 

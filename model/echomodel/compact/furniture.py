@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from echomodel.compact.echo import EchoLayer, level_features
+from echomodel.compact.echo import Alone, EchoLayer, level_features
 from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
 from echomodel.config import CompactConfig
@@ -51,7 +51,7 @@ class FurnitureDenoiser(nn.Module):
         self.trust = nn.Sequential(nn.Linear(told, 32), nn.SiLU(), nn.Linear(32, own.voices)) if own.echo else None
         self.heard = nn.Linear(own.voices * (self.values + 1), width) if own.echo else None
         self.layers = nn.ModuleList(
-            (EchoLayer(width, told) if own.echo else _Alone(width)) for _ in range(own.layers)
+            (EchoLayer(width, told) if own.echo else Alone(width)) for _ in range(own.layers)
         )  # fmt: skip
         self.norm = nn.LayerNorm(width)
         self.head = nn.Linear(width, self.values)
@@ -110,16 +110,3 @@ class FurnitureDenoiser(nn.Module):
             )
             out += [spoken / (total[:, voice, None] + 0.05), torch.tanh(total[:, voice, None])]
         return torch.cat(out, dim=1)
-
-
-class _Alone(nn.Module):
-    """An echo layer's perceptron without its echo, for the ablation; as deep and a little wider."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__()
-        self.norm = nn.LayerNorm(width)
-        self.mlp = nn.Sequential(nn.Linear(width, 4 * width), nn.SiLU(), nn.Linear(4 * width, width))
-
-    def forward(self, x: Tensor, pairs: Pairs, modulation: Tensor) -> Tensor:
-        scale, shift = modulation.chunk(2, dim=1)
-        return x + self.mlp(self.norm(x) * (1 + scale) + shift)

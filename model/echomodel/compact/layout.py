@@ -16,9 +16,10 @@ from torch import Tensor, nn
 
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.compact.draft import PAIR_FEATURES, WALL_FEATURES, measurable, pair_features, wall_features
-from echomodel.compact.echo import EchoLayer, level_features
+from echomodel.compact.echo import Alone, EchoLayer, level_features
 from echomodel.compact.learned import WordTable
 from echomodel.compact.pairs import Pairs
+from echomodel.compact.room_echo import RoomEcho, side_features, sides_of
 from echomodel.config import CompactConfig
 from echomodel.floors import GRID, plan_features
 from echomodel.graph import GraphBatch
@@ -32,13 +33,14 @@ WILDEST = 8.0  # at high noise the clean boxes of the `noise` objective may lie 
 @dataclass(frozen=True, eq=False)
 class LayoutContext:
     """What stays the same over all steps: `nodes` (N, width), pairs, `floor` (N, K, 2) and `openings` (N, O, ROW) in
-    metres, and `scale`."""
+    metres, `scale`, and `sides` (N, M, SIDE) where the network hears them."""
 
     nodes: Tensor
     pairs: Pairs
     floor: Tensor
     openings: Tensor
     scale: BoxScale
+    sides: Tensor | None = None
 
 
 class LayoutDenoiser(nn.Module):
@@ -74,9 +76,13 @@ class LayoutDenoiser(nn.Module):
         self.modulation = nn.Linear(128, 2 * width * layout.layers)
         measured = BOX * (1 + 2 * layout.frequencies) + WALL_FEATURES + OPENING_FEATURES
         self.rounds = nn.ModuleList(
-            nn.ModuleList(EchoLayer(width, 2 * len(config.predicates) + PAIR_FEATURES * (n > 0)) for _ in range(layers))
+            nn.ModuleList(
+                EchoLayer(width, 2 * len(config.predicates) + PAIR_FEATURES * (n > 0)) if layout.echo else Alone(width)
+                for _ in range(layers)
+            )
             for n, layers in enumerate([each + rest] + [each] * layout.drafts)
         )
+        self.room = nn.ModuleList(RoomEcho(width) for _ in self.rounds) if layout.sides else None
         self.measured = nn.ModuleList(nn.Linear(measured, width) for _ in range(layout.drafts))
         self.norms = nn.ModuleList(nn.LayerNorm(width) for _ in self.rounds)
         self.heads = nn.ModuleList(nn.Linear(width, BOX) for _ in self.rounds)
@@ -106,7 +112,8 @@ class LayoutDenoiser(nn.Module):
         room = room + self.tidy(torch.ones_like(rules) if tidy is None else tidy)
         room = room + (self.opening(openings) * there[..., None]).sum(1)
         nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
-        return LayoutContext(nodes, pairs, graph.floor[graph.scene], graph.openings[graph.scene], scale)
+        sides = None if self.room is None else sides_of(graph.floor, graph.openings)[graph.scene]
+        return LayoutContext(nodes, pairs, graph.floor[graph.scene], graph.openings[graph.scene], scale, sides)
 
     def forward(self, boxes: Tensor, level: Tensor, context: LayoutContext) -> Tensor:
         return self.drafts(boxes, level, context)[-1]
@@ -117,13 +124,17 @@ class LayoutDenoiser(nn.Module):
         with exactly(boxes):
             x = context.nodes + self.box(box_features(boxes, self.frequencies)) + known * self.known
         modulations = iter(self.modulation(self.level(level_features(level))).chunk(self.layers, dim=1))
-        pairs, out = context.pairs, [torch.zeros_like(boxes)]
+        pairs, out, draft = context.pairs, [torch.zeros_like(boxes)], boxes
         for number, layers in enumerate(self.rounds):
             if number:
                 draft = clean_from(out[-1].detach(), boxes, level, self.objective).clamp(-WILDEST, WILDEST)
                 with exactly(boxes):
                     features, pairs = self._measure(draft, context)
                     x = x + self.measured[number - 1](features)
+            if self.room is not None and context.sides is not None:
+                with exactly(boxes):
+                    heard = side_features(measurable(Boxes.decode(draft, context.scale)), context.sides)
+                x = self.room[number](x, *heard)
             for layer in layers:  # type: ignore[attr-defined]
                 x = layer(x, pairs, next(modulations))
             with exactly(boxes):

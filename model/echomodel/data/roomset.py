@@ -1,6 +1,6 @@
 """Sets of labelled rooms on disk: sharded, memory-mapped, about half a kilobyte a room, read as rooms or as batches.
 
-A packed set is one compressed file (`pack_rooms`), about 0.15 kB a room, in millimetres; it is labelled when it is read.
+A packed set is one compressed file (`pack_rooms`), 0.14 kB a room, in millimetres; it is labelled when it is read.
 
 A folder holds `rooms.json` (what the set is, written last) and shards `rooms-0000.bin`: a header, then five tables, one
 entry per room, object, floor corner, opening and ordered pair of objects. A pair carries one bit per predicate and rule
@@ -385,7 +385,7 @@ def claim(folder: Path, plan: dict) -> None:
 
 
 def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:
-    """Rooms of a rooms file, of a packed set, or of the folder that `echousd data build` made (its held-out ones only, if so asked).
+    """Rooms of a rooms file or a room set (its held-out ones only, if so asked).
 
     Raises ValueError for anything else.
     """

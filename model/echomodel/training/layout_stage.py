@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import ClassVar
 
 import torch
 from torch import Tensor
+from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.draft import measurable, pair_features, wall_features
@@ -14,7 +16,6 @@ from echomodel.compact.layout import exactly
 from echomodel.compact.learned import places
 from echomodel.compact.model import CompactModel
 from echomodel.compact.predictors import layout_predictor
-from echomodel.guidance import outside
 from echomodel.objectives import add_noise, clean_from, draw_levels, sampling_levels, target
 from echomodel.openingrows import clearances
 from echomodel.randomness import normal
@@ -22,11 +23,10 @@ from echomodel.rules import verdicts
 from echomodel.samplers import SAMPLERS, sample
 from echomodel.training.living_loss import (
     HEADINGS,
-    SLACK,
     heading_distance,
     living_loss,
     living_miss,
-    missed,
+    physics_loss,
     plan_of_batch,
     stands_low,
 )
@@ -53,13 +53,15 @@ def layout_loss(
     relation_weight: float,
     measure_weight: float = 0.0,
     living_weight: float = 0.0,
+    physics_weight: float = 0.0,
 ) -> tuple[Tensor, dict[str, Tensor]]:
     """Denoising loss of the unknown nodes, of the drafts too, plus the weighted relation hinge and measure distance.
 
     Arguments:
         model: with latent graph and layout denoiser. batch: true rooms. latent: (N, latent width), the edited graph's.
         generator: source of levels, noise and of what is known.
-        relation_weight, measure_weight, living_weight: 0 leaves the hinge, the distance or the living rules out.
+        relation_weight, measure_weight, living_weight, physics_weight: 0 leaves the hinge, the distance, the living
+            rules or collisions and walls out.
 
     Returns:
         The loss, and the parts that the log names.
@@ -90,6 +92,9 @@ def layout_loss(
         parts["living"] = living_loss(batch, predicted, level, known)
         parts["headings"] = heading_distance(batch, predicted, level, known)
         loss = loss + living_weight * (parts["living"] + HEADINGS * parts["headings"])
+    if physics_weight:
+        parts["physics"] = physics_loss(batch, predicted, level, known)
+        loss = loss + physics_weight * parts["physics"]
     return loss, parts
 
 
@@ -130,7 +135,8 @@ class LayoutStage:
         relation_weight: weight of the relation hinge.
         frozen: parts that stay as they are.
         measure_weight: weight of the difference in what predicted and true boxes measure.
-        living_weight: weight of what a person would point at in the predicted boxes.
+        living_weight: weight of what a person would point at in the predicted boxes. physics_weight: of collisions and
+            of what is through a wall.
         own_weight: weight of what is wrong with rooms that the network arranges alone. own_kept: last steps of sampling
             that it is led back through.
     """
@@ -150,9 +156,12 @@ class LayoutStage:
         living_weight: float = 0.0,
         own_weight: float = 0.0,
         own_kept: int = 2,
+        physics_weight: float = 0.0,
+        workers: int = 0,
     ) -> None:
         self.rooms, self.held, self.nodes = rooms, held, nodes
-        self.weights = relation_weight, measure_weight, living_weight
+        self.weights = relation_weight, measure_weight, living_weight, physics_weight
+        self.workers, self._ahead = workers, None
         self.own_weight, self.own_kept = own_weight, own_kept
         self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 
@@ -164,18 +173,27 @@ class LayoutStage:
             names = start.model.config.categories
             rows = places("categories", names, rooms.category)
             start.model.statistics = BoxStatistics.from_boxes(rooms.boxes, rows, len(names))
-        weights = recipe.measure_weight, recipe.living_weight, recipe.own_weight, recipe.own_kept
-        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights)
+        weights = recipe.measure_weight, recipe.living_weight, recipe.own_weight, recipe.own_kept, recipe.physics_weight
+        return cls(rooms, held, recipe.nodes, recipe.relation_weight, recipe.frozen, *weights, recipe.workers)
 
     def loss(self, model: CompactModel, generator: torch.Generator) -> tuple[Tensor, dict[str, Tensor]]:
         """Loss of one random batch, and of rooms that the network arranges alone."""
-        batch = draw_batch(self.rooms, self.nodes, generator).to(model.device)
+        batch = self._drawn(generator).to(model.device)
         loss, parts = self.scored(model, batch, generator)
         if self.own_weight:
             alone = draw_batch(self.rooms, self.nodes, generator, SPARSE).to(model.device)
             own, of_own = own_loss(model, alone, generator, self.own_kept)
             loss, parts = loss + self.own_weight * own, {**parts, **of_own}
         return loss, parts
+
+    def _drawn(self, generator: torch.Generator) -> LayoutBatch:
+        """A batch drawn here, or by `workers` processes ahead of the step: then a resumed run draws other batches."""
+        if not self.workers:
+            return draw_batch(self.rooms, self.nodes, generator)
+        if self._ahead is None:
+            source = _Batches(self.rooms, self.nodes, generator.initial_seed())
+            self._ahead = iter(DataLoader(source, batch_size=None, num_workers=self.workers, prefetch_factor=4))
+        return next(self._ahead)
 
     def scored(
         self, model: CompactModel, batch: LayoutBatch, generator: torch.Generator
@@ -206,6 +224,20 @@ class LayoutStage:
         return out
 
 
+class _Batches(IterableDataset):
+    """Batches without end, other ones in every worker."""
+
+    def __init__(self, rooms: PackedRooms, nodes: int, seed: int) -> None:
+        self.rooms, self.nodes, self.seed = rooms, nodes, seed
+
+    def __iter__(self) -> Iterator[LayoutBatch]:
+        torch.set_num_threads(1)
+        worker = get_worker_info()
+        generator = torch.Generator().manual_seed((self.seed + (0 if worker is None else worker.id)) % 2**63)
+        while True:
+            yield draw_batch(self.rooms, self.nodes, generator)
+
+
 def sample_boxes(model: CompactModel, batch: LayoutBatch, generator: torch.Generator) -> Boxes:
     """Sample all boxes of a batch with the config's sampler and steps."""
     layout = model.config.layout
@@ -225,7 +257,7 @@ LONGEST = 0.05  # of the gradient of a box: one that turns at a hair's breadth w
 def own_loss(
     model: CompactModel, batch: LayoutBatch, generator: torch.Generator, kept: int
 ) -> tuple[Tensor, dict[str, Tensor]]:
-    """What is wrong with tidy rooms that the network arranges alone: living rules, openings, floors and what is told.
+    """What is wrong with rooms that the network arranges alone: living rules, openings, physics and what is told.
 
     Arguments:
         batch: the graphs; its true boxes are not looked at. generator: source of all noise.
@@ -234,16 +266,18 @@ def own_loss(
     Returns:
         The loss, and the parts that the log names.
     """
-    graph, boxes = batch.graph, own_rooms(model, batch, generator, kept)
-    with exactly(boxes.position):
-        given = torch.zeros(len(boxes), dtype=torch.bool, device=boxes.yaw.device)
+    made = own_rooms(model, batch, generator, kept)
+    with exactly(made.position):
+        # whom each attends is found by many small steps, for which a GPU is slow
+        batch, boxes = batch.to("cpu"), Boxes(*(part.cpu() for part in (made.size, made.position, made.yaw)))
+        graph, level = batch.graph, torch.zeros_like(boxes.yaw)
+        given = torch.zeros(len(boxes), dtype=torch.bool)
         plan, openings = plan_of_batch(batch, boxes, given), graph.openings[graph.scene]
-        living = living_miss(plan, openings, stands_low(boxes), torch.ones_like(boxes.yaw))
-        relations = relation_hinge(batch, boxes, torch.zeros_like(boxes.yaw), given, model.config.rules)
-        over = outside(boxes, graph.floor[graph.scene])
-        floor = missed(SLACK - (over.square().sum(1) + 1e-12).sqrt()).mean()
-    parts = {"own_living": living, "own_relations": relations, "own_floor": floor}
-    return living + RELATIONS * relations + floor, parts
+        living = living_miss(plan, openings, stands_low(boxes), torch.ones_like(level))
+        relations = relation_hinge(batch, boxes, level, given, model.config.rules)
+        physics = physics_loss(batch, boxes, level, given)
+    parts = {"own_living": living, "own_relations": relations, "own_physics": physics}
+    return living + RELATIONS * relations + physics, parts
 
 
 def own_rooms(model: CompactModel, batch: LayoutBatch, generator: torch.Generator, kept: int) -> Boxes:

@@ -9,7 +9,10 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes
 from echomodel.compact.draft import measurable
+from echomodel.guidance import outside
 from echomodel.objective import BY_EYE, TERMS, Plan
+from echomodel.objective.physics import apart
+from echomodel.objective.plan import UNKNOWN
 from echomodel.openingrows import kept_free
 from echomodel.training.relation_loss import told_triplets
 from echomodel.training.rooms import LayoutBatch
@@ -20,6 +23,7 @@ SLACK = 0.03  # metres or radians that are asked for beyond what a rule does
 OTHERWISE = ("scale", "door_free", "window_free", "lamp_on_surface")
 STANDING = 0.3  # metres: what begins higher is in nobody's way
 HEADINGS = 4.0  # weight of the headings beside the rules, which forgive five degrees
+TOUCHING = 0.01  # metres that a box may reach into a wall
 FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
 
 
@@ -35,6 +39,27 @@ def living_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) 
         vars(plan)["anchor"] = truth.anchor  # whom each attends is not the network's to choose
     weight = (1 - level).square() * ~known * (batch.tidy[batch.graph.scene] > 0)
     return living_miss(plan, batch.graph.openings[batch.graph.scene], stands_low(batch.boxes), weight)
+
+
+def physics_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
+    """Mean over the free boxes of how far they run into others and through walls, weighted by (1 - level)^2.
+
+    Arguments:
+        boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
+    """
+    graph, pairs = batch.graph, batch.pairs
+    free = measurable(Boxes(boxes.size.detach(), boxes.position, boxes.yaw))
+    told = torch.zeros(0, 3, dtype=torch.int64, device=level.device)
+    words, openings = (UNKNOWN,) * len(boxes), ((),) * graph.num_scenes
+    plan = Plan(words, free.size, free.position, free.yaw, graph.scene, graph.floor, openings, told, known)
+    once = ((pairs.receiver < pairs.sender) & torch.isfinite(batch.allowed)).nonzero()[:, 0]
+    i, j = pairs.receiver[once], pairs.sender[once]
+    vars(plan)["couples"] = i, j, batch.allowed[once]  # whom each may touch is not the network's to choose
+    sure = (1 - level).square()
+    weight = torch.minimum(sure[i], sure[j]) * ~(known[i] & known[j])
+    over = (outside(free, graph.floor[graph.scene]).square().sum(1) + 1e-12).sqrt()
+    total = (deep(apart(plan).margin) * weight).sum() + (deep(TOUCHING - over) * sure * ~known).sum()
+    return total / (sure * ~known).sum().clamp_min(1)
 
 
 def plan_of_batch(batch: LayoutBatch, boxes: Boxes, known: Tensor) -> Plan:
@@ -81,4 +106,9 @@ def heading_distance(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Ten
 
 def missed(margin: Tensor) -> Tensor:
     """By how much margins are missed, as the losses count it: logarithmic, so that none pulls without bounds."""
-    return torch.log1p(FIRM * (SLACK - margin.float()).clamp_min(0))
+    return deep(margin.float() - SLACK)
+
+
+def deep(margin: Tensor) -> Tensor:
+    """The same without slack: true rooms hold things that touch."""
+    return torch.log1p(FIRM * (-margin).clamp_min(0))

@@ -52,9 +52,11 @@ BOUNDS: tuple[tuple[str, float, float], ...] = (
     *((name, 1, 10**6) for name in ("nodes", "shapes_per_batch", "scenes")),
     ("seed", 0, 2**63 - 1),
     ("threads", 0, 1024),
+    ("workers", 0, 1024),
     ("relation_weight", 0, 10**6),
     ("measure_weight", 0, 10**6),
     ("living_weight", 0, 10**6),
+    ("physics_weight", 0, 10**6),
     ("own_weight", 0, 10**6),
     ("own_kept", 1, 1000),
 )
@@ -70,7 +72,7 @@ class Recipe:
             and the joint stage of the `paper` preset.
         steps: optimiser steps.
         seed: seed of the initial weights and of every batch.
-        data: folder that `echousd data build` made; its held-out part is for validation.
+        data: folder that `echousd data build` made, or a packed set of rooms; its held-out part is for validation.
         start: weights files to start from.
         warm: weights files, of an earlier version too, whose tensors are taken over as far as they reach: what has
             grown keeps what it had in its first rows and columns and begins with zeros in the others.
@@ -81,11 +83,13 @@ class Recipe:
         relation_weight: weight of the hinge on the relations' margins of the predicted boxes.
         measure_weight: weight of the difference in what predicted and true boxes measure (gaps to walls, ...).
         living_weight: weight of what a person would point at in the predicted boxes (the living rules' margins).
+        physics_weight: weight of collisions of the predicted boxes and of what is through a wall.
         own_weight: weight of what is wrong with rooms that the network arranges alone (`training.layout_stage`).
         own_kept: last steps of sampling that it is led back through.
         validate_every, save_every: steps.
         precision: `float32` or `bfloat16` (autocast).
-        threads: CPU threads, 0 = as many as torch likes.
+        threads: CPU threads, 0 = as many as torch likes. workers: processes that draw batches of rooms ahead of a GPU,
+            0 = none.
         model: sizes of the compact model. paper: settings of the `paper` preset (`echoscene.config.PaperSizes`).
         optimizer: how to step.
     """
@@ -104,6 +108,7 @@ class Recipe:
     relation_weight: float = 0.5
     measure_weight: float = 0.0
     living_weight: float = 0.0
+    physics_weight: float = 0.0
     own_weight: float = 0.0
     own_kept: int = 2
     validate_every: int = 2000
@@ -111,6 +116,7 @@ class Recipe:
     log_every: int = 50
     precision: Literal["float32", "bfloat16"] = "float32"
     threads: int = 0
+    workers: int = 0
     model: CompactConfig = field(default_factory=CompactConfig)
     paper: dict = field(default_factory=dict)
     optimizer: OptimizerConfig = field(default_factory=OptimizerConfig)

@@ -15,6 +15,7 @@ from echomodel.config import names_of
 from echomodel.data.roomset import RoomSet
 from echomodel.floors import padded, trimmed
 from echomodel.graph import GraphBatch
+from echomodel.objective import plan_of
 from echomodel.openingrows import padded_rows
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rules.telling import near_first
@@ -36,6 +37,7 @@ class PackedRooms:
         room_type: (R,) int64. floor: (R, K, 2), openings: (R, O, ROW) float32, as in `GraphBatch`.
         rules: (R,) int64, rule set of the labels. tidy: (R,) int64, 0 for rooms that were shaken.
         bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
+        allowed: (P,) float32, metres that the two may run into each other, inf where one stands on the other.
     """
 
     category: Tensor
@@ -50,6 +52,7 @@ class PackedRooms:
     rules: Tensor
     tidy: Tensor
     bits: Tensor
+    allowed: Tensor
 
     def __len__(self) -> int:
         return len(self.count)
@@ -73,6 +76,7 @@ class PackedRooms:
             rules=torch.full((len(rooms),), rules),
             tidy=torch.ones(len(rooms), dtype=torch.int64) if untidy is None else torch.from_numpy(~untidy).long(),
             bits=torch.cat([_bits(g) for g in graphs]),
+            allowed=torch.cat([_allowed(room) for room in rooms]),
         )
 
     @classmethod
@@ -101,7 +105,7 @@ class LayoutBatch:
 
     Arguments:
         predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
-        rules, tidy: (S,) int64. style: (N,) int64.
+        rules, tidy: (S,) int64. style: (N,) int64. allowed: (P,) float32, as in `PackedRooms`.
         before: relations of the pseudo graph before the edit (EchoScene 3.2, inverse strategy).
         added, touched: (N,) bool, nodes missing from the pseudo graph, and all nodes that the edit meets.
     """
@@ -116,6 +120,7 @@ class LayoutBatch:
     before: Pairs
     added: Tensor
     touched: Tensor
+    allowed: Tensor
 
     def to(self, device: torch.device | str) -> LayoutBatch:
         """The same batch on another device."""
@@ -142,7 +147,8 @@ def make_batch(
     nodes = _ranges(rooms.count.cumsum(0)[picked] - counts, counts)
     all_pairs = rooms.count * (rooms.count - 1)
     pair_counts = all_pairs[picked]
-    bits = rooms.bits[_ranges(all_pairs.cumsum(0)[picked] - pair_counts, pair_counts)]
+    places = _ranges(all_pairs.cumsum(0)[picked] - pair_counts, pair_counts)
+    bits = rooms.bits[places]
     scene = torch.arange(len(picked)).repeat_interleave(counts)
     holds = (bits[:, None] >> torch.arange(len(PREDICATES))) & 1 == 1
     position, yaw = rooms.position[nodes].clone(), rooms.yaw[nodes].clone()
@@ -166,7 +172,8 @@ def make_batch(
     )  # fmt: skip
     before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
     kinds = {"rules": rooms.rules[picked], "tidy": rooms.tidy[picked], "style": rooms.style[nodes]}
-    return LayoutBatch(graph, boxes, pairs, predicates, before=before, added=added, touched=touched, **kinds)
+    more = {"before": before, "added": added, "touched": touched, "allowed": rooms.allowed[places], **kinds}
+    return LayoutBatch(graph, boxes, pairs, predicates, **more)
 
 
 def _bits(graph: GraphBatch) -> Tensor:
@@ -178,6 +185,15 @@ def _bits(graph: GraphBatch) -> Tensor:
     told = graph.triplets[graph.triplets[:, 1] < len(PREDICATES)]
     hot[number[told[:, 0], told[:, 2]], told[:, 1]] = 1
     return (hot << torch.arange(len(PREDICATES), dtype=torch.int32)).sum(1, dtype=torch.int32)
+
+
+def _allowed(room: RoomBoxes) -> Tensor:
+    """(n (n - 1),) float32, what the objective allows the ordered pairs of a true room."""
+    plan = plan_of(room, room.categories, relations=room.relations, dtype=torch.float32)
+    first, second, metres = plan.couples
+    table = torch.full((len(room), len(room)), torch.inf)
+    table[first, second] = table[second, first] = metres
+    return table[~torch.eye(len(room), dtype=torch.bool)]
 
 
 def _ranges(starts: Tensor, counts: Tensor) -> Tensor:

@@ -115,7 +115,7 @@ def data_folder(recipe: Recipe, part: str) -> Path:
     """The folder of the recipe's data that holds `part`; raises ValueError where the recipe names none."""
     if not recipe.data:
         raise ValueError(f"recipe field 'data' is empty, stage {recipe.stage!r} needs a folder of `echousd data build`")
-    return Path(recipe.data) / part
+    return Path(recipe.data) if part == "rooms" and Path(recipe.data).is_file() else Path(recipe.data) / part
 
 
 def warm_start(model: CompactModel, path: Path) -> tuple[str, ...]:

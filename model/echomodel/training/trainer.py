@@ -25,8 +25,8 @@ from echomodel.training.recipe import Recipe
 # Fields of a recipe that may change on the way: length, rates and weights, files, and what the machine offers.
 MAY_CHANGE = {
     "steps", "data", "start", "warm", "optimizer", "relation_weight", "measure_weight", "living_weight",
-    "own_weight", "own_kept",
-    "validate_every", "save_every", "log_every", "threads", "precision", "nodes", "scenes", "shapes_per_batch",
+    "physics_weight", "own_weight", "own_kept", "validate_every", "save_every", "log_every", "threads", "workers",
+    "precision", "nodes", "scenes", "shapes_per_batch",
 }  # fmt: skip
 Report = Callable[[int, dict[str, float]], None]
 Trainable = Any  # a module that names its `parts`, gives their parameters and writes them, as `CompactModel` does
@@ -285,7 +285,10 @@ def read_log(path: Path) -> list[tuple[int, str, float]]:
 
 def plot_log(log: Path, out: Path) -> None:
     """Draw every curve of a log file, grouped by the word before the slash, into one picture."""
-    import matplotlib
+    try:
+        import matplotlib
+    except ImportError:
+        return  # the CSV file has everything
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt

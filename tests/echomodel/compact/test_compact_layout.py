@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import torch
 from torch import Tensor
@@ -111,6 +113,28 @@ def test_a_batch_is_its_single_runs() -> None:
                 run(model, graph, boxes[start:stop], level[start:stop]), together[start:stop], rtol=1e-5, atol=2e-6
             )
             start = stop
+
+
+def test_sides_begin_silent_and_the_echo_can_be_taken_out() -> None:
+    """Weights that know no sides are what they were; without the echo no object hears of another."""
+    model, graph = small_model(), random_graph(5, 9, 0)
+    boxes, level = torch.randn(5, 8, generator=torch.Generator().manual_seed(1)), torch.full((5,), 0.4)
+    torch.manual_seed(0)
+    hearing = CompactModel(replace(SMALL, layout=replace(SMALL.layout, sides=True)), STATISTICS, ("latent", "layout"))
+    hearing.load_state_dict(model.state_dict(), strict=False)
+    with torch.no_grad():
+        assert torch.equal(run(model, graph, boxes, level), run(hearing, graph, boxes, level))
+        torch.nn.init.normal_(hearing.layout.room[0].message.weight, std=0.1)
+        assert not torch.allclose(run(model, graph, boxes, level), run(hearing, graph, boxes, level))
+    alone = CompactModel(replace(SMALL, layout=replace(SMALL.layout, echo=False)), STATISTICS, ("latent", "layout"))
+    for head in alone.layout.heads:
+        torch.nn.init.normal_(head.weight, std=0.1)
+    moved = boxes.clone()
+    moved[0] += 1.0
+    with torch.no_grad():
+        before, after = (run(alone, graph, given, level) for given in (boxes, moved))
+    assert torch.equal(before[1:], after[1:])
+    assert not torch.allclose(before[0], after[0])
 
 
 def test_the_outline_of_the_floor_reaches_the_boxes() -> None:

@@ -48,7 +48,7 @@ def test_a_few_steps_lower_what_is_wrong_with_own_rooms(data: Path, batch: Layou
         optimizer.step()
         optimizer.zero_grad()
         losses.append(loss.item())
-        assert set(parts) == {"own_living", "own_relations", "own_floor"}
+        assert set(parts) == {"own_living", "own_relations", "own_physics"}
     assert min(losses[-3:]) < 0.9 * losses[0]
 
 

@@ -1,0 +1,46 @@
+"""Rooms found by search: nothing is missed in them, a stopped search goes on, another one is refused."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from echomodel.boxes import Boxes
+from echomodel.objective import faults_of, plan_of
+from echomodel.rooms.generator import generate_rooms
+from echousd.place import examples
+from echousd.place.examples import ExamplesPlan, search_examples
+
+
+@pytest.fixture(autouse=True)
+def _few(monkeypatch):
+    monkeypatch.setattr(examples, "GRAPHS", 2)
+    monkeypatch.setattr(examples, "HALLS", 0.0)
+
+
+def test_found_rooms_miss_nothing_and_a_search_goes_on(tmp_path, monkeypatch):
+    plan = ExamplesPlan(5, drafts=0)
+    search_examples(tmp_path, plan, shards=1)
+    first = (tmp_path / "found-00000.npz").read_bytes()
+    rooms = search_examples(tmp_path, plan, shards=2)
+    assert (tmp_path / "found-00000.npz").read_bytes() == first
+    with (tmp_path / "log.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["shard"] for row in rows] == ["0", "1"]
+    assert sum(int(row["kept"]) for row in rows) == len(rooms) > 0
+    for number in range(len(rooms)):
+        room = rooms.room(number)
+        found = plan_of(room, room.categories, room.floor_polygon, room.openings, height=room.height)
+        assert not faults_of(found, ("physics", "living", "composition"))
+    with pytest.raises(ValueError, match="was begun with seed 5; choose another folder or remove it"):
+        search_examples(tmp_path, ExamplesPlan(6, drafts=0), shards=1)
+
+
+def test_a_room_that_misses_something_is_left_out():
+    room = generate_rooms(1, 5)[0]
+    start = Boxes.from_room(room)
+    assert examples._searched(room, np.zeros((0, 3), int), start) is not None
+    contradiction = np.array([[0, 1, 1], [1, 1, 0]])  # each to the left of the other
+    assert examples._searched(room, contradiction, start) is None
