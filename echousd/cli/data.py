@@ -88,7 +88,7 @@ def search(
     graphs: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
     seed: Seed = 0,
     drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
-    model: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
+    weights: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
     jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
     minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
 ) -> None:
@@ -104,7 +104,7 @@ def search(
     def report(row: dict[str, float]) -> None:
         console.print("  ".join(f"{name} {value}" for name, value in row.items()))
 
-    plan = ExamplesPlan(seed, drafts, model)
+    plan = ExamplesPlan(seed, drafts, weights)
     found = search_examples(out, plan, shards=-(-graphs // GRAPHS), jobs=jobs, minutes=minutes, report=report)
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 

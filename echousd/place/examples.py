@@ -42,8 +42,8 @@ COLUMNS = ("shard", "graphs", "kept", "objects", "from_generator", "faults_gener
 
 @dataclass(frozen=True)
 class ExamplesPlan:
-    """What a folder of examples is filled with: the world's seed, drafts of the network a room, its weights ("" = none,
-    None = those that ship)."""
+    """What a folder of examples is filled with: the world's seed, drafts of the network a room, and the weights that
+    draw them, None = those that ship."""
 
     seed: int
     drafts: int = 2
@@ -115,10 +115,12 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
         for relations, room in zip(labels, drawn, strict=True)
     ]
     starts = [[Boxes.from_room(room)] for room in drawn]
-    if plan.drafts and plan.weights != "":
-        for more, found in zip(starts, _drafts(plan, drawn, told, number), strict=True):
-            more += found
-    kept, numbers, own, faults = [], [], 0, 0
+    if plan.drafts:
+        for more, drafts in zip(starts, _drafts(plan, drawn, told, number), strict=True):
+            more += drafts
+    kept: list[RoomBoxes] = []
+    numbers: list[int] = []
+    own = faults = 0
     for k, (room, triplets, begun) in enumerate(zip(drawn, told, starts, strict=True)):
         found = [(*it, n) for n, start in enumerate(begun) if (it := _searched(room, triplets, start))]
         faults += len(_missed(room, triplets))
@@ -136,7 +138,8 @@ def _search_shard(folder: Path, plan: ExamplesPlan, until: float | None, number:
 def _drafts(plan: ExamplesPlan, rooms: list[RoomBoxes], told: list[np.ndarray], number: int) -> list[list[Boxes]]:
     """Boxes that the network draws of some rooms from noise, `plan.drafts` of each."""
     model, counts = _model(plan.weights), [len(room) for room in rooms]
-    graph = GraphBatch.pack([GraphBatch.from_room(r, triplets=t) for r, t in zip(rooms, told, strict=True)])
+    labelled = [replace(room, relations=triplets) for room, triplets in zip(rooms, told, strict=True)]
+    graph = GraphBatch.pack([GraphBatch.from_room(room) for room in labelled])
     out: list[list[Boxes]] = [[] for _ in rooms]
     for draft in range(plan.drafts):
         generator = torch.Generator().manual_seed(plan.seed * 1_000_003 + number * 101 + draft)
@@ -176,3 +179,12 @@ def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[floa
 def _missed(room: RoomBoxes, triplets: np.ndarray) -> list:
     plan = plan_of(room, room.categories, room.floor_polygon, room.openings, triplets, height=room.height)
     return faults_of(plan, KINDS) + unreached(plan)
+
+
+if __name__ == "__main__":  # where the command line's libraries are not installed
+    import sys
+
+    search_examples(
+        Path(sys.argv[1]), ExamplesPlan(int(sys.argv[4])), shards=1000, jobs=int(sys.argv[2]),
+        minutes=float(sys.argv[3]),
+    )  # fmt: skip

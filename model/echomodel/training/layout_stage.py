@@ -161,7 +161,8 @@ class LayoutStage:
     ) -> None:
         self.rooms, self.held, self.nodes = rooms, held, nodes
         self.weights = relation_weight, measure_weight, living_weight, physics_weight
-        self.workers, self._ahead = workers, None
+        self.workers = workers
+        self._ahead: Iterator[LayoutBatch] | None = None
         self.own_weight, self.own_kept = own_weight, own_kept
         self.trained = tuple(part for part in ("latent", "layout") if part not in frozen)
 

@@ -172,8 +172,10 @@ def make_batch(
     )  # fmt: skip
     before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
     kinds = {"rules": rooms.rules[picked], "tidy": rooms.tidy[picked], "style": rooms.style[nodes]}
-    more = {"before": before, "added": added, "touched": touched, "allowed": rooms.allowed[places], **kinds}
-    return LayoutBatch(graph, boxes, pairs, predicates, **more)
+    allowed = rooms.allowed[places]
+    return LayoutBatch(
+        graph, boxes, pairs, predicates, before=before, added=added, touched=touched, allowed=allowed, **kinds
+    )
 
 
 def _bits(graph: GraphBatch) -> Tensor:
