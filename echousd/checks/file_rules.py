@@ -9,12 +9,11 @@ from functools import lru_cache
 from pathlib import PurePosixPath
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdPhysics, UsdShade
+from pxr import Sdf, Usd, UsdPhysics, UsdShade
 
-from echousd.checks.findings import Finding, Rule
+from echousd.checks.findings import UNREADABLE, Finding, rule
 from echousd.checks.reading import Reading, specs
 from echousd.exporting.packing import Reach
-from echousd.stage.encoding import StageError
 from echousd.stage.units import METRES, UP_AXIS, unit_faults, up_axis
 from echousd.stage.values import asset
 from echousd.textures import READABLE, TextureError, file_of, read_image
@@ -26,6 +25,7 @@ LEVEL = 0.5  # cosine of the angle between a model's up and the room's
 ABSOLUTE = re.compile(r"^(?:/|\\\\|[A-Za-z]:[\\/]|file:)")
 
 
+@rule("echo:RelativePaths")
 def relative_paths(reading: Reading) -> Iterator[Finding]:
     """Every asset path is relative and written with forward slashes."""
     told = set()
@@ -39,6 +39,7 @@ def relative_paths(reading: Reading) -> Iterator[Finding]:
             yield Finding(_holder(layer, path), f"{where}: asset path {path!r} is {what}, allowed: ./relative/path")
 
 
+@rule("echo:PathsInside")
 def paths_inside(reading: Reading) -> Iterator[Finding]:
     """Every file that the room names lies below its folder: it stays behind when the folder is sent, or leaks."""
     if not reading.stage.GetRootLayer().realPath:
@@ -61,25 +62,17 @@ def paths_inside(reading: Reading) -> Iterator[Finding]:
                 )
 
 
-def images(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Images", "prims", UsdShade.Shader)
+def images(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Every image that a shader reads can be read."""
-    known: dict[str, str] = {}
-    for prim in reading.prims:
-        if not prim.IsA(UsdShade.Shader):
-            continue
-        try:
-            file = asset(prim.GetAttribute("inputs:file")) if prim.HasAttribute("inputs:file") else None
-        except (StageError, Tf.ErrorException):  # the rules on values report it
-            continue
-        path = str(file.resolvedPath) if file else ""
-        if file and file.path and not path and "<" not in file.path:
-            yield Finding(prim.GetPath(), f"inputs:file is {file.path!r}, where no file is")
-        if not path or PurePosixPath(path.rstrip("]")).suffix.lower() not in READABLE:
-            continue
-        if path not in known:
-            known[path] = _image_fault(path, _stamp(path))
-        if known[path]:
-            yield Finding(prim.GetPath(), known[path])
+    file = asset(prim.GetAttribute("inputs:file")) if prim.HasAttribute("inputs:file") else None
+    path = str(file.resolvedPath) if file else ""
+    if file and file.path and not path and "<" not in file.path:
+        yield f"inputs:file is {file.path!r}, where no file is"
+    if path and PurePosixPath(path.rstrip("]")).suffix.lower() in READABLE:
+        fault = _image_fault(path, _stamp(path))
+        if fault:
+            yield fault
 
 
 def _stamp(path: str) -> tuple[int, ...]:
@@ -113,12 +106,14 @@ def _holder(layer: Sdf.Layer, path: str) -> Sdf.Path:
     return Sdf.Path.absoluteRootPath
 
 
+@rule("echo:Units")
 def units(reading: Reading) -> Iterator[Finding]:
     """The root layer says the unit and the up axis of the layers that it composes."""
     for message, wrong in unit_faults(reading.stage):
         yield Finding(Sdf.Path.absoluteRootPath, message, warning=not wrong)
 
 
+@rule("echo:Arcs")
 def arcs(reading: Reading) -> Iterator[Finding]:
     """What is referenced is brought to the unit and up axis of the stage; masses are told in one unit."""
     stage = reading.stage
@@ -133,7 +128,7 @@ def arcs(reading: Reading) -> Iterator[Finding]:
         for layer in _referenced(prim):
             try:
                 world = reading.world(prim)[:3, :3]
-            except (StageError, Tf.ErrorException):  # the rules on values report it
+            except UNREADABLE:
                 continue
             size = float(np.cbrt(abs(np.linalg.det(world)))) * reading.metres
             unit = layer.pseudoRoot.GetInfo(METRES) if layer.pseudoRoot.HasInfo(METRES) else None
@@ -154,12 +149,3 @@ def _referenced(prim: Usd.Prim) -> list[Sdf.Layer]:
     found = Usd.PrimCompositionQuery.GetDirectReferences(prim).GetCompositionArcs()
     own = set(prim.GetStage().GetLayerStack())
     return [layer for layer in dict.fromkeys(arc.GetTargetLayer() for arc in found) if layer not in own]
-
-
-RULES = (
-    Rule("echo:Units", "Unit and up axis of the root layer are those of the layers below.", units),
-    Rule("echo:Arcs", "What is referenced has the unit and the up axis of the stage.", arcs),
-    Rule("echo:RelativePaths", "Asset paths are relative and use forward slashes.", relative_paths),
-    Rule("echo:Images", "Images can be read.", images),
-    Rule("echo:PathsInside", "Files that a room names lie below its folder.", paths_inside),
-)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdShade
 
-from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.findings import UNREADABLE, Finding, applied, rule
 from echousd.checks.reading import Reading
-from echousd.stage.encoding import NODE_API, StageError
+from echousd.stage.encoding import NODE_API
 from echousd.stage.values import array, matrix, targets
 
 EVEN = 1e-3  # relative difference of scale factors that counts as none
@@ -17,20 +17,15 @@ NO_UVS = "no texture coordinates, allowed: primvars:st of type texCoord2f[]"
 PHYSICAL = ("PhysicsRigidBodyAPI", "PhysicsCollisionAPI")
 
 
-def texture_coordinates(reading: Reading) -> Iterator[Finding]:
+@rule("echo:TextureCoordinates", "prims", UsdGeom.Mesh)
+def texture_coordinates(reading: Reading, prim: Usd.Prim) -> Iterator[Finding]:
     """Every visible mesh has `primvars:st`, with as many values as its interpolation asks for and indices in range.
 
     Models of others that have none are warnings: they may need none.
     """
-    for prim in reading.prims:
-        if not prim.IsA(UsdGeom.Mesh) or reading.is_guide(prim):
-            continue
-        try:
-            fault = _uv_fault(UsdGeom.Mesh(prim))
-        except (StageError, Tf.ErrorException):  # the rules on values report it
-            continue
-        if fault:
-            yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and of_others(prim))
+    fault = None if reading.is_guide(prim) else _uv_fault(UsdGeom.Mesh(prim))
+    if fault:
+        yield Finding(prim.GetPath(), fault, warning=fault == NO_UVS and of_others(prim))
 
 
 def of_others(prim: Usd.Prim) -> bool:
@@ -64,6 +59,7 @@ def _uv_fault(mesh: UsdGeom.Mesh) -> str | None:
     return None
 
 
+@rule("echo:Scale")
 def scale(reading: Reading) -> Iterator[Finding]:
     """No scale is zero, and no node of a graph, body or collider is scaled differently along its axes."""
     told: set[Sdf.Path] = set()
@@ -73,7 +69,7 @@ def scale(reading: Reading) -> Iterator[Finding]:
         try:
             local = _factors(matrix(reading.cache.GetLocalTransformation(prim)[0], prim))
             whole = reading.world(prim)
-        except (StageError, Tf.ErrorException):  # the rules on values report it
+        except UNREADABLE:
             continue
         if local.min() < 1e-6:
             told.add(prim.GetPath())
@@ -92,17 +88,11 @@ def scale(reading: Reading) -> Iterator[Finding]:
             yield Finding(culprit.GetPath(), f"scale is {_shown(world)}, allowed on {what}: the same along all axes")
 
 
-def mirrored(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Mirrored", "prims", UsdGeom.Xformable)
+def mirrored(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """No transform mirrors: physics engines and many clients turn such meshes inside out."""
-    for prim in reading.prims:
-        if not prim.IsA(UsdGeom.Xformable):
-            continue
-        try:
-            turn = matrix(reading.cache.GetLocalTransformation(prim)[0], prim)[:3, :3]
-        except (StageError, Tf.ErrorException):
-            continue
-        if np.linalg.det(turn) < -1e-12:
-            yield Finding(prim.GetPath(), "its transform mirrors (a negative scale), allowed: positive scales")
+    if np.linalg.det(matrix(reading.cache.GetLocalTransformation(prim)[0], prim)[:3, :3]) < -1e-12:
+        yield "its transform mirrors (a negative scale), allowed: positive scales"
 
 
 def _unevenly_scaled(prim: Usd.Prim, cache: UsdGeom.XformCache) -> Usd.Prim:
@@ -123,29 +113,16 @@ def _shown(factors: np.ndarray) -> str:
     return "(" + ", ".join(f"{factor:.4g}" for factor in sorted(factors)) + ")"
 
 
-def materials_inside(reading: Reading) -> Iterator[Finding]:
+@rule("echo:MaterialsInside", "prims")
+def materials_inside(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Bound materials lie below the default prim, so that a reference to the stage brings them along."""
     default = reading.stage.GetDefaultPrim()
-    if not default:
+    if not default or not prim.GetPath().HasPrefix(default.GetPath()):
         return
-    for prim in reading.prims:
-        if not prim.GetPath().HasPrefix(default.GetPath()):
+    for relationship in prim.GetRelationships():
+        if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
             continue
-        for relationship in prim.GetRelationships():
-            if not relationship.GetName().startswith(str(UsdShade.Tokens.materialBinding)):
-                continue
-            for target in targets(prim, relationship.GetName()):
-                found = reading.stage.GetPrimAtPath(target.GetPrimPath())
-                if found and found.IsA(UsdShade.Material) and not target.HasPrefix(default.GetPath()):
-                    yield Finding(
-                        prim.GetPath(),
-                        f"bound to <{target}>, allowed: a material below the default prim <{default.GetPath()}>",
-                    )
-
-
-RULES = (
-    Rule("echo:TextureCoordinates", "Visible meshes have texture coordinates, as many as needed.", texture_coordinates),
-    Rule("echo:Scale", "No zero scale; bodies, colliders and objects are scaled evenly.", scale),
-    Rule("echo:Mirrored", "No transform mirrors.", mirrored),
-    Rule("echo:MaterialsInside", "Bound materials lie below the default prim.", materials_inside),
-)
+        for target in targets(prim, relationship.GetName()):
+            found = reading.stage.GetPrimAtPath(target.GetPrimPath())
+            if found and found.IsA(UsdShade.Material) and not target.HasPrefix(default.GetPath()):
+                yield f"bound to <{target}>, allowed: a material below the default prim <{default.GetPath()}>"

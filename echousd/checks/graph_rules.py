@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from pxr import Usd, UsdGeom
 
-from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.findings import Finding, applied, rule
 from echousd.checks.reading import Reading
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
@@ -20,6 +20,7 @@ LABELS_PREFIX = "SemanticsLabelsAPI:"
 OURS = frozenset((usd.GRAPH_TYPE, usd.RELATION_TYPE, usd.NODE_API))
 
 
+@rule("echo:EdgeTargets")
 def edge_targets(reading: Reading) -> Iterator[Finding]:
     """Every relation has one subject, one known predicate and one object, all in its own room."""
     try:
@@ -53,6 +54,7 @@ def edge_targets(reading: Reading) -> Iterator[Finding]:
             )
 
 
+@rule("echo:ConsistentGraph")
 def consistent_graph(reading: Reading) -> Iterator[Finding]:
     """The relations of a room do not contradict each other, and its words are those of the vocabulary."""
     if any(not found.warning for found in edge_targets(reading)):
@@ -74,19 +76,19 @@ def consistent_graph(reading: Reading) -> Iterator[Finding]:
             yield Finding(room.graph.GetPath(), message.split(": ", 1)[-1], warning=True)
 
 
-def known_types(reading: Reading) -> Iterator[Finding]:
+@rule("echo:KnownTypes", "prims")
+def known_types(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Every prim type and applied API schema is known to this OpenUSD."""
-    registry = Usd.SchemaRegistry()
-    for prim in reading.prims:
-        name = prim.GetTypeName()
-        if name and not registry.FindConcretePrimDefinition(name) and name not in OURS:
-            yield Finding(prim.GetPath(), f"unknown prim type {name!r}: no registered schema defines it")
-        for schema in applied(prim):
-            base = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)[0]
-            if not registry.FindAppliedAPIPrimDefinition(base) and base not in OURS:
-                yield Finding(prim.GetPath(), f"unknown API schema {schema!r}: no registered schema defines it")
+    registry, name = Usd.SchemaRegistry(), prim.GetTypeName()
+    if name and not registry.FindConcretePrimDefinition(name) and name not in OURS:
+        yield f"unknown prim type {name!r}: no registered schema defines it"
+    for schema in applied(prim):
+        base = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)[0]
+        if not registry.FindAppliedAPIPrimDefinition(base) and base not in OURS:
+            yield f"unknown API schema {schema!r}: no registered schema defines it"
 
 
+@rule("echo:Semantics")
 def semantics(reading: Reading) -> Iterator[Finding]:
     """All visible geometry carries semantics labels, itself or through a prim above it."""
     told: set = set()
@@ -123,11 +125,3 @@ def _component(prim: Usd.Prim) -> Usd.Prim:
 
 def _without_place(message: str, prim: Usd.Prim) -> str:
     return message.split(f"<{prim.GetPath()}>: ", 1)[-1]
-
-
-RULES = (
-    Rule("echo:EdgeTargets", "Relations have one subject, one predicate and one object in their room.", edge_targets),
-    Rule("echo:ConsistentGraph", "The relations of a room do not contradict each other.", consistent_graph),
-    Rule("echo:KnownTypes", "Prim types and applied API schemas are known.", known_types),
-    Rule("echo:Semantics", "All visible geometry carries semantics labels.", semantics),
-)

@@ -4,39 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from echousd.checks.collisions import inside_solid
-from echousd.checks.findings import Finding, Rule
+from echousd.checks.findings import UNREADABLE, Finding, rule
 from echousd.checks.geometry_rules import of_others
 from echousd.checks.ranges import LIGHTS
 from echousd.checks.reading import Reading, below
 from echousd.stage.contents import room_frame
-from echousd.stage.encoding import StageError
 from echousd.stage.values import asset
 
 UNDER = 0.02  # metres below its floor that a camera or a lamp is not
 
 
-def materials(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Materials", "distinct", UsdShade.Material)
+def materials(reading: Reading, prim: Usd.Prim) -> Iterator[Finding | str]:
     """A material has a surface, every node of it is used, images have files, and inputs are connected to outputs."""
-    known = {name.partition(":")[2] for name in {attribute.GetName() for attribute in reading.authored}}
-    for prim in reading.distinct:
-        if not prim.IsA(UsdShade.Material):
-            continue
-        nodes = [node for node in below(prim) if node.IsA(UsdShade.Shader)]
-        outputs = [out for out in UsdShade.Material(prim).GetOutputs() if out.HasConnectedSource()]
-        if not outputs and (nodes or not prim.HasAPI(UsdPhysics.MaterialAPI)):
-            yield Finding(prim.GetPath(), "a material without a surface: nothing is connected to its outputs")
-            continue
-        used = _used(prim, outputs)
-        for node in nodes:
-            if node.GetPath() not in used:
-                yield Finding(node.GetPath(), "reaches no output of its material", warning=of_others(prim))
-        for node in (prim, *nodes):
-            yield from _loose_ends(node)
-        for node in nodes:
-            yield from _unread(node, known)
+    nodes = [node for node in below(prim) if node.IsA(UsdShade.Shader)]
+    outputs = [out for out in UsdShade.Material(prim).GetOutputs() if out.HasConnectedSource()]
+    if not outputs and (nodes or not prim.HasAPI(UsdPhysics.MaterialAPI)):
+        yield "a material without a surface: nothing is connected to its outputs"
+        return
+    used = _used(prim, outputs)
+    for node in nodes:
+        if node.GetPath() not in used:
+            yield Finding(node.GetPath(), "reaches no output of its material", warning=of_others(prim))
+    for node in (prim, *nodes):
+        yield from _loose_ends(node)
+    for node in nodes:
+        yield from _unread(node, reading.primvars)
 
 
 def _used(material: Usd.Prim, outputs: list[UsdShade.Output]) -> set[Sdf.Path]:
@@ -73,10 +69,11 @@ def _unread(node: Usd.Prim, primvars: set[str]) -> Iterator[Finding]:
             name = node.GetAttribute("inputs:varname").Get()
             if name is not None and str(name) not in primvars:
                 yield Finding(node.GetPath(), f"reads primvars:{name}, which no prim has")
-    except (StageError, Tf.ErrorException):  # the rules on values report it
+    except UNREADABLE:
         return
 
 
+@rule("echo:Bindings")
 def bindings(reading: Reading) -> Iterator[Finding]:
     """What is seen has a material that is there, where a stage has materials at all; a warning where it has none."""
     if not any(prim.IsA(UsdShade.Material) for prim in reading.distinct):
@@ -84,11 +81,11 @@ def bindings(reading: Reading) -> Iterator[Finding]:
     seen = [prim for prim in reading.distinct if prim.IsA(UsdGeom.Gprim) and not reading.is_guide(prim)]
     bound, _ = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(seen)
     for prim, material in zip(seen, bound, strict=True):
-        for relationship in (prim.GetRelationship("material:binding"),):
-            for target in relationship.GetTargets() if relationship else ():
-                found = reading.stage.GetPrimAtPath(target)
-                if not found or not found.IsActive():
-                    yield Finding(prim.GetPath(), f"bound to <{target}>, where no active material is")
+        relationship = prim.GetRelationship("material:binding")
+        for target in relationship.GetTargets() if relationship else ():
+            found = reading.stage.GetPrimAtPath(target)
+            if not found or not found.IsActive():
+                yield Finding(prim.GetPath(), f"bound to <{target}>, where no active material is")
         if material or prim.GetAttribute("primvars:displayColor").HasAuthoredValue():
             continue
         parts = [each for each in prim.GetChildren() if each.IsA(UsdGeom.Subset)]
@@ -96,6 +93,7 @@ def bindings(reading: Reading) -> Iterator[Finding]:
             yield Finding(prim.GetPath(), "no material is bound: it is shown grey", warning=True)
 
 
+@rule("echo:Lights")
 def lights(reading: Reading) -> Iterator[Finding]:
     """Where a stage has lights or cameras, some light shines."""
     off = [prim for prim in reading.inactive if prim.GetTypeName() in LIGHTS or prim.GetName() == "Lights"]
@@ -114,6 +112,7 @@ def _shines(light: Usd.Prim) -> bool:
     return visible and (not isinstance(intensity, float) or intensity > 0)
 
 
+@rule("echo:Viewpoints")
 def viewpoints(reading: Reading) -> Iterator[Finding]:
     """Cameras and lamps are above the floor; cameras stand in no piece of furniture and show something."""
     placed = [prim for prim in reading.prims if prim.IsA(UsdGeom.Camera) or prim.GetTypeName() in LIGHTS]
@@ -129,7 +128,7 @@ def viewpoints(reading: Reading) -> Iterator[Finding]:
                 continue
             try:
                 at = (room_frame(room.room, reading.cache) @ reading.world(prim))[:3, 3]
-            except (StageError, Tf.ErrorException):  # the rules on values report it
+            except UNREADABLE:
                 continue
             if at[1] < -UNDER:
                 yield Finding(prim.GetPath(), f"{-at[1]:.2g} m below the floor of its room, allowed: above it")
@@ -138,11 +137,3 @@ def viewpoints(reading: Reading) -> Iterator[Finding]:
                 within = [one.name for one in solids if len(one.faces) and inside_solid(at[None], one)[0]]
                 if within:
                     yield Finding(prim.GetPath(), f"stands inside {within[0]}, allowed: in the open")
-
-
-RULES = (
-    Rule("echo:Materials", "Materials have a surface and no loose ends.", materials),
-    Rule("echo:Bindings", "What is seen has a material that is there.", bindings),
-    Rule("echo:Lights", "Some light shines.", lights),
-    Rule("echo:Viewpoints", "Cameras and lamps are above the floor, and cameras in the open.", viewpoints),
-)

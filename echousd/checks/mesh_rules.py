@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Gf, Tf, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.triangles import area_normals
-from echousd.checks.findings import Finding, Rule
+from echousd.checks.findings import UNREADABLE, Finding, rule
 from echousd.checks.geometry_rules import of_others
 from echousd.checks.reading import Reading
-from echousd.stage.encoding import StageError
 from echousd.stage.layouts import ARTICULATION
 from echousd.stage.values import MeshArrays, array
 
@@ -22,90 +21,84 @@ HINT = 0.1  # the same of a component, which has levels of detail
 AGAINST = 0.5  # share of the faces whose normals point the other way
 
 
-def mesh_indices(reading: Reading) -> Iterator[Finding]:
+@rule("echo:MeshIndices", "meshes")
+def mesh_indices(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces have three corners or more, as many in all as there are indices, and indices name points."""
-    for mesh in reading.meshes:
-        try:
-            points = array(mesh.GetPointsAttr(), 3)
-            counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
-            indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True)
-        except (StageError, Tf.ErrorException):  # the rules on values report it
-            continue
-        if len(counts) and counts.min() < 3:
-            yield Finding(mesh.GetPath(), f"a face has {counts.min()} corners, allowed: 3 or more")
-        elif counts.sum() != len(indices):
-            yield Finding(mesh.GetPath(), f"faces ask for {counts.sum()} corners, faceVertexIndices has {len(indices)}")
-        elif len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
-            reach = f"from {indices.min()} to {indices.max()}"
-            yield Finding(mesh.GetPath(), f"faceVertexIndices reach {reach}, allowed: 0 to {len(points) - 1}")
+    points = array(mesh.GetPointsAttr(), 3)
+    counts = array(mesh.GetFaceVertexCountsAttr(), whole=True)
+    indices = array(mesh.GetFaceVertexIndicesAttr(), whole=True)
+    if len(counts) and counts.min() < 3:
+        yield f"a face has {counts.min()} corners, allowed: 3 or more"
+    elif counts.sum() != len(indices):
+        yield f"faces ask for {counts.sum()} corners, faceVertexIndices has {len(indices)}"
+    elif len(indices) and (indices.min() < 0 or indices.max() >= len(points)):
+        yield f"faceVertexIndices reach from {indices.min()} to {indices.max()}, allowed: 0 to {len(points) - 1}"
 
 
-def degenerate(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Degenerate", "meshes")
+def degenerate(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[Finding]:
     """No face uses a point twice or has no area; models of others may, in few faces."""
-    for mesh, arrays in _readable(reading):
-        faces = corners_of(arrays)
-        if not len(faces):
-            continue
-        triangles = arrays.indices[faces]
-        twice = (triangles == np.roll(triangles, 1, axis=1)).any(1)
-        corners = arrays.points[triangles]
-        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
-        flat = twice | (np.linalg.norm(area_normals(corners), axis=1) <= THIN * sides**2)
-        if flat.any():
-            told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
-            yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
+    arrays = reading.mesh(mesh)
+    triangles = arrays.indices[corners_of(arrays)]
+    twice = (triangles == np.roll(triangles, 1, axis=1)).any(1)
+    corners = arrays.points[triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)
+    flat = twice | (np.linalg.norm(area_normals(corners), axis=1) <= THIN * sides**2)
+    if flat.any():
+        told = f"{int(flat.sum())} of {len(flat)} triangles have no area"
+        yield Finding(mesh.GetPath(), told, warning=not twice.any() or of_others(mesh.GetPrim()))
 
 
-def subdivision(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Subdivision", "meshes")
+def subdivision(_reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """A mesh with normals is no subdivision surface: clients would round its edges."""
-    for mesh in reading.meshes:
-        scheme = mesh.GetSubdivisionSchemeAttr()
-        has = UsdGeom.PrimvarsAPI(mesh).HasPrimvar("normals") or mesh.GetNormalsAttr().HasAuthoredValue()
-        if has and scheme.HasAuthoredValue() and scheme.Get() != UsdGeom.Tokens.none:
-            told = f"subdivisionScheme is {scheme.Get()!r} on a mesh with normals, allowed: none"
-            yield Finding(mesh.GetPath(), told)
+    scheme = mesh.GetSubdivisionSchemeAttr()
+    has = UsdGeom.PrimvarsAPI(mesh).HasPrimvar("normals") or mesh.GetNormalsAttr().HasAuthoredValue()
+    if has and scheme.HasAuthoredValue() and scheme.Get() != UsdGeom.Tokens.none:
+        yield f"subdivisionScheme is {scheme.Get()!r} on a mesh with normals, allowed: none"
 
 
-def empty_meshes(reading: Reading) -> Iterator[Finding]:
+@rule("echo:EmptyMeshes", "meshes")
+def empty_meshes(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """A mesh has faces."""
-    for mesh, arrays in _readable(reading):
-        if not len(arrays.counts) and not reading.is_guide(mesh.GetPrim()):
-            yield Finding(mesh.GetPath(), "a mesh without faces")
+    if not len(reading.mesh(mesh).counts) and not reading.is_guide(mesh.GetPrim()):
+        yield "a mesh without faces"
 
 
-def normals(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Normals", "meshes")
+def normals(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Normals have length 1, and are as many as their interpolation asks for."""
-    for mesh, arrays in _readable(reading):
-        reach = _normals_reach(mesh)
-        if reach:
-            yield Finding(mesh.GetPath(), f"primvars:normals:indices reach {reach}")
-            continue
-        found = _normals(mesh)
-        if found is None:
-            continue
-        values, interpolation = found
-        wanted = {
-            UsdGeom.Tokens.constant: 1,
-            UsdGeom.Tokens.uniform: len(arrays.counts),
-            UsdGeom.Tokens.faceVarying: len(arrays.indices),
-        }.get(interpolation, len(arrays.points))
-        if len(values) != wanted:
-            yield Finding(mesh.GetPath(), f"{len(values)} normals, {interpolation} interpolation needs {wanted}")
-            continue
-        length = np.linalg.norm(values, axis=1)
-        wrong = np.abs(length - 1) > UNIT
-        if wrong.any():
-            told = f"{length[wrong][0]:.4g} ({int(wrong.sum())} of {len(length)})"
-            yield Finding(mesh.GetPath(), f"a normal has length {told}, allowed: 1")
+    arrays, reach = reading.mesh(mesh), _normals_reach(mesh)
+    if reach:
+        yield f"primvars:normals:indices reach {reach}"
+        return
+    found = _normals(mesh)
+    if found is None:
+        return
+    values, interpolation = found
+    wanted = {
+        UsdGeom.Tokens.constant: 1,
+        UsdGeom.Tokens.uniform: len(arrays.counts),
+        UsdGeom.Tokens.faceVarying: len(arrays.indices),
+    }.get(interpolation, len(arrays.points))
+    if len(values) != wanted:
+        yield f"{len(values)} normals, {interpolation} interpolation needs {wanted}"
+        return
+    length = np.linalg.norm(values, axis=1)
+    wrong = np.abs(length - 1) > UNIT
+    if wrong.any():
+        yield f"a normal has length {length[wrong][0]:.4g} ({int(wrong.sum())} of {len(length)}), allowed: 1"
 
 
+@rule("echo:Extents")
 def extents(reading: Reading) -> Iterator[Finding]:
     """An extent is the box around the points, a component's hint that around its meshes: clients cull by them."""
     yield from _hints(reading)
-    for mesh, arrays in _readable(reading):
+    for mesh in reading.meshes:
         try:
+            arrays = reading.mesh(mesh)
             extent = array(mesh.GetExtentAttr(), 3) if mesh.GetExtentAttr().HasAuthoredValue() else None
-        except (StageError, Tf.ErrorException):
+        except UNREADABLE:
             continue
         if extent is None or not len(arrays.points):
             continue
@@ -130,7 +123,7 @@ def _hints(reading: Reading) -> Iterator[Finding]:
             if found.IsEmpty() or (hint.shape == (2, 3) and (np.abs(hint - box) <= slack).all()):
                 continue
             still = _still(cache, prim, box)
-        except (StageError, Tf.ErrorException):  # the rules on values report it
+        except UNREADABLE:
             continue
         low, high = np.stack([box, still], 1)  # of what is seen, and of what must be in the hint
         within = hint.shape == (2, 3) and (low[0] - slack <= hint[0]).all() and (hint[1] <= high[0] + slack).all()
@@ -171,30 +164,28 @@ def _placed(prim: Usd.Prim, above: Usd.Prim) -> bool:
     return bool(own and UsdGeom.Xformable(prim).GetXformOpOrderAttr().HasAuthoredValue())
 
 
-def winding(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Winding", "meshes")
+def winding(reading: Reading, mesh: UsdGeom.Mesh) -> Iterator[str]:
     """Faces turn outwards: closed surfaces enclose a positive volume, and faces agree with their normals."""
-    for mesh, arrays in _readable(reading):
-        faces = corners_of(arrays)
-        if not len(faces):
-            continue
-        sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
-        triangles = arrays.points[arrays.indices[faces]]
-        if _closed(arrays.indices[faces]):
-            middle = triangles.mean((0, 1))
-            a, b, c = np.moveaxis(triangles - middle, 1, 0)
-            volume = sign * float((a * np.cross(b, c)).sum()) / 6
-            if volume < 0:
-                yield Finding(mesh.GetPath(), "closed and turned inside out: its faces wind the wrong way round")
-                continue
-        found = _normals(mesh)
-        if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
-            continue
-        cross = sign * area_normals(triangles)
-        agree = (cross * found[0][faces].sum(1)).sum(1)
-        area = np.linalg.norm(cross, axis=1)
-        if area.sum() > 0 and area[agree < 0].sum() > AGAINST * area.sum():
-            share = area[agree < 0].sum() / area.sum()
-            yield Finding(mesh.GetPath(), f"{share:.0%} of its surface winds against its normals, allowed: outwards")
+    arrays = reading.mesh(mesh)
+    faces = corners_of(arrays)
+    if not len(faces):
+        return
+    sign = -1.0 if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded else 1.0
+    triangles = arrays.points[arrays.indices[faces]]
+    if _closed(arrays.indices[faces]):
+        a, b, c = np.moveaxis(triangles - triangles.mean((0, 1)), 1, 0)
+        if sign * float((a * np.cross(b, c)).sum()) < 0:
+            yield "closed and turned inside out: its faces wind the wrong way round"
+            return
+    found = _normals(mesh)
+    if found is None or found[1] != UsdGeom.Tokens.faceVarying or len(found[0]) != len(arrays.indices):
+        return
+    cross = sign * area_normals(triangles)
+    against = (cross * found[0][faces].sum(1)).sum(1) < 0
+    area = np.linalg.norm(cross, axis=1)
+    if area[against].sum() > AGAINST * area.sum() > 0:
+        yield f"{area[against].sum() / area.sum():.0%} of its surface winds against its normals, allowed: outwards"
 
 
 def corners_of(arrays: MeshArrays) -> np.ndarray:
@@ -204,13 +195,6 @@ def corners_of(arrays: MeshArrays) -> np.ndarray:
     start = np.repeat(first, fans)
     step = np.arange(len(start)) - np.repeat(np.cumsum(fans) - fans, fans)
     return np.stack([start, start + step + 1, start + step + 2], 1)
-
-
-def _readable(reading: Reading) -> Iterator[tuple[UsdGeom.Mesh, MeshArrays]]:
-    for mesh in reading.meshes:
-        arrays = reading.mesh(mesh)
-        if arrays is not None:
-            yield mesh, arrays
 
 
 def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:
@@ -223,7 +207,7 @@ def _normals(mesh: UsdGeom.Mesh) -> tuple[np.ndarray, str] | None:
             return values, primvar.GetInterpolation()
         if mesh.GetNormalsAttr().HasAuthoredValue():
             return array(mesh.GetNormalsAttr(), 3), mesh.GetNormalsInterpolation()
-    except (StageError, Tf.ErrorException, IndexError):
+    except (*UNREADABLE, IndexError):
         pass
     return None
 
@@ -235,7 +219,7 @@ def _normals_reach(mesh: UsdGeom.Mesh) -> str:
         if not primvar or not primvar.IsIndexed():
             return ""
         count, index = len(array(primvar.GetAttr(), 3)), array(primvar.GetIndicesAttr(), whole=True)
-    except (StageError, Tf.ErrorException):  # the rules on values report it
+    except UNREADABLE:
         return ""
     if not len(index) or (index.min() >= 0 and index.max() < count):
         return ""
@@ -252,14 +236,3 @@ def _closed(faces: np.ndarray) -> bool:
 
 def _shown(box: np.ndarray) -> str:
     return " to ".join("(" + ", ".join(f"{value:.4g}" for value in row) + ")" for row in box)
-
-
-RULES = (
-    Rule("echo:MeshIndices", "The faces of meshes can be made of their points.", mesh_indices),
-    Rule("echo:Degenerate", "Faces have an area.", degenerate),
-    Rule("echo:Subdivision", "What has normals is no subdivision surface.", subdivision),
-    Rule("echo:EmptyMeshes", "Meshes have faces.", empty_meshes),
-    Rule("echo:Normals", "Normals have length 1 and are as many as needed.", normals),
-    Rule("echo:Extents", "Extents are the boxes around the points.", extents),
-    Rule("echo:Winding", "Faces turn outwards and agree with their normals.", winding),
-)

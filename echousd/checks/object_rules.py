@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from pxr import Kind, Tf, Usd, UsdGeom
+from pxr import Kind, Usd, UsdGeom
 
 from echomodel.dressing import SMALL
-from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.findings import UNREADABLE, Finding, applied, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage import encoding as usd
 from echousd.stage.contents import components, is_seen, room_frame
-from echousd.stage.encoding import StageError
 from echousd.stage.labels import known_category
 from echousd.stage.read import RoomPrims, value
 from echousd.stage.taxonomy import SHELL
-from echousd.stage.values import matrix, texts
+from echousd.stage.values import texts
 
 UPRIGHT = 0.5  # cosine of the angle between an object's up and the room's
 SIZE = 0.05, 0.1  # metres, and share of the stated size: differences below either are none
@@ -25,56 +24,40 @@ FLOOR = usd.FLOOR_SIZE, usd.FLOOR_POLYGON
 TURN = np.radians(15)
 
 
+@rule("echo:Upright")
 def upright(reading: Reading) -> Iterator[Finding]:
     """Objects stand the right way up: their own +Y (or +Z) points upwards in the room."""
-    cache = reading.cache
     for room in reading.rooms:
-        to_room = room_frame(room.room, cache)
-        for prim in room.nodes:
-            ups = _ups(prim, to_room, cache)
-            if ups is not None and ups.max() < UPRIGHT:
+        to_room = room_frame(room.room, reading.cache)
+        for prim in (*room.nodes, *components(room)):
+            try:
+                own = to_room @ reading.world(prim)
+            except UNREADABLE:
+                continue
+            length = np.linalg.norm(own[:3, 1:3], axis=0)
+            if (length < 1e-9).any():
+                continue
+            ups = own[1, 1:3] / length  # cosines of the angles between the room's up and its own +Y and +Z
+            if prim in room.nodes and ups.max() < UPRIGHT:
                 angle = np.degrees(np.arccos(np.clip(ups.max(), -1, 1)))
                 yield Finding(prim.GetPath(), f"leans by {angle:.0f} degrees, allowed: upright")
-        for prim in components(room):
-            ups = _ups(prim, to_room, cache)
-            if ups is not None and ups[0] < -UPRIGHT and ups[1] < UPRIGHT:
+            elif prim not in room.nodes and ups[0] < -UPRIGHT and ups[1] < UPRIGHT:
                 yield Finding(prim.GetPath(), "stands on its head, allowed: its own +Y (or +Z) upwards")
 
 
-def _ups(prim: Usd.Prim, to_room: np.ndarray, cache: UsdGeom.XformCache) -> np.ndarray | None:
-    """(2,) float, cosines of the angles between the room's up and a prim's own +Y and +Z; None = it has no axes."""
-    try:
-        own = to_room @ matrix(cache.GetLocalToWorldTransform(prim), prim)
-    except (StageError, Tf.ErrorException):  # the rules on values report it
-        return None
-    length = np.linalg.norm(own[:3, 1:3], axis=0)
-    return None if (length < 1e-9).any() else own[1, 1:3] / length
-
-
-def one_label(reading: Reading) -> Iterator[Finding]:
+@rule("echo:OneLabel", "labelled")
+def one_label(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """An object has one label of the taxonomy `category`, and it is the category that the graph states."""
-    for room in reading.rooms:
-        for prim in room.nodes:
-            try:
-                words = texts(prim.GetAttribute(usd.LABELS))
-                category = value(prim, usd.CATEGORY)
-            except (StageError, Tf.ErrorException):
-                continue
-            if len(words) > 1:
-                yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
-            elif words and words[0] == value(prim, f"{usd.FREE}{OBSTACLE}"):
-                continue
-            elif words and isinstance(category, str) and known_category(words[0]) != known_category(category):
-                yield Finding(prim.GetPath(), f"{usd.LABELS} is {words[0]!r}, {usd.CATEGORY} {category!r}")
-        for prim in components(room):
-            try:
-                words = texts(prim.GetAttribute(usd.LABELS))
-            except (StageError, Tf.ErrorException):
-                continue
-            if len(words) > 1:
-                yield Finding(prim.GetPath(), f"{usd.LABELS} is {', '.join(words)}, allowed: one word")
+    words, category = texts(prim.GetAttribute(usd.LABELS)), value(prim, usd.CATEGORY)
+    if len(words) > 1:
+        yield f"{usd.LABELS} is {', '.join(words)}, allowed: one word"
+    elif not words or prim not in reading.nodes or words[0] == value(prim, f"{usd.FREE}{OBSTACLE}"):
+        return
+    elif isinstance(category, str) and known_category(words[0]) != known_category(category):
+        yield f"{usd.LABELS} is {words[0]!r}, {usd.CATEGORY} {category!r}"
 
 
+@rule("echo:StatedBoxes")
 def stated_boxes(reading: Reading) -> Iterator[Finding]:
     """Geometry is as large and turned as the graph states."""
     for room in reading.rooms:
@@ -100,6 +83,7 @@ def _states(prim: Usd.Prim, names: tuple[str, ...]) -> bool:
     return any(prim.GetAttribute(name).HasAuthoredValue() for name in names if prim.HasAttribute(name))
 
 
+@rule("echo:Floor")
 def floors(reading: Reading) -> Iterator[Finding]:
     """Every room with objects has a floor, stated by its graph or as labelled geometry; nobody switched it off."""
     for prim in reading.inactive:
@@ -125,25 +109,25 @@ def _has_floor(room: RoomPrims, reading: Reading) -> bool:
 def _words(prim: Usd.Prim) -> tuple[str, ...]:
     try:
         return texts(prim.GetAttribute(usd.LABELS))
-    except (StageError, Tf.ErrorException):
+    except UNREADABLE:
         return ()
 
 
-def some_label(reading: Reading) -> Iterator[Finding]:
+@rule("echo:SomeLabel", "distinct")
+def some_label(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """A prim that carries semantics labels has one of each taxonomy that it applies."""
-    for prim in reading.distinct:
-        for schema in applied(prim):
-            kind, taxonomy = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)
-            attribute = prim.GetAttribute(f"semantics:labels:{taxonomy}")
-            if kind == "SemanticsLabelsAPI" and not (attribute and attribute.Get()):
-                told = f"semantics:labels:{taxonomy} is empty, allowed: a word"
-                yield Finding(prim.GetPath(), told)
+    for schema in applied(prim):
+        kind, taxonomy = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)
+        attribute = prim.GetAttribute(f"semantics:labels:{taxonomy}")
+        if kind == "SemanticsLabelsAPI" and not (attribute and attribute.Get()):
+            yield f"semantics:labels:{taxonomy} is empty, allowed: a word"
 
 
+@rule("echo:Kinds")
 def kinds(reading: Reading) -> Iterator[Finding]:
     """Kinds are known; components lie below groups and not in one another; furniture is components."""
-    nodes = {prim.GetPath() for room in reading.rooms for prim in room.nodes}
-    modelled = any(_kind(prim) == "component" for room in reading.rooms for prim in room.nodes)
+    nodes = {prim.GetPath() for prim in reading.nodes}
+    modelled = any(_kind(prim) == "component" for prim in reading.nodes)
     groups = {prim.GetParent() for prim in reading.prims if _kind(prim) == "component"}
     groups = {prim for prim in groups if _kind(prim) == "group"}
     for prim in reading.prims:
@@ -173,15 +157,15 @@ def _kind(prim: Usd.Prim) -> str:
     return str(prim.GetMetadata("kind") or "")
 
 
-def hidden(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Hidden", "nodes")
+def hidden(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Something is seen of an object that has surfaces at all."""
-    for room in reading.rooms:
-        for prim in room.nodes:
-            surfaces = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
-            if surfaces and not any(map(is_seen, surfaces)):
-                yield Finding(prim.GetPath(), "nothing of it is seen: its surfaces are invisible or guides")
+    surfaces = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
+    if surfaces and not any(map(is_seen, surfaces)):
+        yield "nothing of it is seen: its surfaces are invisible or guides"
 
 
+@rule("echo:Strangers")
 def strangers(reading: Reading) -> Iterator[Finding]:
     """Furniture that no graph knows stands in no room that has one."""
     for room in reading.rooms:
@@ -193,15 +177,3 @@ def strangers(reading: Reading) -> Iterator[Finding]:
 
 def _shown(size: object) -> str:
     return " x ".join(f"{length:.3g}" for length in np.asarray(size))
-
-
-RULES = (
-    Rule("echo:Upright", "Objects stand the right way up.", upright),
-    Rule("echo:OneLabel", "Objects have one label, that of their category.", one_label),
-    Rule("echo:StatedBoxes", "Geometry is as large and turned as the graph states.", stated_boxes),
-    Rule("echo:Floor", "Rooms have floors.", floors),
-    Rule("echo:SomeLabel", "Taxonomies that are applied have a word.", some_label),
-    Rule("echo:Kinds", "Kinds are known, and components lie below groups.", kinds),
-    Rule("echo:Hidden", "Objects are seen.", hidden),
-    Rule("echo:Strangers", "All furniture is in the graph.", strangers),
-)

@@ -8,11 +8,11 @@ import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics
 
 from echomodel.vocabulary import vocabulary
-from echousd.checks.findings import Finding, Rule
+from echousd.checks.findings import UNREADABLE, Finding, rule
 from echousd.checks.reading import Reading, below
 from echousd.graph.nodes import OBSTACLE
 from echousd.stage.contents import triangulated
-from echousd.stage.encoding import CATEGORY, FREE, LABELS, StageError
+from echousd.stage.encoding import CATEGORY, FREE, LABELS
 from echousd.stage.read import value
 from echousd.stage.units import up_axis
 from echousd.stage.values import array, targets, texts
@@ -26,45 +26,34 @@ OFF = 0.25  # metres between the boxes of geometry and colliders, which are hull
 CONCAVE = (UsdPhysics.Tokens.none, UsdPhysics.Tokens.meshSimplification)
 
 
-def nested_bodies(reading: Reading) -> Iterator[Finding]:
+@rule("echo:NestedBodies", "prims", UsdPhysics.RigidBodyAPI)
+def nested_bodies(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """No rigid body lies below another one, unless it resets the transform stack."""
-    for prim in reading.prims:
-        if not prim.HasAPI(UsdPhysics.RigidBodyAPI) or UsdGeom.Xformable(prim).GetResetXformStack():
-            continue
-        above = _body_above(prim.GetParent())
-        if above:
-            yield Finding(
-                prim.GetPath(), f"a rigid body inside the rigid body <{above.GetPath()}>, allowed: side by side"
-            )
+    above = None if UsdGeom.Xformable(prim).GetResetXformStack() else _body_above(prim.GetParent())
+    if above:
+        yield f"a rigid body inside the rigid body <{above.GetPath()}>, allowed: side by side"
 
 
-def dynamic_colliders(reading: Reading) -> Iterator[Finding]:
+@rule("echo:DynamicColliders", "prims", UsdPhysics.CollisionAPI)
+def dynamic_colliders(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """What moves collides with hulls or primitives: engines refuse triangle meshes on dynamic bodies."""
-    for prim in reading.prims:
-        if not prim.IsA(UsdGeom.Mesh) or not prim.HasAPI(UsdPhysics.CollisionAPI):
-            continue
-        body = _body_above(prim)
-        if not body or not _dynamic(UsdPhysics.RigidBodyAPI(body)):
-            continue
-        shape = UsdPhysics.MeshCollisionAPI(prim)
-        kind = (
-            shape.GetApproximationAttr().Get() if prim.HasAPI(UsdPhysics.MeshCollisionAPI) else UsdPhysics.Tokens.none
+    body = _body_above(prim) if prim.IsA(UsdGeom.Mesh) else None
+    if not body or not _dynamic(UsdPhysics.RigidBodyAPI(body)):
+        return
+    told = prim.HasAPI(UsdPhysics.MeshCollisionAPI)
+    kind = UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() if told else UsdPhysics.Tokens.none
+    if kind in CONCAVE:
+        yield (
+            f"physics:approximation is {kind!r} on a collider of the dynamic body <{body.GetPath()}>, "
+            "allowed: convexHull, convexDecomposition, boundingCube, boundingSphere"
         )
-        if kind in CONCAVE:
-            yield Finding(
-                prim.GetPath(),
-                f"physics:approximation is {kind!r} on a collider of the dynamic body <{body.GetPath()}>, "
-                "allowed: convexHull, convexDecomposition, boundingCube, boundingSphere",
-            )
 
 
+@rule("echo:Colliders")
 def colliders(reading: Reading) -> Iterator[Finding]:
     """Every rigid body has colliders, and they fill the same box as its geometry."""
-    bodies = False
-    for prim in reading.prims:
-        if not prim.HasAPI(UsdPhysics.RigidBodyAPI):
-            continue
-        bodies = True
+    bodies = [prim for prim in reading.prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    for prim in bodies:
         shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim)]
         solid = [found for found in shapes if _collides(found)]
         if shapes and not solid and not _collides(prim):
@@ -73,7 +62,7 @@ def colliders(reading: Reading) -> Iterator[Finding]:
         seen = [found for found in shapes if not reading.is_guide(found)]
         try:
             boxes = [_bounds(gprims, reading) for gprims in (seen, solid)]
-        except (StageError, Tf.ErrorException):  # the rules on values report it
+        except UNREADABLE:
             continue
         if boxes[0] is None or boxes[1] is None:
             continue
@@ -89,7 +78,7 @@ def _bare_shell(reading: Reading) -> Iterator[Finding]:
     for prim in reading.prims:
         try:
             words = texts(prim.GetAttribute(LABELS))
-        except (StageError, Tf.ErrorException):  # the rules on values report it
+        except UNREADABLE:
             continue
         if not {"floor", "wall"} & set(words):
             continue
@@ -121,64 +110,56 @@ def _bounds(gprims: list[Usd.Prim], reading: Reading) -> np.ndarray | None:
     return np.stack([np.min(corners, 0), np.max(corners, 0)]) if corners else None
 
 
-def gravity(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Gravity", "prims", UsdPhysics.Scene)
+def gravity(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """Gravity points down."""
-    up = np.array([0.0, 0, 1] if up_axis(reading.stage) == UsdGeom.Tokens.z else [0.0, 1, 0])
-    for prim in reading.prims:
-        if prim.GetTypeName() != "PhysicsScene":
-            continue
-        try:
-            direction = array(prim.GetAttribute("physics:gravityDirection"))
-        except (StageError, Tf.ErrorException):
-            continue
-        length = float(np.linalg.norm(direction))
-        if direction.shape == (3,) and length > 0 and direction @ up > -DOWN * length:  # (0, 0, 0) = downwards
-            shown = ", ".join(f"{value:g}" for value in direction)
-            axis = up_axis(reading.stage)
-            yield Finding(prim.GetPath(), f"gravity points along ({shown}), allowed: downwards on a {axis}-up stage")
+    axis = up_axis(reading.stage)
+    up = np.array([0.0, 0, 1] if axis == UsdGeom.Tokens.z else [0.0, 1, 0])
+    direction = array(prim.GetAttribute("physics:gravityDirection"))
+    length = float(np.linalg.norm(direction))
+    if direction.shape == (3,) and length > 0 and direction @ up > -DOWN * length:  # (0, 0, 0) = downwards
+        shown = ", ".join(f"{value:g}" for value in direction)
+        yield f"gravity points along ({shown}), allowed: downwards on a {axis}-up stage"
 
 
-def masses(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Masses", "prims", UsdPhysics.MassAPI)
+def masses(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """A body weighs no more than stone, its centre is within its geometry, its inertia that of something."""
-    for prim in reading.prims:
-        if not prim.HasAPI(UsdPhysics.MassAPI) or prim.IsInstanceProxy():
-            continue
-        told = UsdPhysics.MassAPI(prim)
-        mass, centre = told.GetMassAttr().Get(), told.GetCenterOfMassAttr()
-        shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim) and not reading.is_guide(found)]
-        try:
-            box = _bounds(shapes, reading)
-            world = reading.world(prim)
-            at = world[:3, :3] @ np.array(centre.Get(), float) + world[:3, 3] if centre.HasAuthoredValue() else None
-        except (StageError, Tf.ErrorException, TypeError):  # the rules on values report it
-            continue
-        if box is None:
-            continue
-        box = box * reading.metres
-        volume = float(np.prod(np.maximum(box[1] - box[0], 1e-3)))
-        if isinstance(mass, float) and mass > HEAVY * volume + 1:
-            most = HEAVY * volume + 1
-            yield Finding(
-                prim.GetPath(), f"physics:mass is {mass:g} kg in a box of {volume:.3g} m³, allowed: {most:.3g}"
-            )
-        if at is not None and np.isfinite(at).all():
-            off = float(np.maximum(box[0] - at * reading.metres, at * reading.metres - box[1]).max())
-            if off > APART:
-                yield Finding(prim.GetPath(), f"its centre of mass lies {off:.2g} m outside its geometry")
-        yield from _inertia(prim, told)
+    if prim.IsInstanceProxy():
+        return
+    told = UsdPhysics.MassAPI(prim)
+    mass, centre = told.GetMassAttr().Get(), told.GetCenterOfMassAttr()
+    shapes = [found for found in below(prim) if found.IsA(UsdGeom.Gprim) and not reading.is_guide(found)]
+    box = _bounds(shapes, reading)
+    world = reading.world(prim)
+    if box is None:
+        return
+    box = box * reading.metres
+    volume = float(np.prod(np.maximum(box[1] - box[0], 1e-3)))
+    most = HEAVY * volume + 1
+    if isinstance(mass, float) and mass > most:
+        yield f"physics:mass is {mass:g} kg in a box of {volume:.3g} m³, allowed: {most:.3g}"
+    local = array(centre) if centre.HasAuthoredValue() else np.zeros(0)
+    if local.shape == (3,) and np.isfinite(local).all():
+        at = (world[:3, :3] @ local + world[:3, 3]) * reading.metres
+        off = float(np.maximum(box[0] - at, at - box[1]).max())
+        if off > APART:
+            yield f"its centre of mass lies {off:.2g} m outside its geometry"
+    yield from _inertia(told)
 
 
-def _inertia(prim: Usd.Prim, told: UsdPhysics.MassAPI) -> Iterator[Finding]:
+def _inertia(told: UsdPhysics.MassAPI) -> Iterator[str]:
     inertia, axes = told.GetDiagonalInertiaAttr().Get(), told.GetPrincipalAxesAttr()
     if inertia is not None and 2 * max(inertia) > sum(inertia) * (1 + SLACK):
         shown = ", ".join(f"{value:g}" for value in inertia)
-        yield Finding(prim.GetPath(), f"physics:diagonalInertia is {shown}, allowed: none larger than both others")
+        yield f"physics:diagonalInertia is {shown}, allowed: none larger than both others"
     turn = axes.Get() if axes.HasAuthoredValue() else None
     length = 0.0 if turn is None else turn.GetLength()
     if length > 0 and abs(length - 1) > SLACK:  # (0, 0, 0, 0) = as the engine finds
-        yield Finding(prim.GetPath(), f"physics:principalAxes has length {length:.3g}, allowed: 1")
+        yield f"physics:principalAxes has length {length:.3g}, allowed: 1"
 
 
+@rule("echo:FixedFurniture")
 def fixed_furniture(reading: Reading) -> Iterator[Finding]:
     """Where most pieces of a room are bodies, all that stand on a floor or a table are, and can move."""
     for room in reading.rooms:
@@ -196,12 +177,13 @@ def _stands(prim: Usd.Prim) -> bool:
     """Whether a node is furniture that stands somewhere, rather than hangs or is an obstacle."""
     try:
         word = value(prim, CATEGORY)
-    except (StageError, Tf.ErrorException):
+    except UNREADABLE:
         return False
     row = vocabulary().known_category(word) if isinstance(word, str) else None
     return row is not None and row.support in ("floor", "table") and not value(prim, f"{FREE}{OBSTACLE}")
 
 
+@rule("echo:PhysicsScene")
 def scenes(reading: Reading) -> Iterator[Finding]:
     """What has bodies has a physics scene that nobody switched off."""
     off = [prim for prim in reading.inactive if prim.GetTypeName() == "PhysicsScene"]
@@ -209,27 +191,25 @@ def scenes(reading: Reading) -> Iterator[Finding]:
         yield Finding(off[0].GetPath(), "the physics scene is deactivated: engines take gravity of their own, or none")
 
 
-def joints(reading: Reading) -> Iterator[Finding]:
+@rule("echo:Joints", "prims", UsdPhysics.Joint)
+def joints(reading: Reading, prim: Usd.Prim) -> Iterator[str]:
     """A joint holds two different prims that are there, at one place, and its limits leave it room."""
-    for prim in reading.prims:
-        if not prim.IsA(UsdPhysics.Joint):
-            continue
-        ends = [targets(prim, f"physics:body{number}") for number in (0, 1)]
-        for number, found in enumerate(ends):
-            for path in found:
-                if not reading.stage.GetPrimAtPath(path):
-                    yield Finding(prim.GetPath(), f"physics:body{number} points to <{path}>, where no prim is")
-        if not any(ends):
-            yield Finding(prim.GetPath(), "a joint that holds nothing, allowed: physics:body0 or physics:body1")
-        elif ends[0] == ends[1]:
-            yield Finding(prim.GetPath(), f"holds <{ends[0][0]}> to itself, allowed: two different prims")
-        low, high = (prim.GetAttribute(f"physics:{word}Limit").Get() for word in ("lower", "upper"))
-        if low is not None and high is not None and low > high:
-            yield Finding(prim.GetPath(), f"its limits are {low:g} to {high:g}, allowed: from the lower to the upper")
-        if all(ends) and ends[0] != ends[1]:
-            apart = _anchors_apart(prim, ends, reading)
-            if apart is not None and apart > APART:
-                yield Finding(prim.GetPath(), f"its anchors are {apart:.2g} m apart, allowed: {APART:g} m")
+    ends = [targets(prim, f"physics:body{number}") for number in (0, 1)]
+    for number, found in enumerate(ends):
+        for path in found:
+            if not reading.stage.GetPrimAtPath(path):
+                yield f"physics:body{number} points to <{path}>, where no prim is"
+    if not any(ends):
+        yield "a joint that holds nothing, allowed: physics:body0 or physics:body1"
+    elif ends[0] == ends[1]:
+        yield f"holds <{ends[0][0]}> to itself, allowed: two different prims"
+    low, high = (prim.GetAttribute(f"physics:{word}Limit").Get() for word in ("lower", "upper"))
+    if low is not None and high is not None and low > high:
+        yield f"its limits are {low:g} to {high:g}, allowed: from the lower to the upper"
+    if all(ends) and ends[0] != ends[1]:
+        apart = _anchors_apart(prim, ends, reading)
+        if apart is not None and apart > APART:
+            yield f"its anchors are {apart:.2g} m apart, allowed: {APART:g} m"
 
 
 def _anchors_apart(joint: Usd.Prim, ends: list[list[Sdf.Path]], reading: Reading) -> float | None:
@@ -240,10 +220,7 @@ def _anchors_apart(joint: Usd.Prim, ends: list[list[Sdf.Path]], reading: Reading
     places = []
     for number, body in enumerate(bodies):
         local = joint.GetAttribute(f"physics:localPos{number}").Get()
-        try:
-            world = reading.world(body)
-        except (StageError, Tf.ErrorException):
-            return None
+        world = reading.world(body)
         places.append(world[:3, :3] @ np.array(local if local is not None else (0, 0, 0), float) + world[:3, 3])
     return float(np.linalg.norm(places[0] - places[1])) * reading.metres
 
@@ -259,15 +236,3 @@ def _body_above(prim: Usd.Prim) -> Usd.Prim | None:
 def _dynamic(body: UsdPhysics.RigidBodyAPI) -> bool:
     enabled = body.GetRigidBodyEnabledAttr().Get()
     return enabled is not False and not body.GetKinematicEnabledAttr().Get()
-
-
-RULES = (
-    Rule("echo:NestedBodies", "No rigid body lies inside another one.", nested_bodies),
-    Rule("echo:DynamicColliders", "Dynamic bodies have no triangle-mesh colliders.", dynamic_colliders),
-    Rule("echo:Colliders", "Rigid bodies have colliders, where their geometry is.", colliders),
-    Rule("echo:Gravity", "Gravity points down.", gravity),
-    Rule("echo:Masses", "Bodies weigh what such things can, and where they are.", masses),
-    Rule("echo:FixedFurniture", "Furniture that stands is a body among bodies.", fixed_furniture),
-    Rule("echo:PhysicsScene", "The physics scene is active.", scenes),
-    Rule("echo:Joints", "Joints hold two prims at one place, within limits.", joints),
-)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pxr import Tf, Usd
 
-from echousd.checks.findings import Finding, Rule, applied
+from echousd.checks.findings import RULES, Finding, Rule, applied
 from echousd.checks.reading import Reading
 
 UNLIMITED = float("inf")
@@ -151,9 +152,10 @@ def _numbers(attribute: Usd.Attribute) -> np.ndarray:
     return np.zeros(0) if np.isnan(found).any() else found
 
 
-RULES = (
-    Rule(PHYSICS, "Masses, frictions, gravity, drives are ones that can be.", lambda r: out_of_range(r, PHYSICS)),
-    Rule(LOOK, "Colours, roughness and opacity are ones that can be seen.", lambda r: out_of_range(r, LOOK)),
-    Rule(LIGHT, "Lights have an intensity, a colour and a size.", lambda r: out_of_range(r, LIGHT)),
-    Rule(CAMERA, "Cameras have a lens, a film and something before them.", lambda r: out_of_range(r, CAMERA)),
-)
+for _name, _doc in (
+    (PHYSICS, "Masses, frictions, gravity, drives are ones that can be."),
+    (LOOK, "Colours, roughness and opacity are ones that can be seen."),
+    (LIGHT, "Lights have an intensity, a colour and a size."),
+    (CAMERA, "Cameras have a lens, a film and something before them."),
+):
+    RULES.append(Rule(_name, _doc, partial(out_of_range, rule=_name)))

@@ -7,9 +7,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils
+from pxr import Sdf, Usd, UsdGeom, UsdUtils
 
-from echousd.stage.contents import HIDDEN, RoomContents, read_contents
+from echousd.stage.contents import HIDDEN, RoomContents, components, read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.read import RoomPrims, find_rooms
 from echousd.stage.units import metres_per_unit
@@ -61,12 +61,27 @@ class Reading:
         return [attribute for prim in self.distinct for attribute in prim.GetAuthoredAttributes()]
 
     @cached_property
+    def primvars(self) -> set[str]:
+        """Names of all primvars that somebody authored."""
+        return {attribute.GetName().partition(":")[2] for attribute in self.authored}
+
+    @cached_property
     def rooms(self) -> list[RoomPrims]:
         """The rooms; none where they cannot be told, which echo:EdgeTargets reports."""
         try:
             return find_rooms(self.stage)
         except StageError:
             return []
+
+    @cached_property
+    def nodes(self) -> list[Usd.Prim]:
+        """The objects of all rooms' graphs."""
+        return [prim for room in self.rooms for prim in room.nodes]
+
+    @cached_property
+    def labelled(self) -> list[Usd.Prim]:
+        """The objects of all rooms' graphs, and what else carries labels in these rooms."""
+        return [*self.nodes, *(prim for room in self.rooms for prim in components(room))]
 
     @cached_property
     def named_files(self) -> dict[Sdf.Layer, list[str]]:
@@ -87,16 +102,9 @@ class Reading:
         """(4, 4) float, column vectors, prim to world; raises StageError where it is not finite."""
         return self.once("world", prim, lambda: matrix(self.cache.GetLocalToWorldTransform(prim), prim))
 
-    def mesh(self, mesh: UsdGeom.Mesh) -> MeshArrays | None:
-        """Points and faces of a mesh, None where they cannot be read, which the rules on values report."""
-
-        def read() -> MeshArrays | None:
-            try:
-                return mesh_arrays(mesh)
-            except (StageError, Tf.ErrorException):
-                return None
-
-        return self.once("mesh", mesh.GetPrim(), read)
+    def mesh(self, mesh: UsdGeom.Mesh) -> MeshArrays:
+        """Points and faces of a mesh; raises StageError or Tf.ErrorException where they cannot be read."""
+        return self.once("mesh", mesh.GetPrim(), lambda: mesh_arrays(mesh))
 
     def is_guide(self, prim: Usd.Prim) -> bool:
         """Whether a prim is there for tools rather than for the eye (purpose guide or proxy)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -9,37 +10,15 @@ from typing import Any
 from pxr import Plug, Sdf, Tf, Usd, UsdUtils
 
 import echousd
-from echousd.checks import (
-    file_rules,
-    geometry_rules,
-    graph_rules,
-    label_rules,
-    look_rules,
-    mesh_rules,
-    object_rules,
-    physics_rules,
-    ranges,
-    value_rules,
-)
-from echousd.checks.findings import Finding, Rule
+from echousd.checks.findings import RULES, Finding, Rule
 from echousd.checks.reading import Reading
 from echousd.stage.encoding import StageError
 from echousd.stage.files import said
 from echousd.stage.layouts import ARTICULATED, ARTICULATION, showing_variant
 
-FAMILIES = (
-    graph_rules,
-    object_rules,
-    label_rules,
-    look_rules,
-    geometry_rules,
-    mesh_rules,
-    physics_rules,
-    file_rules,
-    ranges,
-    value_rules,
-)
-RULES: tuple[Rule, ...] = tuple(rule for family in FAMILIES for rule in family.RULES)
+FAMILIES = ("graph", "object", "label", "look", "geometry", "mesh", "physics", "file", "value")
+for family in (*(f"{family}_rules" for family in FAMILIES), "ranges"):
+    importlib.import_module(f"echousd.checks.{family}")  # its rules enter the table
 JOINED = tuple(rule for rule in RULES if rule.name in ("echo:Joints", "echo:PhysicsValues"))
 KEYWORD = "EchoUSD"
 ALONE = "echo:Validators"
