@@ -72,16 +72,13 @@ def network(request: BatchRequest, folder: Path) -> tuple[float, float, float]:
             work.Job(e.id, str(folder / e.path), e.seed, plan.options[0], draw=e.draw, store=str(folder / "store"))
             for e in pack
         ]
-        while jobs:
-            began = time.process_time()
-            found = work.layouts(jobs)
-            packed += time.process_time() - began
-            jobs = [replace(job, text=new.text, rounds=new.rounds) for job, new in zip(jobs, found, strict=True)]
-            began = time.process_time()
-            made = [work.room(job) for job in jobs]
-            rooms += time.process_time() - began
-            again = [(job, best) for job, best in zip(jobs, made, strict=True) if isinstance(best, work.Best)]
-            jobs = [replace(job, best=best) for job, best in again]
+        began = time.process_time()
+        found = work.layouts(jobs)
+        packed += time.process_time() - began
+        began = time.process_time()
+        for job, new in zip(jobs, found, strict=True):
+            work.room(replace(job, text=new.text, first=new.first))
+        rooms += time.process_time() - began
     count = len(plan.entries)
     return packed / count, spent[0] / count, (packed + rooms) / count
 

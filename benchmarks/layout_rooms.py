@@ -6,7 +6,7 @@ Wanted: at most 1 s in a cold run of 12 objects and at most 60 ms a room in batc
 busy machine changes those least; beside them what they are in matrix products of 2048 x 2048 on the same machine.
 `cold`: new processes that import, load the model and lay out one graph as `generate` does, the graphs of 12 objects in
 turns; the median of each part. `batch`: rooms of the room generator as `echousd batch` samples them, in one process,
-packed, with further rounds of drafts for those that want them.
+the first drafts packed, further ones alone for those that want them.
 """
 
 from __future__ import annotations
@@ -148,40 +148,27 @@ def batch(rooms: int, first: int, product: float) -> None:
     from echomodel.loading import load_model
     from echousd.batches.sources import sampled_graph
     from echousd.graph.floors import with_plan
-    from echousd.make.layouts import BestDraft, DraftsWanted, Drawn, Draws, best_boxes, most_drafts
-    from echousd.make.packed import sample_round
+    from echousd.make.layouts import Draws, best_boxes, most_drafts
+    from echousd.make.packed import first_drafts
     from echousd.progress import StageTimer
     from echousd.shapes.styles import style_groups
 
     model = load_model(None)
     graphs = [sampled_graph(TYPES[n % len(TYPES)], first, n // len(TYPES), 1.0) for n in range(rooms)]
-    drawn: list[tuple[Any, ...]] = [()] * rooms
-    best: list[BestDraft | None] = [None] * rooms
+    seeds = [first + number for number in range(rooms)]
     drafts = [most_drafts(model, len(graph.nodes)) for graph in graphs]
-    left, sampled, rounds = list(range(rooms)), 0, 0
     alone = sum(best_of_one(model, graph, first) for graph in graphs[:6]) / 6  # and warms
     with parted() as spent:
         began = time.process_time()
-        while left:
-            found = sample_round(
-                model, [graphs[i] for i in left], [first + i for i in left], [drafts[i] for i in left], number=rounds
-            )
-            again = []
-            for i, given in zip(left, found, strict=True):
-                drawn[i], sampled = (*drawn[i], given), sampled + len(given)
-                planned = with_plan(graphs[i], first + i)
-                try:
-                    best_boxes(
-                        model, planned, style_groups(planned), Draws(first + i), drafts=drafts[i],
-                        drawn=Drawn(drawn[i], elsewhere=True, best=best[i]), proposed=True, timer=StageTimer(),
-                    )  # fmt: skip
-                except DraftsWanted as wanted:
-                    best[i] = wanted.best
-                    again.append(i)
-            left, rounds = again, rounds + 1
+        for graph, seed, most, draft in zip(graphs, seeds, drafts, first_drafts(model, graphs, seeds), strict=True):
+            planned = with_plan(graph, seed)
+            best_boxes(
+                model, planned, style_groups(planned), Draws(seed), drafts=most, first=draft, proposed=True,
+                timer=StageTimer(),
+            )  # fmt: skip
         whole = time.process_time() - began
     objects = sum(len(graph.nodes) for graph in graphs)
-    print(f"batch of {rooms} rooms, {objects} objects: {sampled} drafts in at most {rounds} rounds")
+    print(f"batch of {rooms} rooms, {objects} objects")
     spent = {**spent, "rest": whole - sum(spent.values())}
     for part in LAYOUT:
         print(f"  {part:16s} {spent[part] / rooms * 1e3:7.1f} ms a room")

@@ -34,7 +34,6 @@ from echousd.folder.within import inside
 from echousd.naming import free_name
 
 if TYPE_CHECKING:
-    from echousd.batches.work import Best, Job
     from echousd.graph import SceneGraph
     from echousd.make.finished import Room
 
@@ -114,11 +113,10 @@ def run_batch(request: BatchRequest, out: Path, how: RunOptions) -> BatchResult:
     with locked(place):
         _agree_on(plan, out, resume=how.resume or how.shard[1] > 1)
         valid = _valid(plan, out, how.shard)
-        rounds = {name: row.get("rounds", 1) for name, row in read_journals(out).items() if name in valid}
         journal = Journal(place)
         pool = how.executor or _executor(how, len(plan.entries), device)
         seen = out.resolve() if how.ray else out  # workers elsewhere stand in another folder
-        run = Run(plan, plan.packs(how.shard), valid, seen, journal, how, rounds)
+        run = Run(plan, plan.packs(how.shard), valid, seen, journal, how)
         try:
             end = run.execute(pool)
         finally:
@@ -139,7 +137,7 @@ def generate_many(
     Raises ValueError for the first graph that no room can be made of.
     """
     from echomodel.loading import load_model
-    from echousd.batches.work import Best, Job, layouts
+    from echousd.batches.work import Job, generated, layouts
 
     request = request_of({"sources": ["graphs"], "options": options}, "generate_many")
     asked = request.options
@@ -148,33 +146,11 @@ def generate_many(
     for pack in packed(graphs):
         own = [seed if seeds is None else seeds[number + k] for k in range(len(pack))]
         jobs = [Job("", "", s, asked, graph.to_json()) for s, graph in zip(own, pack, strict=True)]
-        sampled = layouts(jobs)
-        for k, found in enumerate(sampled):
+        for k, found in enumerate(layouts(jobs)):
             if found.error:
                 raise ValueError(f"graph {number + k}: {found.error}")
-            jobs[k] = replace(jobs[k], text=found.text, rounds=found.rounds)
-        rooms = {k: _judged(job) for k, job in enumerate(jobs)}
-        while wanting := [(k, best) for k, best in rooms.items() if isinstance(best, Best)]:
-            for (k, best), found in zip(wanting, layouts([jobs[k] for k, _ in wanting]), strict=True):
-                jobs[k] = replace(jobs[k], rounds=found.rounds, best=best)
-                rooms[k] = _judged(jobs[k])
-        for k in range(len(pack)):
-            made = rooms.pop(k)
-            assert not isinstance(made, Best)
-            yield made
+            yield generated(replace(jobs[k], text=found.text, first=found.first), here=True)
         number += len(pack)
-
-
-def _judged(job: Job) -> Room | Best:
-    """The room of a job, or the best of its drafts where it wants further ones."""
-    from echousd.batches.work import best_of, generated
-    from echousd.make.layouts import DraftsWanted
-
-    try:
-        found: Room = generated(job, here=True)
-    except DraftsWanted as wanted:
-        return best_of(wanted)
-    return found
 
 
 def _executor(how: RunOptions, rooms: int, device: str) -> Executor:

@@ -18,7 +18,6 @@ from echousd.folder.within import inside
 MEMORY = 4096  # MiB that a worker may hold
 TRIES = 4  # of a task whose worker died: a machine loses one now and then, a room that kills them all is given up
 FULL = "No space left on device"
-NOTHING: tuple[work.Rows, ...] = ([],)
 
 
 @dataclass
@@ -90,28 +89,11 @@ class RunOptions:
 
 
 @dataclass
-class _Pack:
-    """Rooms whose layouts are sampled together.
-
-    Arguments:
-        round: of drafts that was sampled last.
-        open: ids of those whose drafts nobody has judged yet.
-        wanting: those that want the next round, which is sampled together, too: job, or None of a room that is there.
-    """
-
-    entries: tuple[Entry, ...]
-    round: int = 0
-    open: set[str] = field(default_factory=set)
-    wanting: dict[Entry, work.Job | None] = field(default_factory=dict)
-
-
-@dataclass
 class Run:
     """One shard of a plan on an executor.
 
     Arguments:
-        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid; rounds: how many
-            rounds of drafts they took.
+        plan, packs: what there is to do; skip: ids of the rooms that are complete and valid.
         folder: of the run. journal: of the shard. how: when it stops, and who is told.
     """
 
@@ -121,12 +103,9 @@ class Run:
     folder: Path
     journal: Journal
     how: RunOptions
-    rounds: dict[str, int] = field(default_factory=dict)
     stopped: str = ""
     _ready: deque[tuple[Entry, work.Job]] = field(default_factory=deque)
-    _more: deque[_Pack] = field(default_factory=deque)
     _wanted: deque[tuple[Entry, work.Job, work.Wanted]] = field(default_factory=deque)
-    _of: dict[str, _Pack] = field(default_factory=dict)
     _tries: dict[str, int] = field(default_factory=dict)
     _asked: dict[str, Any] = field(default_factory=dict)
 
@@ -136,7 +115,7 @@ class Run:
         progress = BatchProgress(sum(map(len, self.packs)), done=len(self.skip))
         waiting = deque(pack for pack in self.packs if any(entry.id not in self.skip for entry in pack))
         layouts_out = 0
-        while waiting or self._ready or self._asked or self._more or self._wanted:
+        while waiting or self._ready or self._asked or self._wanted:
             self._check_stop(progress)
             while not self.stopped:
                 soon = len(self._ready) + PACK * layouts_out
@@ -145,8 +124,6 @@ class Run:
                     entry, job, wanted = self._wanted.popleft()
                     key = f"samples {len(job.answers)} {entry.id}"
                     self._submit(executor, Task(key, work.samples, (job, wanted), network=True), entry)
-                elif self._more and executor.free(network=True):
-                    layouts_out += self._submit_further(executor, self._more.popleft())
                 elif early and executor.free(network=True):
                     layouts_out += self._submit_layouts(executor, waiting.popleft(), progress)
                 elif self._ready and executor.free():
@@ -162,9 +139,6 @@ class Run:
                     self._submit(executor, outcome.task, asked)
                 elif isinstance(asked, Entry):
                     self._ended(asked, outcome, progress)
-                elif isinstance(asked, _Pack):
-                    layouts_out -= 1
-                    self._drawn_further(asked, outcome)
                 else:
                     layouts_out -= 1
                     self._drawn(asked, outcome, progress)
@@ -195,13 +169,6 @@ class Run:
         self._submit(executor, task, good)
         return 1
 
-    def _submit_further(self, executor: Executor, pack: _Pack) -> int:
-        gone = (NOTHING,) * (pack.round + 1)  # of a room that is there: only its next drafts are drawn again
-        jobs = [job or self._job(entry, rounds=gone) for entry, job in pack.wanting.items()]
-        key = f"round {pack.round + 1} {pack.entries[0].number}"
-        self._submit(executor, Task(key, work.layouts, jobs, network=True, rooms=len(jobs)), pack)
-        return 1
-
     def _submit(self, executor: Executor, task: Task, asked: Any) -> None:
         self._asked[task.key] = asked
         executor.submit(task)
@@ -213,45 +180,13 @@ class Run:
     def _drawn(self, pack: tuple[Entry, ...], outcome: Outcome, progress: BatchProgress) -> None:
         """Rooms whose first drafts were sampled are ready; if the pack was too much for a worker, each is alone."""
         found = outcome.value if outcome.fate == "done" else [work.Sampled()] * len(pack)
-        together = _Pack(pack)
-        self._expect(together)
         for entry, sampled in zip(pack, found, strict=True):
             if entry.id in self.skip:
                 continue
             if sampled.error:
                 self._fail(entry, sampled.error, progress)
                 continue
-            self._begin(together, entry, self._job(entry, sampled.text, sampled.rounds))
-
-    def _drawn_further(self, pack: _Pack, outcome: Outcome) -> None:
-        """Rooms have more drafts; if those were too much for a worker, each is made alone from the beginning."""
-        found = outcome.value if outcome.fate == "done" else [work.Sampled()] * len(pack.wanting)
-        asked = dict(pack.wanting)
-        pack.round += 1
-        self._expect(pack)
-        for (entry, job), sampled in zip(asked.items(), found, strict=True):
-            if job is not None:
-                self._begin(pack, entry, replace(job, rounds=sampled.rounds))
-
-    def _expect(self, pack: _Pack) -> None:
-        """Rooms that are there and took a later round are packed into that again."""
-        wanted = [entry for entry in pack.entries if self.rounds.get(entry.id, 0) > pack.round + 1]
-        pack.wanting = dict.fromkeys(wanted)
-
-    def _begin(self, pack: _Pack, entry: Entry, job: work.Job) -> None:
-        pack.open.add(entry.id)
-        self._of[entry.id] = pack
-        self._ready.append((entry, job))
-
-    def _judged(self, entry: Entry, job: work.Job | None) -> None:
-        """The drafts of a room will do or the room is lost (None), or it wants further ones."""
-        pack = self._of.pop(entry.id)
-        pack.open.discard(entry.id)
-        if job is not None:
-            pack.wanting[entry] = job
-        if not pack.open and any(pack.wanting.values()):
-            pack.wanting = dict(sorted(pack.wanting.items(), key=lambda item: item[0].number))
-            self._more.append(pack)
+            self._ready.append((entry, self._job(entry, sampled.text, sampled.first)))
 
     def _ended(self, entry: Entry, outcome: Outcome, progress: BatchProgress) -> None:
         if isinstance(outcome.value, work.Wanted):
@@ -260,10 +195,6 @@ class Run:
         if outcome.fate == "done" and isinstance(outcome.value, bytes):
             job = outcome.task.given[0]
             self._ready.appendleft((entry, replace(job, answers=(*job.answers, outcome.value))))
-            return
-        best = outcome.value if isinstance(outcome.value, work.Best) else None
-        self._judged(entry, None if best is None else replace(outcome.task.given, best=best))
-        if best is not None:
             return
         if outcome.fate != "done":
             if FULL in outcome.error:
@@ -289,12 +220,12 @@ class Run:
             return False
         return True
 
-    def _job(self, entry: Entry, text: str = "", rounds: tuple[tuple[work.Rows, ...], ...] = ()) -> work.Job:
+    def _job(self, entry: Entry, text: str = "", first: work.Rows | None = None) -> work.Job:
         options = self.plan.options[entry.options]
         folder, store = str(entry.folder(self.folder)), str(inside(self.folder, STORE, f"{self.folder}: the run"))
         if self.plan.to:
             folder, store = entry.path, STORE
         return work.Job(
-            entry.id, folder, entry.seed, options, text or self.plan.graphs.get(entry.graph, ""), entry.draw, rounds,
+            entry.id, folder, entry.seed, options, text or self.plan.graphs.get(entry.graph, ""), entry.draw, first,
             "" if options.self_contained else store, to=self.plan.to, outside=self.how.outside,
         )  # fmt: skip

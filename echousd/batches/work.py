@@ -21,7 +21,6 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.remote import deliver
 from echousd.batches.sources import sampled_graph
 from echousd.graph import SceneGraph
-from echousd.make.layouts import BestDraft, DraftsWanted, Drawn, most_drafts
 
 if TYPE_CHECKING:
     from echomodel.boxes import Boxes
@@ -29,16 +28,6 @@ if TYPE_CHECKING:
     from echomodel.protocols import RoomModel
 
 Rows = list[list[float]]  # of one scene: seven numbers a box
-
-
-@dataclass(frozen=True)
-class Best:
-    """`echousd.make.layouts.BestDraft` in numbers that any process can be sent."""
-
-    of: str
-    boxes: Rows
-    conflicts: tuple[str, ...]
-    wishes: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -55,8 +44,7 @@ class Job:
     Arguments:
         id: its name; folder: where it goes; store: where its assets go, "" = into the folder.
         text: canonical JSON of its graph; draw: else the graph to draw (`plan.Entry.draw`).
-        seed, options: as in the plan. rounds: drafts of its first layout, round by round; none = sampled alone.
-        best: of all rounds but the last, None = nobody has judged them.
+        seed, options: as in the plan. first: draft of its first layout, None = sampled alone.
         answers: samples of the process that has the device.
         to: URL that `folder` and `store` are below, "" = they lie on a disk.
         outside: as of the run (`RunOptions`).
@@ -68,9 +56,8 @@ class Job:
     options: BatchOptions
     text: str = ""
     draw: tuple[str, int, int] | None = None
-    rounds: tuple[tuple[Rows, ...], ...] = ()
+    first: Rows | None = None
     store: str = ""
-    best: Best | None = None
     answers: tuple[bytes, ...] = ()
     to: str = ""
     outside: tuple[str, ...] = ()
@@ -78,20 +65,20 @@ class Job:
 
 @dataclass(frozen=True)
 class Sampled:
-    """What the network made of a job: text of its graph and its drafts, or an error."""
+    """What the network made of a job: text of its graph and its first draft, or an error."""
 
     text: str = ""
-    rounds: tuple[tuple[Rows, ...], ...] = ()
+    first: Rows | None = None
     error: str = ""
 
 
 def layouts(jobs: list[Job]) -> list[Sampled]:
-    """The next round of drafts of a pack of rooms, which all had as many rounds.
+    """The first drafts of a pack of rooms.
 
     A graph that the network refuses does not cost the others theirs: all are sampled alone then.
     """
     from echomodel.loading import load_model
-    from echousd.make.packed import sample_round
+    from echousd.make.packed import first_drafts
 
     graphs: dict[int, SceneGraph] = {}
     out = [Sampled() for _ in jobs]
@@ -103,11 +90,8 @@ def layouts(jobs: list[Job]) -> list[Sampled]:
 
     def sample(model: Any, rows: list[int], steps: int | None, guided: bool) -> None:
         chosen, seeds = [graphs[i] for i in rows], [jobs[i].seed for i in rows]
-        most = [jobs[i].options.drafts or most_drafts(model, len(graphs[i].nodes)) for i in rows]
-        number = len(jobs[rows[0]].rounds)
-        found = sample_round(model, chosen, seeds, most, number=number, steps=steps, guided=guided)
-        for i, drafts in zip(rows, found, strict=True):
-            out[i] = Sampled(graphs[i].to_json(), (*jobs[i].rounds, tuple(map(_rows, drafts))))
+        for i, boxes in zip(rows, first_drafts(model, chosen, seeds, steps=steps, guided=guided), strict=True):
+            out[i] = Sampled(graphs[i].to_json(), _rows(boxes))
 
     asked = {i: (one.weights, one.steps, not one.place) for i, one in ((i, jobs[i].options) for i in graphs)}
     for weights, steps, guided in dict.fromkeys(asked.values()):
@@ -134,9 +118,8 @@ def samples(asks: tuple[Job, Wanted]) -> bytes:
         return sampled(load_model(asked.weights, device=asked.device), wanted.call)
 
 
-def room(job: Job) -> dict[str, Any] | Best | Wanted:
-    """Make, save and judge one room, and return its row of the manifest; or what it wants from the network first: the
-    best draft where further ones are wanted, or samples of shapes.
+def room(job: Job) -> dict[str, Any] | Wanted:
+    """Make, save and judge one room, and return its row of the manifest; or what it wants from the network first.
 
     Raises ValueError as `generate` and `Room.save` do.
     """
@@ -153,19 +136,17 @@ def room(job: Job) -> dict[str, Any] | Best | Wanted:
         warnings.simplefilter("always")
         try:
             made = generated(job)
-        except DraftsWanted as wanted:
-            return best_of(wanted)
         except SamplesWanted as wanted:
             return Wanted(wanted.call)
         root = made.save(folder, preview=job.options.preview, wait=True, store=job.store)
-    facts = {**_facts(made, root, settle=job.options.settle), "rounds": max(1, len(job.rounds))}
+    facts = _facts(made, root, settle=job.options.settle)
     facts["notes"] = [*made.notes, *(str(warning.message) for warning in told)]
     facts["seconds"] = round(time.perf_counter() - started, 3)
     return facts
 
 
 def generated(job: Job, *, here: bool = False) -> Any:
-    """The room (`Room`) of a job; raises DraftsWanted where it has drafts and none of them is good enough.
+    """The room (`Room`) of a job.
 
     Arguments:
         here: this process has the device; else SamplesWanted is raised for what another one must sample.
@@ -173,21 +154,12 @@ def generated(job: Job, *, here: bool = False) -> Any:
     from echomodel.loading import load_model
     from echousd.make.pipeline import generate
 
-    drafts = tuple(tuple(_boxes(rows) for rows in given) for given in job.rounds)
-    found = job.best
-    best = None if found is None else BestDraft(found.of, _boxes(found.boxes), found.conflicts, found.wishes)
-    drawn = Drawn(drafts, elsewhere=True, best=best) if drafts else None
+    first = None if job.first is None else _boxes(job.first)
     asked = job.options
     model = load_model(asked.weights, device=asked.device if here else CPU)
     if asked.device != CPU and not here:
         model = ElsewhereModel(model, job.answers)
-    return generate(_checked(job), options=asked, seed=job.seed, model=model, drawn=drawn, outside=job.outside)
-
-
-def best_of(wanted: DraftsWanted) -> Best:
-    """What the next round need not judge again."""
-    found = wanted.best
-    return Best(found.of, _rows(found.boxes), found.conflicts, found.wishes)
+    return generate(_checked(job), options=asked, seed=job.seed, model=model, first=first, outside=job.outside)
 
 
 def _checked(job: Job) -> Any:
@@ -258,7 +230,7 @@ def _facts(made: Any, root: Path, *, settle: bool) -> dict[str, Any]:
     }
 
 
-METHODS = ("sample_shapes", "sample_furniture")
+METHODS = ("sample_layout", "sample_shapes", "sample_furniture")
 
 
 class SamplesWanted(Exception):  # no error: the caller has them sampled and asks again
@@ -270,7 +242,7 @@ class SamplesWanted(Exception):  # no error: the caller has them sampled and ask
 
 
 class ElsewhereModel:
-    """`RoomModel` with the samples of another process for shapes and furniture; all else is its own model's.
+    """`RoomModel` with the samples of another process; all else is its own model's.
 
     Arguments:
         own: a model with the same weights in this process. answers: what `sampled` gave, call by call.
@@ -283,33 +255,38 @@ class ElsewhereModel:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._own, name)
 
+    def sample_layout(self, graph: GraphBatch, **rest: Any) -> Boxes:
+        """As of the model; raises SamplesWanted."""
+        found: Boxes = self._sampled("sample_layout", (graph,), rest)
+        return found
+
     def sample_shapes(self, graph: GraphBatch, boxes: Boxes, **rest: Any) -> torch.Tensor:
         """As of the model; raises SamplesWanted."""
-        return self._sampled("sample_shapes", graph, boxes, rest)
+        found: torch.Tensor = self._sampled("sample_shapes", (graph, boxes), rest)
+        return found
 
     def sample_furniture(self, graph: GraphBatch, boxes: Boxes, **rest: Any) -> torch.Tensor:
         """As of the model; raises SamplesWanted."""
-        return self._sampled("sample_furniture", graph, boxes, rest)
+        found: torch.Tensor = self._sampled("sample_furniture", (graph, boxes), rest)
+        return found
 
-    def _sampled(self, method: str, graph: GraphBatch, boxes: Boxes, rest: dict[str, Any]) -> torch.Tensor:
+    def _sampled(self, method: str, given: tuple[Any, ...], rest: dict[str, Any]) -> Any:
         answer = next(self._answers, None)
         if answer is None:
             state = rest.pop("generator").get_state()
             rest.pop("progress", None)
-            raise SamplesWanted(pickle.dumps((method, graph, boxes, state, rest)))
-        found = pickle.loads(answer)
-        assert isinstance(found, torch.Tensor)
-        return found
+            raise SamplesWanted(pickle.dumps((method, given, state, rest)))
+        return pickle.loads(answer)
 
 
 def sampled(model: RoomModel, call: bytes) -> bytes:
     """What a model samples for a call of `SamplesWanted`, for `ElsewhereModel`; raises what the model raises."""
-    method, graph, boxes, state, rest = pickle.loads(call)
+    method, given, state, rest = pickle.loads(call)
     if method not in METHODS:
         raise ValueError(f"{method!r:.40} is no call for samples, allowed: {', '.join(METHODS)}")
     generator = torch.Generator()
     generator.set_state(state)
-    return pickle.dumps(getattr(model, method)(graph, boxes, generator=generator, **rest).cpu())
+    return pickle.dumps(getattr(model, method)(*given, generator=generator, **rest).to("cpu"))
 
 
 CPU = "cpu"

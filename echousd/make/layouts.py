@@ -10,7 +10,6 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
-from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.openings import free_area
 from echomodel.roomboxes import footprints
@@ -48,44 +47,6 @@ def usual_drafts(objects: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class BestDraft:
-    """The best of some drafts after placing.
-
-    Arguments:
-        of: JSON of the graph that they are of. boxes, conflicts: as `finished_boxes` gives them.
-        wishes: what is left to be wished for, the worse first.
-    """
-
-    of: str
-    boxes: Boxes
-    conflicts: tuple[str, ...]
-    wishes: tuple[float, ...]
-
-
-class DraftsWanted(Exception):  # no error: the caller draws them and asks again
-    """What was drawn leaves something to be wished for, and further ones are drawn elsewhere; `best` of them."""
-
-    def __init__(self, best: BestDraft) -> None:
-        super().__init__()
-        self.best = best
-
-
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """Drafts of the first layout that were sampled already (`echousd.make.packed`).
-
-    Arguments:
-        rounds: the first draft alone, then those of the following rounds (`draft_rounds`) that were wanted.
-        elsewhere: raise `DraftsWanted` in place of drawing further ones.
-        best: of all rounds but the last, where those were valued; None = they are valued again.
-    """
-
-    rounds: tuple[tuple[Boxes, ...], ...]
-    elsewhere: bool = False
-    best: BestDraft | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Draws:
     """Which drafts are drawn, and how.
 
@@ -119,7 +80,7 @@ def sample_boxes(
         extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
     if draws.steps is not None:
         extra["steps"] = draws.steps
-    if not draws.guided and isinstance(model, EchoModel):
+    if not draws.guided and model.preset == "compact":
         extra["relation_guidance"] = 0.0
     if draws.change is not None:
         extra["edit"] = repeated(draws.change, len(nodes), count)
@@ -141,7 +102,7 @@ def best_boxes(
     drafts: int = 1,
     place: bool = True,
     sized: Boxes | None = None,
-    drawn: Drawn | None = None,
+    first: Boxes | None = None,
     proposed: bool = False,
     timer: StageTimer,
 ) -> tuple[Boxes, tuple[str, ...]]:
@@ -151,24 +112,16 @@ def best_boxes(
 
     Arguments:
         draws: of the first draft. drafts: how many at most. sized: boxes whose sizes the graph states for all layouts.
-        drawn: drafts that were sampled already.
+        first: the first draft, where it was sampled already (`echousd.make.packed`).
         proposed: nobody stated the openings, which may still be moved: what is in their way counts least.
         others: as `sample_boxes` and `finished_boxes`.
     """
     best: tuple[Boxes, tuple[str, ...]] | None = None
     worth: tuple[float, ...] = ()
-    of, valued = graph.to_json() if drawn is not None else "", 0
-    if drawn is not None and drawn.best is not None and drawn.best.of == of:
-        best, worth = (drawn.best.boxes, drawn.best.conflicts), drawn.best.wishes
-        valued = len(drawn.rounds) - 1
-    for at, (start, count) in enumerate(draft_rounds(drafts)):
-        if at < valued:
-            continue
+    for start, count in draft_rounds(drafts):
         if best is not None and not any(worth):
             break
-        given = drawn.rounds[at] if drawn is not None and at < len(drawn.rounds) else ()
-        if not given and best is not None and drawn is not None and drawn.elsewhere:
-            raise DraftsWanted(BestDraft(of, *best, worth))
+        given = () if first is None or best is not None else (first,)
         for draft in given or sample_boxes(
             model, graph, replace(draws, number=draws.number + start, guided=not place), count=count, timer=timer
         ):

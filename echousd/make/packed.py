@@ -11,7 +11,7 @@ from echomodel.graph import GraphBatch
 from echomodel.randomness import SceneGenerators
 from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan
-from echousd.make.layouts import Draws, draft_rounds, sample_boxes
+from echousd.make.layouts import Draws, sample_boxes
 from echousd.progress import StageTimer
 from echousd.reproducible import one_thread, rounded_boxes
 from echousd.tensors import floor_centre, graph_batch, seeded
@@ -22,17 +22,15 @@ if TYPE_CHECKING:
 NODES = 512  # of one pass of the network: larger products, bounded memory
 
 
-def sample_round(
+def first_drafts(
     model: RoomModel,
     graphs: Sequence[SceneGraph],
     seeds: Sequence[int],
-    drafts: Sequence[int],
     *,
-    number: int = 0,
     steps: int | None = None,
     guided: bool = False,
-) -> list[tuple[Boxes, ...]]:
-    """The drafts of one round (`draft_rounds`) of the first layout of every graph, as `generate` takes them (`drawn`).
+) -> list[Boxes]:
+    """The first draft of the first layout of every graph, as `generate` takes it (`first`).
 
     A sum's rounding depends on what is packed together: boxes are those of single runs but for at most a few units of
     `reproducible.LENGTH`, and exactly the same for the same list of graphs and seeds.
@@ -40,38 +38,28 @@ def sample_round(
     Arguments:
         model: any model; graphs that cannot be packed (with given boxes, or for other models) are sampled alone.
         graphs, seeds: as many of each. steps: sampling steps, None for the model's own. guided: as `Draws`.
-        drafts: how many each graph gets at most in all rounds. number: of the round, 0 = the first draft.
     """
-    starts, counts = zip(*(draft_rounds(most)[number] for most in drafts), strict=True)
-    start = starts[0]
-    found: dict[int, tuple[Boxes, ...]] = {}
+    found: dict[int, Boxes] = {}
     planned = [with_plan(graph, seed) for graph, seed in zip(graphs, seeds, strict=True)]
     together = [i for i, graph in enumerate(planned) if isinstance(model, EchoModel) and not _given(graph)]
-    for pack in packs(together, [len(graph.nodes) * n for graph, n in zip(planned, counts, strict=True)]):
-        owners = [i for i in pack for _ in range(counts[i])]
-        batches = {i: graph_batch(planned[i]) for i in pack}
-        generators = {i: seeded(seeds[i], "layout", start) for i in pack}  # one draws all drafts of its scene
-        rows = [batches[i].num_nodes for i in owners]
+    for pack in packs(together, [len(graph.nodes) for graph in planned]):
+        batches = [graph_batch(planned[i]) for i in pack]
+        rows = [batch.num_nodes for batch in batches]
         with one_thread():
             assert isinstance(model, EchoModel)
             drawn = model.sample_layout(
-                GraphBatch.pack([batches[i] for i in owners]),
-                generator=SceneGenerators([generators[i] for i in owners], rows),
+                GraphBatch.pack(batches),
+                generator=SceneGenerators([seeded(seeds[i], "layout", 0) for i in pack], rows),
                 steps=steps,
                 relation_guidance=None if guided else 0.0,
             )
         fields = (drawn.size.cpu().split(rows), drawn.position.cpu().split(rows), drawn.yaw.cpu().split(rows))
-        for i, size, position, yaw in zip(owners, *fields, strict=True):
-            graph = planned[i]
-            boxes = rounded_boxes(graph, Boxes(size, position + floor_centre(graph), yaw))
-            found[i] = (*found.get(i, ()), boxes)
+        for i, size, position, yaw in zip(pack, *fields, strict=True):
+            found[i] = rounded_boxes(planned[i], Boxes(size, position + floor_centre(planned[i]), yaw))
     for i, graph in enumerate(planned):
         if i not in found:
-            found[i] = tuple(
-                sample_boxes(
-                    model, graph, Draws(seeds[i], start, steps, guided=guided), count=counts[i], timer=StageTimer()
-                )
-            )
+            draws = Draws(seeds[i], steps=steps, guided=guided)
+            (found[i],) = sample_boxes(model, graph, draws, timer=StageTimer())
     return [found[i] for i in range(len(graphs))]
 
 

@@ -19,7 +19,6 @@ from echousd.make.clearing import cleared_layouts
 from echousd.make.finished import Room
 from echousd.make.fitting import fitted, with_space
 from echousd.make.layouts import (
-    Drawn,
     Draws,
     best_boxes,
     check_objects,
@@ -65,7 +64,7 @@ def generate(
     boxes: Boxes | None = None,
     meshes: Mapping[str, str | Path] | None = None,
     progress: StageListener | None = None,
-    drawn: Drawn | None = None,
+    first: Boxes | None = None,
     **given: Any,
 ) -> Room:
     """Make a room from a scene graph.
@@ -87,7 +86,7 @@ def generate(
         meshes: object name -> file of a piece of your own (USD, glTF, OBJ), which keeps its materials; relative to the
             working folder.
         progress: called with (stage, done, total).
-        drawn: drafts of the first layout that were sampled already (`echousd.make.packed`).
+        first: draft of the first layout, where it was sampled already (`echousd.make.packed`).
 
     Raises:
         ValueError: an argument that is not allowed, a graph that cannot be read or contradicts itself, weights that are
@@ -136,11 +135,11 @@ def generate(
 
     def arranged(graph: SceneGraph) -> tuple[Boxes, tuple[str, ...]]:
         styles = style_groups(graph)
-        whole = drawn is not None and len(drawn.rounds[0][0]) == len(graph.nodes)  # none of them left out
+        whole = first is not None and len(first) == len(graph.nodes)  # none of them left out
         return best_boxes(
             echo, with_given_sizes(graph, sizes), styles, Draws(seed, steps=asked.steps), drafts=drafts,
             place=asked.place,
-            drawn=drawn if whole else None, proposed=not stated.room.openings, timer=timer,
+            first=first if whole else None, proposed=not stated.room.openings, timer=timer,
         )  # fmt: skip
 
     def laid_out(graph: SceneGraph) -> tuple[SceneGraph, Boxes, tuple[str, ...], tuple[str, ...]]:
