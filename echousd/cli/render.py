@@ -34,14 +34,14 @@ def render(
     view: Annotated[
         str,
         typer.Option(
-            help="top, perspective, eye, every-camera (those of --cameras side by side), sheet (six views), turntable "
-            "(a GIF)."
+            help="hero (from inside), dollhouse (from above a corner), top, every-camera (those of --cameras side by "
+            "side), sheet (six views), turntable (a GIF)."
         ),
-    ] = "perspective",
+    ] = "hero",
     cameras: Annotated[
         bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
     ] = False,
-    size: Annotated[int, typer.Option(help="Pixels on each side of a picture.")] = 512,
+    size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 512,
     samples: Annotated[int, typer.Option(help="Rays through a pixel, a square number.", min=1, max=256)] = 9,
     frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
@@ -49,7 +49,7 @@ def render(
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
 ) -> None:
-    """Draw a room from above, from a corner, from inside, from all around, or through each of its cameras."""
+    """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
     from echousd.draw.pictures import gif, png
     from echousd.draw.rendering import VIEWS, render_cameras, render_turn
     from echousd.draw.rendering import render as draw
@@ -63,7 +63,7 @@ def render(
     if view not in (*VIEWS, TURN):
         raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
     if cameras:
-        if view != "perspective":
+        if view != "hero":
             raise ValueError(f"--view is {view!r}, which --cameras does not use; leave one of them out")
         if output.suffix.lower() == ".png":
             raise ValueError(f"{output}: with --cameras the output is a folder, a picture for each camera")

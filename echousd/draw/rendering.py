@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echousd.draw.indoors import with_ceiling
 from echousd.draw.scenery import Scenery, read_scenery
 from echousd.draw.tracing import FINE, QUICK, trace
-from echousd.draw.viewpoints import corner_views, eye_view, stage_views, top_view, turning_views
+from echousd.draw.viewpoints import View, corner_views, hero_view, stage_views, top_view, turning_views
 
 if TYPE_CHECKING:
     from PIL import Image
     from pxr import Usd
 
 EVERY, CONTACT = "every-camera", "sheet"
-VIEWS = ("top", "perspective", "eye", EVERY, CONTACT)
+HERO, DOLLHOUSE = "hero", "dollhouse"
+VIEWS = (HERO, DOLLHOUSE, "top", EVERY, CONTACT)
 COLORS = ("materials", "class")
-SHEET = ("eye", "top")  # beside the best corner in the first row; below, the views from the others
+SHEET = (HERO, "top")  # beside the best corner in the first row; below, the views from the others
 LARGEST = 4096
 FRAMES = (2, 360)  # pictures that a turn may have
 
@@ -26,7 +29,7 @@ FRAMES = (2, 360)  # pictures that a turn may have
 def render(
     path: str | Path,
     *,
-    view: str = "perspective",
+    view: str = HERO,
     size: int = 512,
     colors: str = "materials",
     rays: int = FINE,
@@ -57,21 +60,21 @@ def render_cameras(
     stage = open_stage(path)
     with showing_layout(stage, layout):
         scenery = _scenery(stage, size, colors)
-        return {name: _image(trace(scenery, view, size, rays=rays)) for name, view in stage_views(stage).items()}
+        return {name: _image(trace(scenery, view, size, rays=rays)) for name, view in _cameras(stage).items()}
 
 
 def render_stage(
-    stage: Usd.Stage, *, view: str = "perspective", size: int = 512, colors: str = "materials", rays: int = FINE
+    stage: Usd.Stage, *, view: str = HERO, size: int = 512, colors: str = "materials", rays: int = FINE
 ) -> Image.Image:
-    """A square picture of everything visible on a stage; `every-camera` and `sheet` are several of them.
+    """A picture of everything visible on a stage; `every-camera` and `sheet` are several of them.
 
     Arguments:
         stage: any stage; its up axis and units are taken care of.
-        view: `top` (orthographic, -Z of a Y-up stage is up in the picture) or `perspective` (from a corner), or
-            `eye` (from a corner inside, at the height of a standing person's eyes), or `every-camera` (through every
-            camera of the stage, in the order of their paths), or `sheet` (perspective, eye, top; below from the other
-            corners).
-        size: pixels on each side, 16 to 4096.
+        view: `hero` (8:5, from inside, with a ceiling, lit by windows and lamps; of a stage without walls as
+            `dollhouse`), `dollhouse` (from above a corner, without the walls before it), `top` (orthographic, -Z of a
+            Y-up stage is up in the picture), `every-camera` (through every camera of the stage, in the order of their
+            paths), or `sheet` (dollhouse, hero, top; below from the other corners).
+        size: pixels across, 16 to 4096.
         colors: `materials`, or `class` for one flat colour per category.
         rays: along each side of a pixel.
 
@@ -82,12 +85,12 @@ def render_stage(
         raise ValueError(f"view is {view!r}, allowed: {', '.join(VIEWS)}")
     scenery = _scenery(stage, size, colors)
     if view == EVERY:
-        cameras = stage_views(stage).values()
+        cameras = [replace(camera, aspect=1.0) for camera in _cameras(stage).values()]
         return _image(np.concatenate([trace(scenery, camera, size, rays=rays) for camera in cameras], axis=1))
     if view != CONTACT:
-        return _image(_seen(scenery, view, size, rays))
+        return _image(_seen(stage, scenery, view, size, rays))
     corner, *others = (trace(shown, camera, size, rays=rays) for camera, shown in corner_views(scenery))
-    first = [corner, *(_seen(scenery, word, size, rays) for word in SHEET)]
+    first = [corner, *(_seen(stage, scenery, word, size, rays, square=True) for word in SHEET)]
     return _image(np.concatenate([np.concatenate(row, axis=1) for row in (first, others)]))
 
 
@@ -118,13 +121,25 @@ def render_turn(
     ]
 
 
-def _seen(scenery: Scenery, view: str, size: int, rays: int) -> np.ndarray:
-    """(size, size, 3) what one of the views `top`, `perspective` and `eye` shows."""
-    if view == "perspective":
-        camera, scenery = next(corner_views(scenery))
+def _seen(stage: Usd.Stage, scenery: Scenery, view: str, size: int, rays: int, *, square: bool = False) -> np.ndarray:
+    """(height, size, 3) what one of the views `hero`, `dollhouse` and `top` shows."""
+    if view == "top":
+        camera = top_view(scenery)
+    elif view == HERO and (scenery.closed or square):
+        camera = hero_view(stage, scenery)
+        scenery = with_ceiling(scenery) if scenery.closed else scenery
     else:
-        camera = {"top": top_view, "eye": eye_view}[view](scenery)
-    return trace(scenery, camera, size, rays=rays)
+        camera, scenery = next(corner_views(scenery))
+    return trace(scenery, replace(camera, aspect=1.0) if square else camera, size, rays=rays)
+
+
+def _cameras(stage: Usd.Stage) -> dict[str, View]:
+    found = stage_views(stage)
+    if not found:
+        raise ValueError(
+            f"{stage.GetRootLayer().identifier}: no camera, which --cameras and the view every-camera need"
+        )
+    return found
 
 
 def _scenery(stage: Usd.Stage, size: int, colors: str) -> Scenery:

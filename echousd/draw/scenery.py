@@ -9,6 +9,7 @@ import numpy as np
 from pxr import Usd
 
 from echousd.draw.drawables import Drawable, Paint, paint_image, read_drawables
+from echousd.draw.indoors import Lights, read_lights
 from echousd.draw.sight import Furniture
 
 GOLDEN = 0.61803398875
@@ -34,6 +35,7 @@ class Scenery:
         wall: (f,) int, which wall a face belongs to, -1 for none.
         panes: (p, 3, 3) float32: middle, half of the width and half of the height of every window's pane.
         pane_wall: (p,) int, the walls of the panes.
+        lights: of the stage.
     """
 
     triangles: np.ndarray
@@ -49,12 +51,18 @@ class Scenery:
     wall: np.ndarray
     panes: np.ndarray
     pane_wall: np.ndarray
+    lights: Lights
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner, (3,) float each."""
         corners = self.triangles.reshape(-1, 3).astype(float)
         return corners.min(0), corners.max(0)
+
+    @property
+    def closed(self) -> bool:
+        """Whether there are walls around it."""
+        return bool((self.wall >= 0).any())
 
     def without_near_walls(self, eye: np.ndarray) -> Scenery:
         """The scene without the walls between the middle of the room and an eye outside, as in a doll's house."""
@@ -173,6 +181,7 @@ def read_scenery(stage: Usd.Stage, *, by_class: bool = False) -> Scenery:
         hung=at_walls,
         panes=np.array([pane for _, pane in panes], np.float32).reshape(-1, 3, 3),
         pane_wall=np.array([walls.get(wall, -1) for wall, _ in panes], int),
+        lights=read_lights(stage),
         **joined,
     )
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
-# rays through a picture whose half width at distance 1 is 1, and what each of them counts
-RAYS = np.stack([*(g.ravel() for g in np.meshgrid(*[np.linspace(-1, 1, 13)] * 2)), np.full(169, -1.0)], 1)
-WEIGHTS = np.where(np.abs(RAYS[:, :2]).max(1) > 0.8, CUT, 1.0)
+ASPECT = 1.6  # of a picture from inside: its width over its height
+# rays through such a picture whose half width at distance 1 is 1, and what each of them counts
+SPREAD = np.linspace(-1, 1, 13)
+RAYS = np.stack([*(g.ravel() for g in np.meshgrid(SPREAD, SPREAD / ASPECT)), np.full(169, -1.0)], 1)
+WEIGHTS = np.where(np.abs(RAYS[:, :2] * (1, ASPECT)).max(1) > 0.8, CUT, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ class Furniture:
         return np.clip(1.0 - away / reach, 0.0, 1.0)
 
     def filled(self, view: np.ndarray, half: float, reach: float) -> float:
-        """Share of a square picture that boxes nearer than `reach` metres fill: the nearer the more, and what the
+        """Share of a picture from inside that boxes nearer than `reach` metres fill: the nearer the more, and what the
         picture's border cuts off `CUT` times; `view`, `half`: as `away`.
         """
         near = self.nearness(view[:3, 3], reach) > 0
@@ -59,7 +61,7 @@ class Furniture:
         return float((np.clip(1.0 - away / reach, 0.0, 1.0) * WEIGHTS).mean())
 
     def away(self, view: np.ndarray, half: float) -> np.ndarray:
-        """(169,) metres to the nearest box along `RAYS` through a square picture, inf where there is none.
+        """(169,) metres to the nearest box along `RAYS` through a picture from inside, inf where there is none.
 
         Arguments:
             view: (4, 4) float camera to world. half: half of the picture's width at distance 1.

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from echousd.draw.indoors import OWN, SKY, SUN, THROWN, VIEW, exposed, thrown_back
 from echousd.draw.scenery import Scenery
 from echousd.draw.viewpoints import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
-SKY_RAYS = 3  # per ray: rays towards the sky
+SKY_RAYS, AROUND = 3, 2  # per ray: rays towards the sky; inside a room, to what stands around
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -18,31 +19,32 @@ class RenderUnavailable(ImportError, ValueError):
 
 
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
-    """The picture as (size, size, 3) float sRGB in [0, 1].
+    """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
     Every pixel sends `rays`² rays; together they cover the sun's disc and the sky evenly, each pixel with another
     shift (randomised quasi-Monte Carlo), so that little noise is left.
 
     Arguments:
         scenery: triangles and their colours.
-        view: the camera.
-        size: pixels on each side.
+        view: the camera; inside a room its windows and lamps light it, else sun and sky from above.
+        size: pixels across.
         rays: along each side of a pixel.
         seed: of the shifts; the same seed gives the same picture.
     """
     rng = np.random.default_rng(seed)
     scene = _embree(scenery)
-    shift = rng.random((size, size, 4)).astype(np.float32)
-    layers = np.zeros((size, size, LAYERS), np.float32)
+    height = round(size / view.aspect)
+    shift = rng.random((height, size, 4)).astype(np.float32)
+    layers = np.zeros((height, size, LAYERS), np.float32)
     rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
-    for start in range(0, size, rows):
-        block = slice(start, min(size, start + rows))
+    for start in range(0, height, rows):
+        block = slice(start, min(height, start + rows))
         for sample in range(rays**2):
             layers[block] += _shade(scene, scenery, view, size, rays, block, sample, shift[block])
     layers /= rays**2
     light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
     color = layers[..., ALBEDO] * light + layers[..., GLOW]
-    return _tone(color) ** (1 / 2.2)
+    return (exposed(color, thrown_back(scenery)) if view.inside else _tone(color)) ** (1 / 2.2)
 
 
 # What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
@@ -79,7 +81,7 @@ def _along(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
 
 
-SUN = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
+ABOVE = np.array([0.38, 0.84, 0.32], np.float32) / np.float32(0.9759)
 SUN_SPREAD = 0.10  # radius of the sun's disc at distance 1: soft shadows
 SUN_LIGHT = np.array([1.05, 0.99, 0.90], np.float32)
 SKY_LIGHT = np.array([0.90, 0.93, 0.97], np.float32)
@@ -108,7 +110,7 @@ def _shade(
     """(rows, size, LAYERS) what one ray for each pixel of some rows brings back."""
     across, down = sample % rays, sample // rays
     x = (np.arange(size, dtype=np.float32) + (across + 0.5) / rays) / size * 2 - 1
-    y = 1 - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
+    y = 1 / view.aspect - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
     u, v = (g.ravel() * view.half for g in np.meshgrid(x, y))
     axes, eye = view.matrix[:3, :3].astype(np.float32), view.matrix[:3, 3].astype(np.float32)
     if view.orthographic:
@@ -124,6 +126,8 @@ def _shade(
     out[:, GLOW] = BACKGROUND
     missed = np.flatnonzero(hit["primID"] < 0)
     out[missed, GLOW] = outside(scenery.panes, origin[missed], direction[missed])
+    if view.inside:
+        out[missed, GLOW] *= VIEW * scenery.lights.sky
     if not len(seen):
         return out.reshape(-1, size, LAYERS)
     face = hit["primID"][seen]
@@ -134,7 +138,9 @@ def _shade(
     toward = -direction[seen]
     normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
     lifted = point + 2e-3 * normal
-    light, shine = _light(scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen])
+    light, shine = (_light_inside if view.inside else _light)(
+        scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen]
+    )
     glow = 0.5 * shine[:, None] + scenery.emissive[face]
     out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
     return out.reshape(-1, size, LAYERS)
@@ -166,9 +172,9 @@ def _light(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
     count = len(point)
-    sun = SUN + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
+    sun = ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
     sun = _unit(sun)
-    facing = np.clip(normal @ SUN, 0, None)
+    facing = np.clip(normal @ ABOVE, 0, None)
     lit = np.zeros(count, np.float32)
     ask = np.flatnonzero(facing > 0)
     lit[ask] = scene.run(_f32(point[ask]), _f32(sun[ask]), query="OCCLUDED") != 0
@@ -185,10 +191,74 @@ def _light(
         open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
-    half = _unit(toward + SUN)
+    half = _unit(toward + ABOVE)
     gloss = scenery.gloss[face]
     shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
     return 0.55 * direct + 1.05 * sky, shine
+
+
+def _light_inside(
+    scene: Any,
+    scenery: Scenery,
+    point: np.ndarray,
+    normal: np.ndarray,
+    toward: np.ndarray,
+    face: np.ndarray,
+    sample: int,
+    shift: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
+    lights, count = scenery.lights, len(point)
+    spot, turn = _even(sample, shift[:, :2]), _even(sample, shift[:, 2:])
+    light, shine = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+    if len(scenery.panes):  # one place in one window for each ray
+        pane = scenery.panes[np.minimum((turn[:, 0] * len(scenery.panes)).astype(int), len(scenery.panes) - 1)]
+        place = pane[:, 0] + (2 * spot[:, :1] - 1) * pane[:, 1] + (2 * spot[:, 1:] - 1) * pane[:, 2]
+        way, away = _way(point, place)
+        area = np.cross(pane[:, 1], pane[:, 2])  # a quarter of it
+        seen = np.clip(_dot(way, normal), 0, None) * 4 * np.abs(_dot(way, area)) / np.maximum(away, 0.2) ** 2
+        seen *= 0.3 + 0.7 * np.clip(0.5 + 2 * way[:, 1], 0, 1)  # sky above, ground below
+        share = _free(scene, point, way, away, seen > 1e-4) * seen
+        light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT
+        half = _unit(toward + way)
+        gloss = scenery.gloss[face]
+        shine += gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * (share > 0)
+    if lights.sun is not None and len(scenery.panes):
+        towards = _unit(lights.sun[0] + 0.02 * _on_sphere(spot))
+        facing = np.clip(_dot(normal, towards), 0, None)
+        lit = _free(scene, point, towards, np.full(count, 1e3, np.float32), facing > 0) * facing
+        light += lit[:, None] * lights.sun[1] * np.float32(SUN / np.pi)
+    if len(lights.bulbs):  # one lamp for each ray
+        which = np.minimum((turn[:, 1] * len(lights.bulbs)).astype(int), len(lights.bulbs) - 1)
+        way, away = _way(point, lights.bulbs[which] + 0.05 * _on_sphere(spot))
+        facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / np.maximum(away, OWN) ** 2
+        lit = _free(scene, point, way, away - OWN, facing > 0) * facing
+        light += lit[:, None] * lights.power[which] / np.float32(np.pi)
+    around, thrown = np.zeros((count, 3), np.float32), thrown_back(scenery)
+    for ray in range(AROUND):
+        way = _unit(normal + _on_sphere(_even(sample * AROUND + ray, shift[:, 2:])))  # cosine-weighted
+        other = scene.run(_f32(point), _f32(way), output=1)
+        near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
+        hue = scenery.flat_colors[np.clip(other["primID"], 0, None)] / np.float32(THROWN)
+        around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.3 + 0.7 * near), 1.0)
+    return light + around / AROUND * thrown, shine * 0.3
+
+
+def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (n, 3) from points to places, and how far they are, (n,) metres."""
+    way = place - point
+    away = np.sqrt(np.maximum(_dot(way, way), 1e-12))
+    return way / away[:, None], away
+
+
+def _free(scene: Any, point: np.ndarray, way: np.ndarray, away: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """(n,) float32: 1 where nothing stands within `away` metres in a direction, 0 elsewhere and where not `asked`."""
+    out, ask = np.zeros(len(point), np.float32), np.flatnonzero(asked & (away > 0.02))
+    out[asked & (away <= 0.02)] = 1.0
+    if len(ask):
+        far = np.ascontiguousarray(away[ask] - 0.01, np.float32)
+        out[ask] = scene.run(_f32(point[ask]), _f32(way[ask]), dists=far, query="OCCLUDED") != 0
+    return out
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +11,7 @@ from pxr import UsdGeom
 from scipy.spatial import ConvexHull
 
 from echousd.draw.scenery import Scenery
+from echousd.draw.sight import ASPECT
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, framed, inside_view, perspective_views, turning_matrices
 from echousd.naming import free_name
 from echousd.stage.units import metres_per_unit, up_axis
@@ -19,17 +20,23 @@ if TYPE_CHECKING:
     from pxr import Usd
 
 
+WIDEST = 4.0  # width of a picture over its height, and the other way round
+
+
 @dataclass(frozen=True)
 class View:
-    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective)."""
+    """A camera: (4, 4) camera to world and half the picture's width, in metres (top) or as a tangent (perspective);
+    its width over its height; whether it is inside a closed room."""
 
     matrix: np.ndarray
     half: float
     orthographic: bool
+    aspect: float = 1.0
+    inside: bool = False
 
 
 def stage_views(stage: Usd.Stage) -> dict[str, View]:
-    """What every camera of a stage sees, by its name, in a y-up world in metres; ValueError where there is none."""
+    """What every camera of a stage sees, by its name, in a y-up world in metres."""
     unit, turn = metres_per_unit(stage), np.eye(4)
     if up_axis(stage) == "Z":
         turn[1:3, 1:3] = ((0, 1), (-1, 0))
@@ -44,11 +51,8 @@ def stage_views(stage: Usd.Stage) -> dict[str, View]:
         flat = camera.projection == camera.Orthographic
         wide = camera.horizontalAperture
         half = wide / 2 * camera.APERTURE_UNIT * unit if flat else wide / 2 / max(camera.focalLength, 1e-6)
-        views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat)
-    if not views:
-        raise ValueError(
-            f"{stage.GetRootLayer().identifier}: no camera, which --cameras and the view every-camera need"
-        )
+        aspect = float(np.clip(wide / max(camera.verticalAperture, 1e-6), 1 / WIDEST, WIDEST))
+        views[free_name(prim.GetName(), views)] = View(matrix, float(half), flat, aspect)
     return views
 
 
@@ -62,13 +66,17 @@ def top_view(scenery: Scenery) -> View:
     return View(matrix, float((upper - lower)[[0, 2]].max()) / 2 * 1.06, True)
 
 
-def eye_view(scenery: Scenery) -> View:
-    """From a corner inside the room, where least is hidden, at the height of a standing person's eyes."""
+def hero_view(stage: Usd.Stage, scenery: Scenery) -> View:
+    """Into a room from inside: through the stage's first camera that stands between its walls, else from a corner
+    where least is hidden, at the height of a standing person's eyes."""
     lower, upper = scenery.bounds
+    for view in stage_views(stage).values() if scenery.closed else ():
+        if not view.orthographic and (lower < view.matrix[:3, 3]).all() and (view.matrix[:3, 3] < upper).all():
+            return replace(view, aspect=ASPECT, inside=True)
     x, z = (lower[0] + 0.15, upper[0] - 0.15), (lower[2] + 0.15, upper[2] - 0.15)  # inside the walls
     floor = np.array([(x[0], z[0]), (x[0], z[1]), (x[1], z[1]), (x[1], z[0])])
     matrix, lens = inside_view(floor, scenery.furniture, float(upper[1] - lower[1]), scenery.hung)
-    return View(matrix, APERTURE / 2 / lens, False)
+    return View(matrix, APERTURE / 2 / lens, False, ASPECT, scenery.closed)
 
 
 def corner_views(scenery: Scenery) -> Iterator[tuple[View, Scenery]]:

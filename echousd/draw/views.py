@@ -11,7 +11,7 @@ import shapely
 
 from echomodel.openings import inward_normal
 from echomodel.triangles import cross
-from echousd.draw.sight import RAYS, Furniture
+from echousd.draw.sight import ASPECT, RAYS, Furniture
 
 APERTURE = 36.0  # mm, width of the picture in the camera
 FOCAL_LENGTH = 30.0  # mm: 62 degrees across
@@ -182,7 +182,7 @@ def _varied(shots: list[Shot]) -> list[Shot]:
 
 
 def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
-    """Share of a square picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
+    """Share of a picture inside a room that shows walls with nothing at or before them; `things`: all boxes.
 
     Arguments:
         floor: (k, 2) float, metres; height: of the walls, metres. view, half: as `Furniture.away`.
@@ -212,9 +212,12 @@ def _hidden(room: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye:
 
 
 def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """(...) float: how far points (..., 3) are from the middle of a picture, at distance 1; inf behind the camera."""
+    """(...) float: how far points (..., 3) are from the middle of a picture, at distance 1; inf behind the camera.
+
+    What is up or down counts as in the picture's width, whose half is `ASPECT` times that of its height.
+    """
     x, y, z = np.moveaxis((points - view[:3, 3]) @ view[:3, :3], -1, 0)
-    return np.asarray(np.where(z < 0, np.maximum(np.abs(x), np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
+    return np.asarray(np.where(z < 0, np.maximum(np.abs(x), ASPECT * np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
 
 
 def _walls(floor: np.ndarray, height: float) -> Furniture:

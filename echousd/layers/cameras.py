@@ -11,7 +11,7 @@ from pxr import Gf, Usd, UsdGeom
 from echomodel.openings import inward_normal, segment
 from echomodel.roomboxes import footprints
 from echomodel.vocabulary import vocabulary
-from echousd.draw.sight import Furniture
+from echousd.draw.sight import ASPECT, Furniture
 from echousd.draw.views import APERTURE, FOCAL_LENGTH, MARGIN, inside_view, perspective_view
 from echousd.room import RoomData
 from echousd.shapes import shell, walls
@@ -80,7 +80,7 @@ def write_cameras(
     camera.AddTransformOp().Set(Gf.Matrix4d(np.ascontiguousarray(matrix.T)))
     camera.CreateFocalLengthAttr(lens * TENTHS)
     camera.CreateHorizontalApertureAttr(APERTURE * TENTHS)
-    camera.CreateVerticalApertureAttr(APERTURE * TENTHS)
+    camera.CreateVerticalApertureAttr(APERTURE * TENTHS / (1.0 if walled is None else ASPECT))
     distance = float(np.linalg.norm(matrix[:3, 3] - volume.centre))
     sharp = volume.centre if main is None else furniture.corners[main].mean(0)
     camera.CreateFocusDistanceAttr(float(np.linalg.norm(matrix[:3, 3] - sharp)))

@@ -59,7 +59,7 @@ class Room(RoomData):
             weakref.finalize(self, folder.cleanup)
         return self._stage  # type: ignore[attr-defined]
 
-    def image(self, *, size: int = 512, view: str = "perspective") -> Any:
+    def image(self, *, size: int = 512, view: str = "hero") -> Any:
         """A picture of the room (PIL image); needs the extra `render`."""
         from echousd.draw.rendering import render_stage
 

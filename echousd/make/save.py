@@ -134,7 +134,7 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     return folder / root
 
 
-PREVIEW = 400  # pixels
+PREVIEW = 640  # pixels across
 
 
 def write_preview(root: Path) -> Path | None:
@@ -144,7 +144,7 @@ def write_preview(root: Path) -> Path | None:
 
     out = root.with_suffix(".png")
     try:
-        picture = render(root, view="perspective", size=PREVIEW, rays=QUICK)
+        picture = render(root, size=PREVIEW, rays=QUICK)
     except RenderUnavailable:
         return None
     if out.is_file() and not is_ours(out):

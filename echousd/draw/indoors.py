@@ -1,0 +1,118 @@
+"""Light in a room with walls: what comes in at the windows, lamps, and what the walls throw back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom, UsdLux
+
+from echousd.draw.drawables import world_frame
+
+if TYPE_CHECKING:
+    from echousd.draw.scenery import Scenery
+
+SKY = 4.0  # radiance of the sky in a window for a dome of intensity 1, whose light else comes from above as well
+SUN = 6.0  # and what is told of the sun: more than a camera in the room would bear, as eyes see it
+CEILING = np.array([0.80, 0.79, 0.77], np.float32)
+VIEW = 1.5  # of the sky's radiance, what is seen of it through a window: eyes adapt
+THROWN = 0.6  # of the light that meets a surface, what furnished rooms throw back
+DIM = 0.05  # radiance at every place of a room without lamps and windows, so that one sees it
+ADAPTED = 0.7  # to the colour of the light: lamps stay a little warm
+GREY, BRIGHTEST = 0.24, 6.0  # what the picture's middle tone becomes, and how much at most it is brightened for that
+FILMIC = (2.51, 0.03, 2.43, 0.59, 0.14)  # Narkowicz's fit of the ACES curve, 2015
+OWN = 0.25  # metres around a bulb where its own shade throws no shadow
+
+
+@dataclass(frozen=True, eq=False)
+class Lights:
+    """Lights of a stage, y up, metres.
+
+    Arguments:
+        sky: radiance of the dome. sun: (2, 3) float32, direction towards it and irradiance by colour.
+        bulbs: (n, 3) float32 places of lamps. power: (n, 3) float32, radiant intensity by colour.
+    """
+
+    sky: float
+    sun: np.ndarray | None
+    bulbs: np.ndarray
+    power: np.ndarray
+
+
+def read_lights(stage: Usd.Stage) -> Lights:
+    """The lights of a stage: domes, the brightest distant light, spheres; panels of light are for other renderers."""
+    frame, cache = world_frame(stage), UsdGeom.XformCache()
+    sky, suns, bulbs, power = 0.0, [], [], []
+    domes = 0
+    for prim in stage.Traverse():
+        if not prim.HasAPI(UsdLux.LightAPI) or UsdGeom.Imageable(prim).ComputeVisibility() == "invisible":
+            continue
+        light = UsdLux.LightAPI(prim)
+        strength = float(light.GetIntensityAttr().Get() or 0.0) * 2.0 ** float(light.GetExposureAttr().Get() or 0.0)
+        color = strength * np.array(light.GetColorAttr().Get() or Gf.Vec3f(1.0), np.float32)
+        world = frame @ np.array(cache.GetLocalToWorldTransform(prim)).T
+        if prim.IsA(UsdLux.DomeLight):
+            domes, sky = domes + 1, sky + strength
+        elif prim.IsA(UsdLux.DistantLight):
+            towards = world[:3, 2] / max(float(np.linalg.norm(world[:3, 2])), 1e-9)
+            suns.append(np.stack([towards, color]))
+        elif prim.IsA(UsdLux.SphereLight):
+            bulbs.append(world[:3, 3])
+            power.append(color / 4)  # of what is told as radiance times area, what goes each way
+    sun = max(suns, key=lambda one: float(one[1].sum()), default=None)
+    return Lights(
+        sky=sky if domes else 1.0,
+        sun=None if sun is None else sun.astype(np.float32),
+        bulbs=np.array(bulbs, np.float32).reshape(-1, 3),
+        power=np.array(power, np.float32).reshape(-1, 3),
+    )
+
+
+def with_ceiling(scenery: Scenery) -> Scenery:
+    """The scene with a ceiling over its walls."""
+    lower, upper = scenery.bounds
+    walls = scenery.triangles[scenery.wall >= 0]
+    height = float(walls[..., 1].max()) if len(walls) else float(upper[1])
+    x, z = np.array([(lower[0], lower[2]), (upper[0], lower[2]), (upper[0], upper[2]), (lower[0], upper[2])]).T
+    corners = np.stack([x, np.full(4, height), z], 1).astype(np.float32)
+    added: dict[str, Any] = {
+        "triangles": corners[[[0, 1, 2], [0, 2, 3]]],
+        "normals": np.broadcast_to(np.array([0, -1, 0], np.float32), (2, 3, 3)),
+        "flat_colors": np.broadcast_to(CEILING, (2, 3)),
+        "emissive": np.zeros((2, 3), np.float32),
+        "gloss": np.zeros(2, np.float32),
+        "st": np.zeros((2, 3, 2), np.float32),
+        "texture": np.full(2, -1),
+        "wall": np.full(2, -1),
+    }
+    joined: dict[str, Any] = {key: np.concatenate([getattr(scenery, key), more]) for key, more in added.items()}
+    return replace(scenery, **joined)
+
+
+def thrown_back(scenery: Scenery) -> np.ndarray:
+    """(3,) radiance that is everywhere in a room, as in a sphere whose walls throw back a part of what comes in."""
+    lights, size = scenery.lights, np.ptp(np.array(scenery.bounds), axis=0)
+    around = 2 * (size[0] * size[2] + size[1] * (size[0] + size[2]))
+    total = np.zeros(3)
+    for _, side, rise in scenery.panes:
+        across = 4 * np.cross(side, rise)
+        total += np.linalg.norm(across) * SKY * lights.sky * np.pi / 2  # the ground below sends little
+        if lights.sun is not None:
+            total += abs(float(across @ lights.sun[0])) * SUN * lights.sun[1]
+    total += 4 * np.pi * lights.power.sum(0)
+    return np.asarray(total / np.pi / around * THROWN / (1 - THROWN) + DIM * max(lights.sky, 0.1), np.float32)
+
+
+def exposed(color: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """(h, w, 3) linear colours in [0, 1]: brightened or darkened to a middle tone, and rolled off as film does.
+
+    Arguments:
+        color: (h, w, 3) linear radiance. light: (3,) that of the room, to whose colour the eye adapts in part.
+    """
+    color = color / (np.maximum(light, 1e-6) / max(float(light.mean()), 1e-6)) ** ADAPTED
+    bright = np.log(np.maximum(color.mean(-1), 1e-4))
+    scale = min(GREY / float(np.exp(bright.mean())), BRIGHTEST)
+    a, b, c, d, e = FILMIC
+    x = color * scale
+    return np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0, 1)

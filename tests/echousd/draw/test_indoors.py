@@ -1,0 +1,143 @@
+"""The picture from inside: what comes in at the windows, lamps, what the walls throw back, and how it is exposed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pxr import Gf, Usd, UsdGeom, UsdLux
+from small_room import BARE, StandIn, small_graph
+
+import echousd
+from echousd.draw.indoors import GREY, exposed, read_lights, thrown_back, with_ceiling
+from echousd.draw.rendering import render_stage
+from echousd.draw.scenery import read_scenery
+from echousd.draw.tracing import trace
+from echousd.draw.viewpoints import View, hero_view
+from echousd.draw.views import view_matrix
+from echousd.options import RoomOptions
+
+WALLED = RoomOptions(walls=True, dress="none")
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, options=WALLED)
+    return Usd.Stage.Open(str(room.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)))
+
+
+def test_the_picture_is_taken_inside_the_room_and_wider_than_high(stage):
+    scenery = read_scenery(stage)
+    view = hero_view(stage, scenery)
+    lower, upper = scenery.bounds
+    assert view.inside
+    assert (lower < view.matrix[:3, 3]).all()
+    assert (view.matrix[:3, 3] < upper).all()
+    camera = UsdGeom.Camera(stage.GetPrimAtPath("/Room/Cameras/perspective")).GetCamera(0)
+    assert camera.aspectRatio == pytest.approx(view.aspect, abs=1e-4)
+    np.testing.assert_allclose(view.matrix[:3, 3], camera.transform.ExtractTranslation(), atol=1e-6)
+    assert render_stage(stage, size=64, rays=1).size == (64, 40)
+
+
+def test_a_stage_without_walls_is_shown_from_outside(tmp_path):
+    room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
+    bare = Usd.Stage.Open(str(room.save(tmp_path / "bedroom", preview=False)))
+    hero, house = (np.asarray(render_stage(bare, view=view, size=32, rays=1)) for view in ("hero", "dollhouse"))
+    np.testing.assert_array_equal(hero, house)
+
+
+def test_the_ceiling_is_as_high_as_the_walls_and_nothing_of_the_sky_is_seen(stage):
+    scenery = read_scenery(stage)
+    closed = with_ceiling(scenery)
+    assert len(closed.triangles) == len(scenery.triangles) + 2
+    top = closed.triangles[-2:]
+    assert top[..., 1] == pytest.approx(scenery.triangles[scenery.wall >= 0][..., 1].max())
+    up = View(view_matrix(np.array([1.4, 2.4, 0.9]), np.array([1.41, 3.0, 0.9])), 0.3, False, inside=True)
+    above, nothing = (trace(one, up, 16, rays=1).mean((0, 1)) for one in (closed, scenery))
+    assert above[0] / above[2] > nothing[0] / nothing[2] + 0.02  # plaster where the sky was
+
+
+def lights_of(**power: float) -> Usd.Stage:
+    """A stage in centimetres, Z up, with the lights that are told."""
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+    for name, intensity in power.items():
+        kind = {"dome": UsdLux.DomeLight, "sun": UsdLux.DistantLight}.get(name, UsdLux.SphereLight)
+        light = kind.Define(stage, f"/{name}")
+        light.CreateIntensityAttr(intensity)
+        light.CreateColorAttr(Gf.Vec3f(1.0, 0.5, 0.25))
+        if name not in ("dome", "sun"):
+            light.AddTranslateOp().Set(Gf.Vec3d(100, 200, 300))
+    return stage
+
+
+def test_lights_are_read_in_any_unit_and_axis():
+    lights = read_lights(lights_of(dome=0.5, sun=2.0, lamp=8.0))
+    assert lights.sky == 0.5
+    np.testing.assert_allclose(lights.sun, [(0, 1, 0), (2.0, 1.0, 0.5)], atol=1e-6)  # straight down from +Z
+    np.testing.assert_allclose(lights.bulbs, [(1, 3, -2)], atol=1e-6)
+    np.testing.assert_allclose(lights.power, [(2.0, 1.0, 0.5)])
+    dark = read_lights(lights_of(dome=0.0))
+    assert dark.sky == 0.0
+    assert dark.sun is None
+    assert read_lights(lights_of()).sky == 1.0  # a stage that tells nothing of light is seen by day
+
+
+def test_what_a_room_throws_back_grows_with_windows_sun_and_lamps(stage):
+    scenery = read_scenery(stage)
+    assert len(scenery.panes)
+    day = thrown_back(scenery).sum()
+    assert thrown_back(replace(scenery, panes=scenery.panes[:0])).sum() < day
+    assert thrown_back(replace(scenery, lights=replace(scenery.lights, sun=None))).sum() < day
+    lamps = replace(scenery.lights, power=100 * np.ones((1, 3), np.float32))
+    assert thrown_back(replace(scenery, lights=lamps)).sum() > 2 * day
+
+
+def box_room(**lights) -> tuple:
+    """The camera on a floor of a closed box without furniture, and the scenery, lit as told."""
+    import trimesh
+
+    stage = Usd.Stage.CreateInMemory()
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    box = trimesh.creation.box((4, 3, 4))
+    box.invert()
+    mesh = UsdGeom.Mesh.Define(stage, "/Box")
+    mesh.CreatePointsAttr((box.vertices + np.array([0, 1.5, 0])).astype(np.float32))
+    mesh.CreateFaceVertexCountsAttr([3] * 12)
+    mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
+    scenery = read_scenery(stage)
+    down = View(view_matrix(np.array([0.0, 2.5, 0.0]), np.array([0.01, 0.0, 0.0])), 0.7, False, inside=True)
+    return replace(scenery, lights=replace(scenery.lights, **lights)), down
+
+
+def test_a_lamp_lights_what_is_near_it_and_a_window_what_is_before_it():
+    lamp = {"bulbs": np.array([(1.0, 0.5, 0.0)], np.float32), "power": np.array([(3.0, 3.0, 3.0)], np.float32)}
+    scenery, down = box_room(sky=0.0, **lamp)
+    bright = trace(scenery, down, 24, rays=2).mean(-1)
+    assert bright.max() > 1.3 * np.median(bright)
+    across, _ = np.unravel_index(bright.argmax(), bright.shape)
+    row = down.matrix[:3, :3].T @ (np.array([1.0, 0.0, 0.0]) - down.matrix[:3, 3])
+    assert abs((1 - row[1] / -row[2] / 0.7) * 12 - across) < 4  # under the lamp
+    pane = np.array([[(2.0, 1.0, 0.0), (0.0, 0.0, 0.8), (0.0, 0.6, 0.0)]], np.float32)
+    sunless, _ = box_room(sky=1.0, sun=None)
+    lit = trace(replace(sunless, panes=pane), down, 24, rays=2).mean(-1)
+    towards = down.matrix[:3, 1] @ (1.0, 0.0, 0.0) > 0
+    near, far = (lit[:6], lit[-6:]) if towards else (lit[-6:], lit[:6])
+    # the pane is in the wall's plane, which stops no ray that ends before it
+    assert near.mean() > far.mean() + 0.02
+
+
+def test_exposure_brings_dark_and_bright_rooms_to_one_middle_tone():
+    rng = np.random.default_rng(0)
+    room = rng.uniform(0.2, 1.0, (20, 20, 3))
+    white = np.ones(3)
+    dark, bright = (exposed(scale * room, white) for scale in (0.2, 5.0))
+    np.testing.assert_allclose(dark, bright, atol=1e-6)
+    assert 0.6 * GREY < np.median(bright) < 1.8 * GREY
+    assert exposed(1e-3 * room, white).mean() < 0.1  # night stays night
+    warm = np.array([1.0, 0.7, 0.4])
+    left = exposed(warm * room, warm).mean((0, 1)) / exposed(room, white).mean((0, 1))
+    assert 1.0 < left[0] / left[2] < 1.6  # of 2.5: the eye adapts to most of a lamp's colour
