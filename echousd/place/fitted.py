@@ -14,7 +14,7 @@ from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.vocabulary import vocabulary
 from echousd.place.problem import Posed
 from echousd.place.relations import relation_margins
-from echousd.place.search import part_of, price
+from echousd.place.search import part_of, priced
 
 MISSED = 3.0  # what a relation costs that a plan breaks
 SHARE = 0.5  # of what a plan costs by itself beside what the objective says of it
@@ -69,8 +69,8 @@ def fitted(
         planned = np.isin(np.arange(len(kinds)), who)
         with torch.inference_mode():
             part = part_of(room, planned | fixed)
-            seen = ((term, term.find(part)) for term in TERMS)
-            cost = sum(float(price(term, one, part).sum()) for term, one in seen) + SHARE * run.cost
+            paid = priced([(term, term.find(part)) for term in TERMS], part)[1]
+            cost = float(paid.sum()) + SHARE * run.cost
         if cost < least - 1e-4:
             best, least = (Posed(problem, size, position, yaw), planned), cost
     return best

@@ -15,8 +15,8 @@ import torch
 from scipy.optimize import linear_sum_assignment
 
 from echomodel.objective import TERMS, Plan, Term, unreached
-from echomodel.objective.copies import copies_of
-from echomodel.objective.found import Found
+from echomodel.objective.copies import OF_WORDS, copies_of, looks_at
+from echomodel.objective.found import Found, found, nobody
 from echousd.place.overlaps import beyond, depths
 from echousd.place.proposals import ahead, aside, height_of, out_of, out_of_habit, proposals, seatings, slots_at, twins
 from echousd.place.relations import margins_at
@@ -25,8 +25,9 @@ from echousd.place.setting import Setting
 JUDGED = 48  # poses that are judged at once
 SWEEPS = 3  # times that what misses something is looked at after the first time
 ANEW = 3  # times that pieces are taken out and put in again
-BUDGET = 6000  # poses that are judged in all; each is a whole room
+BUDGET = 4500  # poses that are judged in all; each is a whole room
 GAIN = 1e-3  # by which a move must be better
+WORTH = 0.5  # that a sweep must gain for another one
 GRAIN = 1e4  # costs are compared to so many parts of one
 PULL, FARTHEST, TURN = 0.08, 4.0, 0.1  # for a metre from the draft, up to so many, and for looking the other way
 ATTENDING = 0.25  # share of that for pieces that attend another
@@ -65,8 +66,11 @@ class Search:
         self.setting, self.budget, self.judged, self.walked = setting, budget, 0, False
         said = {int(number) for number in setting.problem.triplets[:, 1]}
         words = {row.name for row in _predicates() if row.id in said}
-        self.terms = tuple(t for t in terms if t.kind != "relations" or t.name in words or t.name == "placed")
+        sizes = {row.name for row in _predicates() if row.measures == "size"} | {"scale"}  # which no pose changes
+        told = words | {"placed"}
+        self.terms = tuple(t for t in terms if t.name not in sizes and (t.kind != "relations" or t.name in told))
         self.rooms: dict[bytes, Plan] = {}
+        self.looks: list[np.ndarray] = []
         steps = np.array([any(row.step) for row in _predicates()], bool)
         self.sided = steps[setting.problem.triplets[:, 1]]
         self.urgent: list[int] = []
@@ -90,13 +94,15 @@ class Search:
                 room, torch.from_numpy(position[:, there]), torch.from_numpy(yaw[:, there]),
                 torch.from_numpy(moved[there]),
             )  # fmt: skip
-            total = torch.zeros(len(yaw), dtype=torch.float64)
-            for term in self.terms:
-                if whole or term.name not in WHOLE:
-                    seen = term.find(copies)
-                    if len(seen.who):
-                        total.index_add_(0, copies.scene[seen.who], price(term, seen, copies))
+            asked = [term for term in self.terms_of(moved) if whole or term.name not in WHOLE]
+            seen, paid = priced([(term, term.find(copies)) for term in asked], copies)
+            total = torch.zeros(len(yaw), dtype=torch.float64).index_add_(0, copies.scene[seen.who], paid)
         return total.numpy()
+
+    def terms_of(self, moved: np.ndarray) -> list[Term]:
+        """The terms that look at any of some boxes (n,) bool; all before any room was judged."""
+        looks = self.looks or [np.ones(len(moved), bool)] * len(self.terms)
+        return [term for term, at in zip(self.terms, looks, strict=True) if at[moved].any()]
 
     def _room(self, there: np.ndarray) -> Plan:
         key = there.tobytes()
@@ -107,24 +113,20 @@ class Search:
     def faults(self, state: State) -> tuple[float, list[int]]:
         """What a room costs in all, and the boxes that its broken terms are about, the worst first."""
         setting = self.setting
-        every = np.ones(len(setting.size), bool)
         worst: dict[int, float] = {}
-        total = 0.0
         with torch.inference_mode():
-            room = copies_of(
-                self._room(every), torch.from_numpy(state.position[None]), torch.from_numpy(state.yaw[None]),
-                torch.from_numpy(every),
-            )  # fmt: skip
-            for term in self.terms:
-                seen = term.find(room)
-                if not len(seen.who):
-                    continue
-                paid = price(term, seen, room)
-                total += float(paid.sum())
-                for row in (paid > 0.5).nonzero()[:, 0].tolist():
-                    for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
-                        if box < len(every):
-                            worst[box] = worst.get(box, 0.0) + float(paid[row])
+            room = self._plan(state.position, state.yaw)
+            if self.looks:
+                room = copies_of(setting.plan, room.position[None], room.yaw[None], torch.ones_like(room.given))
+                every = [term.find(room) for term in self.terms]
+            else:
+                rows = [looks_at(room, term.find) for term in self.terms]
+                self.looks, every = [looks.numpy() for looks, _ in rows], [found for _, found in rows]
+            seen, paid = priced(list(zip(self.terms, every, strict=True)), room)
+            total = float(paid.sum())
+            for row in (paid > 0.5).nonzero()[:, 0].tolist():
+                for box in {int(seen.who[row]), int(seen.other[row])} - {-1}:
+                    worst[box] = worst.get(box, 0.0) + float(paid[row])
         lost = self._unreached(state.position, state.yaw)
         self.walked = bool(lost)
         for box in lost:
@@ -223,9 +225,13 @@ class Search:
         return len(self._unreached(position, yaw))
 
     def _unreached(self, position: np.ndarray, yaw: np.ndarray) -> list[int]:
-        plan = replace(self.setting.plan, position=torch.from_numpy(position), yaw=torch.from_numpy(yaw))
-        vars(plan).update(anchor=self.setting.plan.anchor)
-        return [fault.object for fault in unreached(plan)]
+        return [fault.object for fault in unreached(self._plan(position, yaw))]
+
+    def _plan(self, position: np.ndarray, yaw: np.ndarray) -> Plan:
+        room = self.setting.plan
+        out = replace(room, position=torch.from_numpy(position), yaw=torch.from_numpy(yaw))
+        vars(out).update({name: getattr(room, name) for name in OF_WORDS})
+        return out
 
     def reseated(self, state: State, there: np.ndarray, i: int) -> State:
         """The state with those who stand around box i at one of the ways in which as many sit there."""
@@ -458,6 +464,19 @@ class Search:
             out += self.children[anchor if anchor >= 0 else i]
         return [i for n, i in enumerate(out) if i not in out[:n]]
 
+    def mended(self, state: State, total: float, wrong: list[int]) -> tuple[State, float, list[int]]:
+        """A state after what its broken terms are about was moved, what it costs, and what still is broken."""
+        for _ in range(SWEEPS):
+            if not wrong or self.judged >= self.budget:
+                break
+            after = self.exchanged(self.swept(state, self.involved(wrong)), wrong)
+            before, (cost, still) = total, self.faults(after)
+            if cost < before - GAIN:
+                state, total, wrong = after, cost, still
+            if cost > before - WORTH:
+                break
+        return state, total, wrong
+
     def run(self) -> Arranged:
         """The best state that the budget finds."""
         setting = self.setting
@@ -470,19 +489,11 @@ class Search:
         mates = np.array([((setting.anchor == a) & at).sum() for a in setting.anchor])
         seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
         state = self.swept(state, [i for i in range(n) if not seated[i]])
-        total, wrong = self.faults(state)
-        for _ in range(SWEEPS):
-            if not wrong or self.judged >= self.budget:
-                break
-            after = self.exchanged(self.swept(state, self.involved(wrong)), wrong)
-            cost, still = self.faults(after)
-            if cost >= total - GAIN:
-                break
-            state, total, wrong = after, cost, still
+        state, total, wrong = self.mended(state, *self.faults(state))
         for number in range(ANEW):
             if not wrong or self.judged >= self.budget:
                 break
-            out = self.involved(wrong) if number < ANEW - 1 else list(range(n))
+            out = list(range(n)) if number else self.involved(wrong)
             if number:  # the worst first, and elsewhere
                 self.urgent = wrong
                 self.regrets = {i: (*state.position[i, [0, 2]], float(state.yaw[i])) for i in wrong[:1]}
@@ -491,16 +502,23 @@ class Search:
             after = self.swept(built, out)
             cost, still = self.faults(after)
             if cost < total - GAIN:
-                state, total, wrong = after, cost, still
+                state, total, wrong = self.mended(after, cost, still)
         return Arranged(state.position, state.yaw, total, self.judged)
 
 
-def price(term: Term, seen: Found, room: Plan) -> torch.Tensor:
-    """(P,) float: what the rows of a term cost."""
-    blamed = ~room.given[seen.who] | (term.kind in ("relations", "physics"))
-    missed = (term.slack - seen.margin).clamp(0.0, 2.0)
-    broken, each = PRICE[term.kind]
-    return (broken * (seen.margin < 0) + each * term.weight * missed) * blamed
+def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, torch.Tensor]:
+    """The rows (P,) of what terms found in a room or its copies, all together, and what each costs (P,) float."""
+    every = [(term, seen) for term, seen in rows_of if len(seen.who)]
+    if not every:
+        return nobody(room.size), room.size[:0, 0]
+    count = torch.tensor([len(seen.who) for _, seen in every])
+    row = [(term.slack, *PRICE[term.kind], term.weight, term.kind in ("relations", "physics")) for term, _ in every]
+    slack, broken, each, weight, always = torch.tensor(row, dtype=room.size.dtype).repeat_interleave(count, 0).T
+    who, other, margin = (torch.cat([getattr(seen, name) for _, seen in every]) for name in ("who", "other", "margin"))
+    rows = found(who, margin, other=other)
+    missed = (slack - rows.margin).clamp(0.0, 2.0)
+    blamed = ~room.given[rows.who] | (always > 0)
+    return rows, (broken * (rows.margin < 0) + each * weight * missed) * blamed
 
 
 # What a broken term costs, and a unit that is missed of it, by its kind.

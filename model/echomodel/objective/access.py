@@ -5,9 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from echomodel.floors import known, signed_distance
 from echomodel.objective.found import Found, found, nobody, worst
-from echomodel.objective.plan import Plan
+from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, hinge_point, inward_normal, segment
 
 NEEDED = 0.45  # share of the vocabulary's access depth below which a front counts as blocked
@@ -22,24 +21,21 @@ CLEARANCE = 1.9  # metres: what hangs higher is in nobody's way
 def front_free(plan: Plan) -> Found:
     """Doors, drawers, shelves and sofas can be reached from the front."""
     depth = plan.column(lambda kind: kind.access) * NEEDED
-    return before_fronts(plan, (depth > 0) & plan.standing & ~plan.of("seat"), depth)  # an armchair is walked round
+    return before_fronts(plan, plan.works & plan.standing & ~plan.of("seat"), depth)  # an armchair is walked round
 
 
 def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
     """How much more than a depth (N,) is free before the fronts of boxes (N,) bool; corners of rows are shared."""
-    i, j = plan.pairs(opens, plan.standing & ~plan.movable)
+    i, j = plan.pairs(opens, plan.standing & ~plan.movable, least=True)
     corner = plan.stands("row")[i] & plan.stands("row")[j] & ((plan.yaw[i] - plan.yaw[j]).cos().abs() < 0.1)
-    other = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner
-    low = plan.position[j, 1] + plan.size[j, 1] < 0.05  # rugs
-    i, j = i[other & ~low], j[other & ~low]
-    lateral, forward = plan.local(j, i)
-    half_width, half_depth = plan.reach(j, i)
-    clear = forward - half_depth - plan.size[i, 2] / 2
-    covered = torch.minimum(plan.size[i, 0], plan.size[i, 0] / 2 + half_width - lateral.abs())
+    low = plan.position[:, 1] + plan.size[:, 1] < CLEAR_HEIGHT  # rugs
+    keep = (plan.anchor[j] != i) & (plan.anchor[i] != j) & ~corner & ~low[j]
+    i, j = i[keep], j[keep]
+    clear, covered, forward = plan.ahead(i, j)
     behind = plan.size[i, 2] / 2 - forward  # what stands beside or behind is in no front's way
     margin = torch.maximum(torch.maximum(clear - depth[i], SHARE * plan.size[i, 0] - covered), behind)
-    least, about = worst(i, margin, j, len(plan), 9.0)
-    who = opens.nonzero()[:, 0]
+    least, about = plan.worst(i, margin, j)
+    who = plan.those(opens)
     walls = _clear_of_walls(plan, who, depth[who])
     margin = torch.minimum(least[who], walls)
     return found(who, margin, other=torch.where(walls < least[who], -1, about[who]), measure=margin + depth[who])
@@ -47,39 +43,33 @@ def before_fronts(plan: Plan, opens: Tensor, depth: Tensor) -> Found:
 
 def _clear_of_walls(plan: Plan, who: Tensor, depth: Tensor) -> Tensor:
     """(P,): how far the far side of the space before each front is inside the room; 9 where there are no walls."""
-    side = torch.stack([plan.yaw[who].cos(), -plan.yaw[who].sin()], -1)
-    front = torch.stack([plan.yaw[who].sin(), plan.yaw[who].cos()], -1)
+    cos, sin = plan.turn[0][who], plan.turn[1][who]
+    side, front = torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
     ahead = plan.position[who][:, [0, 2]] + front * (plan.size[who, 2] / 2 + depth)[:, None]
     across = plan.size[who, 0, None] * plan.numbers([-0.25, 0.0, 0.25])
-    points = ahead[:, None] + side[:, None] * across[..., None]
-    floor = plan.floor[plan.scene[who]]
-    inside = signed_distance(points, floor).median(1).values
-    return torch.where(known(floor), inside, torch.full_like(inside, 9.0))
+    return plan.inside(ahead[:, None] + side[:, None] * across[..., None], who).median(1).values
 
 
 def bed_side_free(plan: Plan) -> Found:
     """At least one long side of a bed can be reached, below the nightstands."""
     beds = plan.of("bed") & plan.standing
-    who = beds.nonzero()[:, 0]
+    who = plan.those(beds)
     if not len(who):
         return nobody(plan.size)
-    i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable)
+    i, j = plan.pairs(beds, plan.standing & ~plan.stands("head") & ~plan.movable, least=True)
     lateral, forward = plan.local(j, i)
     half_width, half_depth = plan.reach(j, i)
     # only what stands between the shoulders and the foot is in the way
     length = plan.size[i, 2]
     along = torch.minimum(forward + half_depth, length / 2) - torch.maximum(forward - half_depth, -length / 5)
+    aside = lateral.abs() - half_width - plan.size[i, 0] / 2 - BEDSIDE
     out = []
     for sign in (1.0, -1.0):
-        clear = torch.where(sign * lateral > 0, lateral.abs() - half_width - plan.size[i, 0] / 2, 9.0 + 0 * lateral)
-        margin = torch.maximum(clear - BEDSIDE, 0.4 * length - along)
-        least, _ = worst(i, margin, j, len(plan), 9.0)
-        yaw = plan.yaw[who]
-        side = torch.stack([yaw.cos(), -yaw.sin()], -1) * sign
+        margin = torch.maximum(torch.where(sign * lateral > 0, aside, FAR), 0.4 * length - along)
+        least, _ = plan.worst(i, margin, j)
+        side = torch.stack([plan.turn[0][who], -plan.turn[1][who]], -1) * sign
         points = plan.position[who][:, [0, 2]] + side * (plan.size[who, 0] / 2 + BEDSIDE)[:, None]
-        floor = plan.floor[plan.scene[who]]
-        wall = signed_distance(points[:, None], floor)[:, 0]
-        out.append(torch.minimum(least[who], torch.where(known(floor), wall, 9.0 + 0 * wall)))
+        out.append(torch.minimum(least[who], plan.inside(points[:, None], who)[:, 0]))
     margin = torch.maximum(*out)
     return found(who, margin, measure=margin + BEDSIDE)
 
@@ -99,7 +89,7 @@ def _before_openings(plan: Plan, *, window: bool) -> Found:
     on_wall = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
     asked = (plan.standing | (on_wall if window else _hangs_low(plan))) & plan.moved
     for scenes, polygon, openings in plan.rooms:
-        who = (torch.isin(plan.scene, scenes) & asked).nonzero()[:, 0]
+        who = plan.those(torch.isin(plan.scene, scenes) & asked)
         for number, opening in enumerate(openings):
             if (opening.kind == "window") == window and opening.edge < len(polygon):
                 rows.append((who, _clearance(plan, who, polygon, opening), number))
@@ -108,7 +98,7 @@ def _before_openings(plan: Plan, *, window: bool) -> Found:
     who = torch.cat([row[0] for row in rows])
     margin = torch.cat([row[1] for row in rows])
     about = torch.cat([torch.full_like(row[0], row[2]) for row in rows])
-    least, which = worst(who, margin, about, len(plan), 9.0)
+    least, which = worst(who, margin, about, len(plan), FAR)
     met = who.unique()
     return found(met, least[met], measure=GRAZE - least[met], words=which[met])
 

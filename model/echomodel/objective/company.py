@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import torch
+from torch import Tensor
 
-from echomodel.floors import known, signed_distance
 from echomodel.objective.found import Found, found, joined, nobody, worst
 from echomodel.objective.plan import FAR, Plan
 
@@ -27,19 +28,84 @@ ALONE = 0.45  # metres from everything: nothing small stands so in a room
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
 
 
-def chairs_even(plan: Plan) -> Found:
-    """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
+@dataclass(frozen=True, eq=False)
+class Seats:
+    """Who sits around tables.
+
+    Arguments:
+        i, j: (P,) int64, a seat and its table.
+        ahead: (P,) bool, whether it sits at the table's front or back, not at one of its sides.
+        along, across: (P,) float, metres from the table's middle along the side where it sits and away from it.
+        side: (P,) int64, number of that side among all sides of all tables; the one opposite is `side ^ 1`.
+        count, rank: (P,) int64, how many sit there, and how many of them further to the left.
+    """
+
+    i: Tensor
+    j: Tensor
+    ahead: Tensor
+    along: Tensor
+    across: Tensor
+    side: Tensor
+    count: Tensor
+    rank: Tensor
+
+    def facing(self) -> tuple[Tensor, Tensor]:
+        """Rows (Q,) of seats that have another one opposite, of as many, and rows (Q,) of those."""
+        one, other = self._rows(self.side ^ 1, self.rank)
+        keep = self.count[one] == self.count[other]
+        return one[keep], other[keep]
+
+    def beside(self) -> tuple[Tensor, Tensor]:
+        """Rows (Q,) of seats that have another one to their right, and rows (Q,) of those."""
+        return self._rows(self.side, self.rank + 1)
+
+    def _rows(self, side: Tensor, rank: Tensor) -> tuple[Tensor, Tensor]:
+        most = int(self.count.max()) + 1
+        place = torch.full((4 * (int(self.j.max()) + 1) * most,), -1)
+        place[self.side * most + self.rank] = torch.arange(len(self.i))
+        other = place[side * most + rank]
+        one = (other >= 0).nonzero()[:, 0]
+        return one, other[one]
+
+
+def seats_at(plan: Plan) -> Seats | None:
+    """Seats at the tables that people sit around, None where there are none."""
+    kept: dict[str, Seats | None] = vars(plan)
+    if "seats_at" not in kept:
+        kept["seats_at"] = _seats_at(plan)
+    return kept["seats_at"]
+
+
+def _seats_at(plan: Plan) -> Seats | None:
+    if not bool(plan.first.dining.any()):
+        return None
     i, j = plan.attended("at", "foot")
-    tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
-    i, j = i[tables[j]], j[tables[j]]
-    keep = plan.apart(i, j).detach() < AROUND
+    keep = plan.dining[j] & (plan.apart(i, j).detach() < AROUND)
     i, j = i[keep], j[keep]
     if not len(i):
+        return None
+    lateral, forward = plan.local(i, j)
+    half = plan.size[j][:, [0, 2]].detach() / 2
+    ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
+    along, across = torch.where(ahead, lateral, forward), torch.where(ahead, forward, lateral)
+    side = 4 * j + 2 * ahead + (across > 0)
+    order = along.detach().argsort(stable=True)
+    order = order[side[order].argsort(stable=True)]
+    counts = torch.bincount(side)
+    ends, count = counts.cumsum(0)[side], counts[side]
+    rank = torch.empty_like(side).index_put((order,), torch.arange(len(side))) - (ends - count)
+    return Seats(i, j, ahead, along, across, side, count, rank)
+
+
+def chairs_even(plan: Plan) -> Found:
+    """The chairs of a table stand evenly around it; a bench counts as the chairs that it stands for."""
+    seats = seats_at(plan)
+    if seats is None:
         return nobody(plan.size)
+    i, j = seats.i, seats.j
     places = (plan.size[i, 0] / PLACE).round().clamp_min(1.0).detach()
     count = torch.zeros(len(plan), dtype=plan.size.dtype).index_add(0, j, places)
-    lateral, forward = plan.local(i, j)
-    away = torch.stack([lateral, forward], -1) * places[:, None]
+    away = torch.stack(plan.local(i, j), -1) * places[:, None]
     sums = torch.zeros(len(plan), 2, dtype=plan.size.dtype).index_add(0, j, away)
     who = (count > 1).nonzero()[:, 0]
     n = count[who]
@@ -51,26 +117,13 @@ def chairs_even(plan: Plan) -> Found:
 
 def chairs_opposite(plan: Plan) -> Found:
     """Where both sides of a table have as many chairs, each has another one opposite."""
-    i, j = plan.attended("at", "foot")
-    tables = plan.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
-    i, j = i[tables[j]], j[tables[j]]
-    keep = plan.apart(i, j).detach() < AROUND
-    i, j = i[keep], j[keep]
-    if not len(i):
+    seats = seats_at(plan)
+    if seats is None:
         return nobody(plan.size)
-    lateral, forward = plan.local(i, j)
-    half = plan.size[j][:, [0, 2]].detach() / 2
-    ahead = forward.detach().abs() - half[:, 1] > lateral.detach().abs() - half[:, 0]
-    along, across = torch.where(ahead, lateral, forward), torch.where(ahead, forward, lateral)
-    side = 4 * j + 2 * ahead + (across > 0)
-    same = side[:, None] == side[None]
-    order = torch.arange(len(i))
-    before = (along[None] < along[:, None]) | ((along[None] == along[:, None]) & (order < order[:, None]))
-    rank, count = (same & before).sum(1), same.sum(1)
-    faced = (side[:, None] == (side ^ 1)[None]) & (rank[:, None] == rank[None]) & (count[:, None] == count[None])
-    one, other = faced.nonzero(as_tuple=True)
-    least, _ = worst(j[one], STAGGERED - (along[one] - along[other]).abs(), i[one], len(plan), FAR)
-    who = j[one].unique()
+    one, other = seats.facing()
+    margin = STAGGERED - (seats.along[one] - seats.along[other]).abs()
+    least, _ = worst(seats.j[one], margin, seats.i[one], len(plan), FAR)
+    who = (least < FAR).nonzero()[:, 0]
     return found(who, least[who], measure=STAGGERED - least[who])
 
 
@@ -94,7 +147,7 @@ def at_its_side(plan: Plan) -> Found:
     """Side tables and floor lamps stand beside their sofa or bed, not before it; armchairs leave room for its knees."""
     i, j = plan.attended("beside")
     keep = (plan.apart(i, j).detach() < SIDE) & plan.of("sofa", "bed")[j]
-    chairs = (plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa")).nonzero()[:, 0]
+    chairs = plan.those(plan.stands("company") & plan.of("sofa")[plan.group] & ~plan.of("sofa"))
     i, j = torch.cat([i[keep], chairs]), torch.cat([j[keep], plan.group[chairs]])
     if not len(i):
         return nobody(plan.size)
@@ -116,22 +169,19 @@ def not_alone(plan: Plan) -> Found:
 
     An armchair that stands apart from its group has something of its own: a lamp, a table, shelves, another one.
     """
-    loner = plan.which(lambda kind: kind.stands == "company") & (plan.anchor < 0)
+    loner = plan.stands("company") & (plan.anchor < 0)
     small = (plan.of("light", "decor") | plan.stands("beside") | loner) & plan.standing
-    who = small.nonzero()[:, 0]
-    i, j = plan.pairs(small, plan.standing)
-    gap, _ = worst(i, plan.apart(i, j), j, len(plan), FAR)
-    floor = plan.floor[plan.scene[who]]
+    company = plan.stands("company") & plan.of("seat") & plan.standing & ~loner
+    i, j = plan.pairs(small, plan.standing, least=True)
+    gap, _ = plan.worst(i, plan.apart(i, j), j)
+    who = plan.those(small & plan.walled)
     half = plan.size[who][:, [0, 2]].amax(1) / 2
-    wall = signed_distance(plan.position[who][:, None, [0, 2]], floor)[:, 0] - half
-    wall = torch.where(known(floor), wall, 0.0 * wall)
+    wall = plan.inside(plan.position[who][:, None, [0, 2]], who)[:, 0] - half
     away = torch.where(loner[who], wall - (EDGE - ALONE), torch.minimum(gap[who], wall))
     lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
-    chairs, group = plan.attended("company")
-    apart = (plan.of("seat") & plan.standing)[chairs] & (plan.apart(chairs, group).detach() > LEFT)
-    mask = torch.zeros(len(plan), dtype=torch.bool).index_put((chairs[apart],), torch.tensor(True))
     others = plan.of("light", "storage", "board") | plan.stands("beside", "company")
-    i, j = plan.pairs(mask, others & plan.standing)
-    gap, _ = worst(i, plan.apart(i, j), j, len(plan), FAR)
-    who = mask.nonzero()[:, 0]
+    i, j = plan.pairs(company, others & plan.standing, least=True)
+    gap, _ = plan.worst(i, plan.apart(i, j), j)
+    who = plan.those(company)
+    who = who[plan.apart(who, plan.anchor[who]).detach() > LEFT]
     return joined(lonely, found(who, OWN - gap[who], measure=gap[who].clamp(0.0, FAR)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,67 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.objective.plan import Plan
+from echomodel.objective.found import Found, worst
+from echomodel.objective.plan import FAR, Plan
 from echomodel.openings import Opening
 from echomodel.vocabulary import Category
+
+# What of a plan stays as it is while its boxes move.
+OF_WORDS = (
+    "anchor", "carrier", "group", "joins", "stance", "standing", "movable", "solid", "works", "dining", "smaller",
+    "walls", "walled", "rectangle", "_masks",
+)  # fmt: skip
+MANY = 80_000  # pairs of boxes in all copies from which on those that stand alike are looked at once
+
+
+@dataclass(frozen=True, eq=False)
+class Watched(Plan):
+    """A plan that notes whose poses are asked for: of masks of words and pairs of them, before any pose is compared."""
+
+    asked: Tensor = field(kw_only=True)
+
+    def those(self, mask: Tensor) -> Tensor:
+        """As `Plan.those`."""
+        self.asked.logical_or_(mask)
+        return super().those(mask)
+
+    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+        """As `Plan.pairs`."""
+        i, j = super().pairs(first, second)
+        return self._noted(i), self._noted(j)
+
+    def told(self, predicate: str) -> tuple[Tensor, Tensor]:
+        """As `Plan.told`."""
+        i, j = super().told(predicate)
+        return self._noted(i), self._noted(j)
+
+    def everywhere(self, number: int) -> Tensor:
+        """As `Plan.everywhere`."""
+        return self._noted(super().everywhere(number))
+
+    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.beside`."""
+        row, k = super().beside(i, others)
+        return row, self._noted(k)
+
+    def _noted(self, numbers: Tensor) -> Tensor:
+        self.asked[numbers] = True
+        return numbers
+
+
+def looks_at(room: Plan, find: Callable[[Plan], Found]) -> tuple[Tensor, Found]:
+    """(N,) bool, the boxes of a room whose poses decide what a term finds, whatever they are; and what it finds."""
+    plan = Watched(**{of.name: getattr(room, of.name) for of in fields(Plan)}, asked=torch.zeros_like(room.given))
+    vars(plan).update({name: getattr(room, name) for name in (*OF_WORDS, "turn")})
+    seen = find(plan)
+    for whom in (room.anchor, room.group, room.carrier):
+        plan.asked[whom[plan.asked & (whom >= 0)]] = True
+    return plan.asked, seen
+
+
+def _repeated(name: str) -> cached_property[Tensor]:
+    """A column of the room, the same in every copy."""
+    return cached_property(lambda copies: getattr(copies.template, name).repeat(copies.count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +114,13 @@ class Copies(Plan):
 
     def of(self, *roles: str) -> Tensor:
         """As `Plan.of`."""
-        return self._repeated(("of", *roles), lambda: self.template.of(*roles))
+        return self._masked(("of", *roles), lambda: self.template.of(*roles))
 
     def stands(self, *stances: str) -> Tensor:
         """As `Plan.stands`."""
-        return self._repeated(("stands", *stances), lambda: self.template.stands(*stances))
+        return self._masked(("stands", *stances), lambda: self.template.stands(*stances))
 
-    def _repeated(self, asked: tuple[str, ...], mask: Callable[[], Tensor]) -> Tensor:
+    def _masked(self, asked: tuple[str, ...], mask: Callable[[], Tensor]) -> Tensor:
         if asked not in self._masks:
             self._masks[asked] = mask().repeat(self.count)
         return self._masks[asked]
@@ -86,10 +144,17 @@ class Copies(Plan):
         """As `Plan.stance`."""
         return self.template.stance * self.count
 
-    @cached_property
-    def standing(self) -> Tensor:
-        """As `Plan.standing`."""
-        return self.template.standing.repeat(self.count)
+    standing, movable, solid = _repeated("standing"), _repeated("movable"), _repeated("solid")
+    works, dining, fronts = _repeated("works"), _repeated("dining"), _repeated("fronts")
+    smaller, walled = _repeated("smaller"), _repeated("walled")
+
+    def inside(self, points: Tensor, who: Tensor) -> Tensor:
+        """As `Plan.inside`."""
+        if self.template.rectangle is None:
+            return super().inside(points, who)
+        middle, half = self.template.rectangle
+        out = (points - middle).abs() - half
+        return torch.where((out <= 0).all(-1), -out.amax(-1), -out.clamp_min(0).norm(dim=-1))
 
     @cached_property
     def carrier(self) -> Tensor:
@@ -134,12 +199,42 @@ class Copies(Plan):
         start, along, normal, length = (of.expand(self.count, *of.shape[1:]) for of in self.template.walls)
         return start, along, normal, length
 
-    def pairs(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Plan.pairs`."""
+    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+        """As `Plan.pairs`; `least`: what stands alike in all copies is paired in the first one alone."""
         n = len(self.template)
-        together = first.reshape(-1, n, 1) & second.reshape(-1, 1, n) & ~torch.eye(n, dtype=torch.bool)
-        room, i, j = together.nonzero(as_tuple=True)
-        return room * n + i, room * n + j
+        together = first[:n, None] & second[None, :n]
+        together.fill_diagonal_(False)
+        still = self._still if least else None
+        i, j = (together if still is None else together & ~still).nonzero(as_tuple=True)
+        i, j = (self._shift + i).reshape(-1), (self._shift + j).reshape(-1)
+        if still is None:
+            return i, j
+        one, other = (together & still).nonzero(as_tuple=True)
+        return torch.cat([one, i]), torch.cat([other, j])
+
+    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.beside`."""
+        n = len(self.template)
+        which = others[:n].nonzero()[:, 0]
+        row = torch.arange(len(i)).repeat_interleave(len(which))
+        return row, (i - i % n)[row] + which.repeat(len(i))
+
+    @cached_property
+    def _still(self) -> Tensor | None:
+        """(N, N) bool, pairs that stand alike in all copies; None where it is no use to leave them out."""
+        if self.count * len(self.template) ** 2 < MANY or bool(self.apart_in.all()):
+            return None
+        return ~(self.apart_in[:, None] | self.apart_in)
+
+    def worst(self, who: Tensor, margin: Tensor, other: Tensor) -> tuple[Tensor, Tensor]:
+        """As `Plan.worst`."""
+        least, about = super().worst(who, margin, other)
+        if self._still is None:
+            return least, about
+        rows = ~(self.moved[who] | self.moved[other])
+        rest, of = worst(who[rows], margin[rows], other[rows], len(self.template), FAR)
+        rest = rest.repeat(self.count)
+        return torch.minimum(least, rest), torch.where(rest < least, self._tiled(of), about)
 
     @cached_property
     def _dense(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:

@@ -73,7 +73,7 @@ def work_triangle(plan: Plan) -> Found:
     """The ways between hob, sink and fridge are neither cramped nor long, and nothing stands in them."""
     tasks = {task: plan.which(lambda kind, task=task: kind.task == task) & plan.standing  # type: ignore[misc]
              for task in ("cook", "wash", "cool")}  # fmt: skip
-    cook = tasks["cook"].nonzero()[:, 0]
+    cook = plan.those(tasks["cook"])
     ends = [(cook, _front(plan, cook))]
     for task in ("wash", "cool"):
         i, j = plan.pairs(tasks["cook"], tasks[task])
@@ -91,9 +91,9 @@ def work_triangle(plan: Plan) -> Found:
     share = plan.numbers([(k + 0.5) / POINTS for k in range(POINTS)])[:, None]
     walked = torch.cat([points[a][:, None] * share + points[b][:, None] * (1 - share) for a, b in pairs], 1)
     others = plan.standing & ~plan.movable & ~plan.stands("row") & (plan.size[:, 1].detach() > 0.3)
-    mask = torch.zeros(len(plan), dtype=torch.bool)
-    mask[cook] = True
-    i, j = plan.pairs(mask, others)
+    i, j = plan.pairs(tasks["cook"], others)
+    keep = torch.isin(i, cook)
+    i, j = i[keep], j[keep]
     number = torch.full((len(plan),), -1).index_put((cook,), torch.arange(len(cook)))
     off = walked[number[i]] - plan.position[j][:, None, [0, 2]]
     cos, sin = plan.turn[0][j, None], plan.turn[1][j, None]
@@ -122,7 +122,7 @@ def hob_safe(plan: Plan) -> Found:
     along = (plan.yaw[i] - plan.yaw[j]).cos()
     beside = (along > 0.99) & ((lateral.abs() - half_width - plan.size[i, 0] / 2).abs() < 2 * FLUSH)
     worktop = torch.where(beside & (plan.size[j, 1] <= TALL), plan.size[j, 0], torch.zeros_like(lateral))
-    who = hobs.nonzero()[:, 0]
+    who = plan.those(hobs)
     landing, _ = worst(i, -worktop, j, len(plan), 0.0)
     out = found(who, -landing[who] - LANDING, measure=-landing[who])
     across = along.abs() < 0.01

@@ -24,6 +24,10 @@ class Found:
     measure: Tensor
     words: Tensor
 
+    def take(self, rows: Tensor) -> Found:
+        """Some of the rows, by number or mask."""
+        return Found(self.who[rows], self.other[rows], self.margin[rows], self.measure[rows], self.words[rows])
+
 
 def found(
     who: Tensor, margin: Tensor, *, other: Tensor | None = None, measure: Tensor | None = None,

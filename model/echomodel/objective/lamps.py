@@ -22,7 +22,7 @@ def pendant_over(plan: Plan) -> Found:
     i, j = plan.pairs(lamps, (plan.of("board", "bed", "sofa") | plan.stands("head")) & plan.standing)
     tables = plan.which(lambda kind: kind.role == "board" and not (kind.belongs_to or kind.access))[j]
     gap = plan.gap(i, j)
-    who = lamps.nonzero()[:, 0]
+    who = plan.those(lamps)
     best = gap.new_full((len(plan),), -9.0).scatter_reduce(0, i, OVER - gap, "amax")[who]
     near = gap.new_full((len(plan),), 9.0).scatter_reduce(0, i[tables], gap[tables], "amin")[who]
     floor = plan.floor[plan.scene[who]]
@@ -42,7 +42,7 @@ def lamp_on_surface(plan: Plan) -> Found:
         return nobody(plan.size)
     carriers = plan.which(lambda kind: kind.carries)
     i, j = plan.pairs(small, carriers)
-    who = small.nonzero()[:, 0]
+    who = plan.those(small)
     lateral, forward = plan.local(i, j)
     half = plan.size[j][:, [0, 2]] / 2
     inside = torch.minimum(half[:, 0] - lateral.abs(), half[:, 1] - forward.abs())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from echomodel.floors import SIDES, edges, known, signed_area, signed_distance
+from echomodel.floors import SIDES, edges, signed_area
 from echomodel.objective.found import Found, found, nobody
 from echomodel.objective.plan import FAR, Plan
 from echomodel.objective.support import ON_CEILING, ON_FLOOR
@@ -28,17 +28,17 @@ def apart(plan: Plan) -> Found:
 
 def on_floor(plan: Plan) -> Found:
     """Every piece lies within the walls."""
-    who = (known(plan.floor)[plan.scene] & plan.moved).nonzero()[:, 0]
+    who = plan.those(plan.walled & plan.moved)
     if not len(who):
         return nobody(plan.size)
-    floor = plan.floor[plan.scene[who]]
     signs = plan.numbers(SIDES)
     half = plan.size[who][:, None, [0, 2]] / 2 * signs
-    cos, sin = plan.yaw[who, None].cos(), plan.yaw[who, None].sin()
+    cos, sin = plan.turn[0][who, None], plan.turn[1][who, None]
     x, z = cos * half[..., 0] + sin * half[..., 1], cos * half[..., 1] - sin * half[..., 0]
     points = torch.stack([x, z], -1) + plan.position[who][:, None, [0, 2]]
-    inside = signed_distance(points, floor).amin(1)
-    return found(who, torch.minimum(inside, _off_corners(plan, who)) + TOUCH, measure=-inside)
+    inside = plan.inside(points, who).amin(1)
+    clear = inside if plan.first.rectangle is not None else torch.minimum(inside, _off_corners(plan, who))
+    return found(who, clear + TOUCH, measure=-inside)
 
 
 def _off_corners(plan: Plan, who: Tensor) -> Tensor:
@@ -52,7 +52,7 @@ def _off_corners(plan: Plan, who: Tensor) -> Tensor:
         return plan.size.new_full((len(who),), FAR)
     looks = (turn < -1e-6)[plan.scene[who]][:, reflex]
     off = start[plan.scene[who]][:, reflex] - plan.position[who][:, None, [0, 2]]
-    cos, sin = plan.yaw[who, None].cos(), plan.yaw[who, None].sin()
+    cos, sin = plan.turn[0][who, None], plan.turn[1][who, None]
     local = torch.stack([cos * off[..., 0] - sin * off[..., 1], sin * off[..., 0] + cos * off[..., 1]], -1)
     outside = (local.abs() - plan.size[who][:, None, [0, 2]] / 2).amax(-1)
     return torch.where(looks, outside, FAR).amin(1)
@@ -60,28 +60,29 @@ def _off_corners(plan: Plan, who: Tensor) -> Tensor:
 
 def rests(plan: Plan) -> Found:
     """Furniture stands on the floor or on its carrier, with its middle over it, and what hangs hangs at the ceiling."""
-    carried = plan.carrier >= 0
-    on = plan.carrier.clamp_min(0)
-    bottom, top = plan.position[:, 1], plan.position[on, 1] + plan.size[on, 1]
-    ceiling = plan.ceiling - plan.size[:, 1]
-    air = torch.where(carried, bottom - top, torch.where(plan.carrier == ON_CEILING, ceiling - bottom, bottom))
-    free = ~(carried | (plan.carrier == ON_FLOOR) | ((plan.carrier == ON_CEILING) & torch.isfinite(ceiling)))
-    margin = TOUCH - torch.where(free, torch.zeros_like(air), air).abs()
-    i = carried.nonzero()[:, 0]
-    lateral, forward = plan.local(i, on[i])
-    half = plan.size[on[i]][:, [0, 2]] / 2
-    over = torch.minimum(half[:, 0] - lateral.abs(), half[:, 1] - forward.abs())
-    beside = torch.full_like(margin, FAR).index_put((i,), over)
-    who = torch.arange(len(plan))
+    who = plan.those(plan.moved | plan.moved[plan.carrier.clamp_min(0)])
+    carrier = plan.carrier[who]
+    carried, on = carrier >= 0, carrier.clamp_min(0)
+    bottom, top = plan.position[who, 1], plan.position[on, 1] + plan.size[on, 1]
+    ceiling = plan.ceiling[who] - plan.size[who, 1]
+    air = torch.where(carried, bottom - top, torch.where(carrier == ON_CEILING, ceiling - bottom, bottom))
+    free = ~(carried | (carrier == ON_FLOOR) | ((carrier == ON_CEILING) & torch.isfinite(ceiling)))
+    air = torch.where(free, 0.0, air)
+    margin, beside = TOUCH - air.abs(), torch.full_like(air, FAR)
+    if bool(carried.any()):
+        lateral, forward = plan.local(who[carried], on[carried])
+        half = plan.size[on[carried]][:, [0, 2]] / 2
+        over = torch.minimum(half[:, 0] - lateral.abs(), half[:, 1] - forward.abs())
+        beside = beside.index_put((carried,), over)
     return found(
-        who, torch.minimum(margin, beside), other=plan.carrier.clamp_min(-1), measure=torch.where(free, 0.0, air),
-        words=(beside < margin).long(),
-    )  # fmt: skip
+        who, torch.minimum(margin, beside), other=carrier.clamp_min(-1), measure=air, words=(beside < margin).long()
+    )
 
 
 def in_height(plan: Plan) -> Found:
     """Nothing lies below the floor or reaches through the ceiling."""
-    ceiling = plan.ceiling
-    low, high = plan.position[:, 1], ceiling - plan.position[:, 1] - plan.size[:, 1]
+    who = plan.those(plan.moved)
+    ceiling, low = plan.ceiling[who], plan.position[who, 1]
+    high = ceiling - low - plan.size[who, 1]
     margin = TOUCH + torch.minimum(low, torch.where(torch.isfinite(ceiling), high, FAR))
-    return found(torch.arange(len(plan)), margin, measure=TOUCH - margin, words=(high < low).long())
+    return found(who, margin, measure=TOUCH - margin, words=(high < low).long())

@@ -11,7 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.floors import edges, known
+from echomodel.floors import edges, known, signed_distance
+from echomodel.objective.found import worst
 from echomodel.objective.support import carriers, shared_fraction
 from echomodel.openings import Opening
 from echomodel.rules.geometry import BoxesLike
@@ -116,6 +117,26 @@ class Plan:
         """(N,) bool, seats that are moved aside to open or to reach something."""
         return self.which(lambda kind: kind.role == "seat" and not kind.access)
 
+    @cached_property
+    def solid(self) -> Tensor:
+        """(N,) bool, seats without a front: stools."""
+        return self.which(lambda kind: kind.solid)
+
+    @cached_property
+    def works(self) -> Tensor:
+        """(N,) bool, boxes at whose front somebody works or takes things out."""
+        return self.which(lambda kind: kind.access > 0)
+
+    @cached_property
+    def dining(self) -> Tensor:
+        """(N,) bool, tables that people sit around."""
+        return self.which(lambda kind: kind.role == "board" and not (kind.access or kind.wall))
+
+    @cached_property
+    def smaller(self) -> Tensor:
+        """(N,) int64, order of the boxes by volume, of equal ones the later first."""
+        return torch.argsort(torch.argsort(self.size.detach().prod(1).flip(0), stable=True)).flip(0)
+
     def _kept(self, asked: tuple[str, ...], values: Callable[[], list[bool]]) -> Tensor:
         """A mask that is asked for again and again."""
         if asked not in self._masks:
@@ -201,12 +222,30 @@ class Plan:
 
     # -- pairs -------------------------------------------------------------------------------------------------------
 
-    def pairs(self, first: Tensor, second: Tensor) -> tuple[Tensor, Tensor]:
-        """Numbers (P,), (P,) of all ordered pairs of different boxes of one room, the first of `first` (N,) bool."""
+    def those(self, mask: Tensor) -> Tensor:
+        """(P,) int64, numbers of the boxes of a mask (N,) bool."""
+        return mask.nonzero()[:, 0]
+
+    def pairs(self, first: Tensor, second: Tensor, *, least: bool = False) -> tuple[Tensor, Tensor]:
+        """Numbers (P,), (P,) of all ordered pairs of different boxes of one room, the first of `first` (N,) bool.
+
+        Arguments:
+            first, second: (N,) bool, by the words of boxes and what stands alike in copies, never by their poses.
+            least: the rows go to `worst`, which alone knows what pairs are left out of copies of one room.
+        """
         together = (self.scene[:, None] == self.scene[None]) & first[:, None] & second[None]
         together.fill_diagonal_(False)
         i, j = together.nonzero(as_tuple=True)
         return i, j
+
+    def beside(self, i: Tensor, others: Tensor) -> tuple[Tensor, Tensor]:
+        """Rows (Q,) of boxes i (P,), and the boxes (Q,) of others (N,) bool that stand in the same room."""
+        row, k = ((self.scene[i][:, None] == self.scene[None]) & others).nonzero(as_tuple=True)
+        return row, k
+
+    def worst(self, who: Tensor, margin: Tensor, other: Tensor) -> tuple[Tensor, Tensor]:
+        """Of the rows (P,) of each box the least margin (N,), `FAR` where it has none, and whom that is about."""
+        return worst(who, margin, other, len(self), FAR)
 
     def local(self, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
         """(P,) and (P,): how far i's centre lies to j's +x side and before j's centre, metres."""
@@ -239,6 +278,18 @@ class Plan:
         """(P,): distance from i's centre to j's footprint, 0 inside it, metres."""
         lateral, forward = self.nearest_point(i, j)
         return (lateral.square() + forward.square()).clamp_min(1e-12).sqrt()
+
+    def ahead(self, i: Tensor, j: Tensor, sign: float = 1.0) -> tuple[Tensor, Tensor, Tensor]:
+        """(P,) each, metres: from i's front to j, of i's width that j covers, and how far j's middle lies before i's.
+
+        Arguments:
+            sign: -1 looks at i's back.
+        """
+        lateral, forward = self.local(j, i)
+        half_width, half_depth = self.reach(j, i)
+        forward = sign * forward
+        covered = torch.minimum(self.size[i, 0], self.size[i, 0] / 2 + half_width - lateral.abs())
+        return forward - half_depth - self.size[i, 2] / 2, covered, forward
 
     @cached_property
     def couples(self) -> tuple[Tensor, Tensor, Tensor]:
@@ -318,7 +369,7 @@ class Plan:
 
     def attended(self, *stances: str) -> tuple[Tensor, Tensor]:
         """Numbers (P,), (P,) of the boxes that stand so to what they attend, and of what that is."""
-        i = ((self.anchor >= 0) & self.stands(*stances)).nonzero()[:, 0]
+        i = self.those((self.anchor >= 0) & self.stands(*stances))
         return i, self.anchor[i]
 
     # -- walls -------------------------------------------------------------------------------------------------------
@@ -335,6 +386,25 @@ class Plan:
         normal = torch.stack([-along[..., 1], along[..., 0]], -1) * torch.sign(area)[:, None, None]
         length = length * known(self.floor)[:, None]
         return start, along, normal, length
+
+    @cached_property
+    def walled(self) -> Tensor:
+        """(N,) bool, boxes of rooms whose floor is known."""
+        return known(self.floor)[self.scene]
+
+    @cached_property
+    def rectangle(self) -> tuple[Tensor, Tensor] | None:
+        """Middle (2,) and half extents (2,), metres, of the first floor if that is a rectangle along x and z."""
+        corners = self.floor[0][torch.isfinite(self.floor[0]).all(1)]
+        if len(corners) != 4:
+            return None
+        low, high = corners.amin(0), corners.amax(0)
+        square = bool(((corners == low) | (corners == high)).all()) and bool((high > low).all())
+        return ((low + high) / 2, (high - low) / 2) if square else None
+
+    def inside(self, points: Tensor, who: Tensor) -> Tensor:
+        """(P, Q): metres from points (P, Q, 2) at boxes (P,) to the nearest wall, negative beyond it; `FAR` without."""
+        return torch.where(self.walled[who, None], signed_distance(points, self.floor[self.scene[who]]), FAR)
 
     def back_gaps(self, who: Tensor) -> Tensor:
         """(P,): metres between the backs of some boxes and the wall behind them; `FAR` where there is none."""

@@ -30,10 +30,13 @@ class Told:
         """Two pieces stand to each other as the graph says."""
         rules = rule_set(plan.rules)
         rule = rules.rules.get(self.predicate)
-        rows = plan.told(self.predicate)
-        if rule is None or rule.margin is None or not len(rows[0]):
+        i, j = plan.told(self.predicate)
+        if rule is None or rule.margin is None or not len(i):
             return nobody(plan.size)
-        i, j = rows
+        keep = plan.moved[i] | plan.moved[j]
+        i, j = i[keep], j[keep]
+        if not len(i):
+            return nobody(plan.size)
         of = pairs(plan, i, j, plan.centres, oriented=rules.oriented, fronts=plan.fronts)
         return found(i, rule.margin(of), other=j)
 

@@ -73,6 +73,8 @@ def _viewers(plan: Plan) -> Watched:
     stands = plan.stands("opposite")
     on_stand = (plan.anchor >= 0) & stands[plan.anchor.clamp_min(0)] if len(plan) else stands
     i, j = plan.pairs(stands | (plan.of("screen") & ~on_stand), plan.of("sofa", "bed") | plan.stands("company"))
+    if not len(i):
+        return i, j, plan.size.new_zeros(0, 4), plan.size.new_zeros(0, 4), plan.size.new_zeros(0), i
     for better in (_told, _lying_or_sitting_back):
         good = better(plan, i, j)
         keep = good | ~torch.isin(i, i[good])
@@ -107,13 +109,15 @@ def _lying_or_sitting_back(plan: Plan, i: Tensor, j: Tensor) -> Tensor:
 def _clear(plan: Plan, i: Tensor, j: Tensor) -> tuple[Tensor, Tensor]:
     """(P,) and (P,): metres between the line from screen i to viewer j and the next thing that is high, and which."""
     high = plan.standing & ~plan.stands("before") & (plan.position[:, 1] + plan.size[:, 1] > HIGH).detach()
-    pair, block = (high[None] & (plan.scene[i][:, None] == plan.scene[None])).nonzero(as_tuple=True)
-    keep = (block != i[pair]) & (block != j[pair]) & (plan.gap(i[pair], block) > 1e-3)  # the last: it stands on that
+    pair, block = plan.beside(i, high)
+    keep = (block != i[pair]) & (block != j[pair])
+    pair, block = pair[keep], block[keep]
+    keep = plan.gap(i[pair], block) > 1e-3  # else it stands on that
     pair, block = pair[keep], block[keep]
     share = torch.linspace(0.1, 0.9, STEPS, dtype=plan.size.dtype)[:, None, None]
     start, end = plan.position[i[pair]][:, [0, 2]], plan.position[j[pair]][:, [0, 2]]
     offset = start + share * (end - start) - plan.position[block][:, [0, 2]]
-    cos, sin = plan.yaw[block].cos(), plan.yaw[block].sin()
+    cos, sin = plan.turn[0][block], plan.turn[1][block]
     lateral = (cos * offset[..., 0] - sin * offset[..., 1]).abs() - plan.size[block, 0] / 2
     forward = (sin * offset[..., 0] + cos * offset[..., 1]).abs() - plan.size[block, 2] / 2
     return worst(pair, torch.maximum(lateral, forward).amin(0) - GRAZE, block, len(i), FAR)

@@ -18,9 +18,8 @@ DEEP = 6.0  # metres of the room along its axis from which on it does; or someth
 
 def parallel(plan: Plan) -> Found:
     """Storage, beds, sofas, tables and desks stand parallel to a wall; side tables go with their seat."""
-    who = (
-        plan.of("storage", "bed", "sofa", "board") & plan.standing & ~plan.stands("company", "beside") & plan.moved
-    ).nonzero()[:, 0]
+    massive = plan.of("storage", "bed", "sofa", "board") & plan.standing
+    who = plan.those(massive & ~plan.stands("company", "beside") & plan.moved)
     _, along, _, length = (of[plan.scene[who]] for of in plan.walls)
     wall = torch.atan2(-along[..., 1], along[..., 0])
     off = _from_quarter(plan.yaw[who, None] - wall)
@@ -41,7 +40,7 @@ def at_wall(plan: Plan) -> Found:
     there = (plan.walls[3] > 0).any(1)[plan.scene]
     hung = plan.which(lambda kind: kind.support == "wall" and kind.role == "storage")
     belongs = (wall & plan.standing & ~beside) | hung
-    who = (belongs & there & (plan.moved | plan.of("sofa"))).nonzero()[:, 0]
+    who = plan.those(belongs & there & (plan.moved | plan.of("sofa")))
     gap = plan.back_gaps(who)
     free = plan.of("sofa")[who] & (gap >= PASSAGE)
     if bool(free.any()):

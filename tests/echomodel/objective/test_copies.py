@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.objective import TERMS, plan_of
+from echomodel.objective import TERMS, copies, plan_of
 from echomodel.objective.copies import copies_of
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
@@ -22,14 +22,15 @@ ROOMS = [
 ]
 
 
-@pytest.fixture(scope="module", params=range(len(ROOMS)))
+@pytest.fixture(scope="module", params=[(room, once) for room in range(len(ROOMS)) for once in (False, True)])
 def copied(request):
     """A plan, seven copies of it with two boxes elsewhere, each as a plan of its own, and which boxes these are."""
-    room = ROOMS[request.param]
+    number, once = request.param
+    room = ROOMS[number]
     told = label_relations(room, rules="strict", drop=0.7, rng=np.random.default_rng(0))
     stated = (Stated("against_wall", 0), Stated("between", 1, (0, 2)))
     plan = plan_of(room, room.categories, room.floor_polygon, room.openings, told, height=2.7, stated=stated)
-    luck = torch.Generator().manual_seed(request.param)
+    luck = torch.Generator().manual_seed(number)
     position, yaw = plan.position[None].repeat(7, 1, 1), plan.yaw[None].repeat(7, 1)
     moved = torch.zeros(len(plan), dtype=torch.bool)
     moved[[1, len(plan) // 2]] = True
@@ -39,13 +40,15 @@ def copied(request):
     for one in alone:
         for name in ("anchor", "carrier", "joins"):
             vars(one)[name] = getattr(plan, name)
-    return plan, copies_of(plan, position, yaw, moved), alone, moved
+    before, copies.MANY = copies.MANY, 0 if once else 10**9  # whether what stands alike is looked at once
+    yield plan, copies_of(plan, position, yaw, moved), alone, moved
+    copies.MANY = before
 
 
 @pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
 def test_terms_find_in_copies_what_they_find_in_each(copied, term):
-    plan, copies, alone, moved = copied
-    seen, differ = term.find(copies), {}
+    plan, room, alone, moved = copied
+    seen, differ = term.find(room), {}
     for k, one in enumerate(alone):
         whole = term.find(one)
         rows = seen.who // len(plan) == k
@@ -58,3 +61,23 @@ def test_terms_find_in_copies_what_they_find_in_each(copied, term):
         differ[k] = [(who, round(margin, 6)) for who, margin in every]  # left out, as it stands alike in all copies
     assert all(left == differ[0] for left in differ.values()), term.name
     assert not any(moved[who] for who, _ in differ[0])
+
+
+@pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
+def test_what_a_term_does_not_look_at_changes_nothing_that_it_finds(copied, term):
+    plan, _, alone, moved = copied
+    if bool(copies.looks_at(plan, term.find)[0][moved].any()):
+        return
+    found = [term.find(one) for one in alone]
+    for one in found:
+        assert torch.equal(one.who, found[0].who)
+        assert torch.allclose(one.margin, found[0].margin)
+
+
+def test_terms_look_at_what_they_are_about(copied):
+    plan = copied[0]
+    chairs = plan.stands("at") & (plan.anchor >= 0)
+    looks = {term.name: copies.looks_at(plan, term.find)[0] for term in TERMS}
+    assert bool((looks["apart"] & looks["on_floor"]).all())
+    assert bool(looks["seat_faces"][chairs & ~plan.solid].all())
+    assert not bool(looks["pendant_over"][chairs].any())

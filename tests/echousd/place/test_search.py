@@ -15,7 +15,7 @@ from echomodel.rules.placements import Stated
 from echomodel.vocabulary import vocabulary
 from echousd.place import place_boxes
 from echousd.place.problem import pose
-from echousd.place.search import PRICE, Search, State, price
+from echousd.place.search import PRICE, Search, State, priced
 from echousd.place.setting import setting_of
 
 ID = {row.name: row.id for row in vocabulary().predicates}
@@ -61,6 +61,11 @@ def missed():
             if bool((seen.margin < 0).any()):
                 found.setdefault(term.name, (seen, plan))
     return found
+
+
+def price(term, seen, plan):
+    """What the rows of a term cost."""
+    return priced([(term, seen)], plan)[1]
 
 
 @pytest.mark.parametrize("term", TERMS, ids=[term.name for term in TERMS])
