@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.boxes2d import seen
+
 CUT = 3.0  # how much more what is cut off by a picture's border disturbs
 ASPECT = 1.6  # of a picture from inside: its width over its height
 # rays through such a picture whose half width at distance 1 is 1, and what each of them counts
@@ -44,9 +46,8 @@ class Furniture:
 
     def nearness(self, eye: np.ndarray, reach: float) -> np.ndarray:
         """(n,) how near each box is to `eye` (3,): 0 at `reach` metres and beyond, 1 where the eye touches it."""
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        x, y, z = (eye - self.position - self.size * (0.0, 0.5, 0.0)).T
-        local = np.stack([cos * x - sin * z, y, sin * x + cos * z], 1)
+        local = eye - self.position - self.size * (0.0, 0.5, 0.0)
+        local[:, [0, 2]] = seen(local[:, [0, 2]], self.yaw)
         away = np.linalg.norm(np.maximum(np.abs(local) - self.size / 2, 0.0), axis=1)
         return np.clip(1.0 - away / reach, 0.0, 1.0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from echomodel.boxes2d import seen
 from echomodel.dressing import usual_size
 from echomodel.openings import hinge_point, inward_normal
 from echousd.dressing.setting import Setting, Standing, Thing, rectangle
@@ -60,9 +61,8 @@ def _under(setting: Setting, host: Standing) -> tuple[set[str], tuple[float, flo
         tables = [o for o in setting.stands("before") if host.footprint.distance(o.footprint) < AROUND]
         reach = 1.7
         for table in tables[:1]:
-            cos, sin = np.cos(host.yaw), np.sin(host.yaw)
-            away = table.position - host.position
-            reach = float(np.clip(sin * away[0] + cos * away[2] - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
+            _, ahead = seen((table.position - host.position)[[0, 2]], host.yaw)
+            reach = float(np.clip(ahead - front, 0.4, 1.3)) + float(table.size[2]) / 2 + 0.45
         around = {o.name for o in (*setting.of("seat", "sofa", "light", "decor"), *setting.stands("before", "beside"))}
         long = reach + 0.3
         return {host.name, *around}, (0.0, front - 0.3 + long / 2), (w + 0.5, long)

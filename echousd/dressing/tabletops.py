@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from echomodel.boxes2d import seen
 from echomodel.dressing import KINDS, usual_size
 from echomodel.dressing.books import BOUND, books_in, bound
 from echousd.dressing.setting import Setting, Standing, Thing
@@ -139,9 +140,7 @@ def _laid(setting: Setting, host: Standing, surface: Surface) -> None:
     x0, z0, x1, z1 = surface.bounds
     middle, half = np.array([x0 + x1, z0 + z1]) / 2, np.array([x1 - x0, z1 - z0]) / 2
     for seat in setting.of("seat"):
-        away = seat.position - host.position
-        cos, sin = np.cos(host.yaw), np.sin(host.yaw)
-        local = np.array([cos * away[0] - sin * away[2], sin * away[0] + cos * away[2]]) - middle
+        local = seen((seat.position - host.position)[[0, 2]], host.yaw) - middle
         beyond = np.abs(local) - half
         if np.max(beyond) > 0.6 or np.min(beyond) > 0:
             continue

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from echomodel.boxes2d import hull, seen
 from echomodel.vocabulary import Predicate, vocabulary
 from echousd.place.footprints import (
     FIRST,
@@ -197,13 +198,11 @@ def _facing(size: np.ndarray, position: np.ndarray, yaw: np.ndarray, triplets: n
     from echomodel.rules.sets import LOOK
 
     i, j = triplets[:, 0], triplets[:, 2]
-    x, z = (position[j] - position[i])[:, [0, 2]].T
-    c, s = np.cos(yaw[i]), np.sin(yaw[i])
-    aside, ahead = np.abs(c * x - s * z), s * x + c * z
-    turn = yaw[j] - yaw[i]
-    across = (np.abs(np.cos(turn)) * size[j, 0] + np.abs(np.sin(turn)) * size[j, 2]) / 2
-    looks = ahead / np.sqrt(np.maximum(x * x + z * z, TINY)) - LOOK
-    return np.maximum(looks, np.minimum(across - aside, ahead))
+    way = (position[j] - position[i])[:, [0, 2]]
+    aside, ahead = seen(way, yaw[i]).T
+    across = hull(size[j][:, [0, 2]] / 2, yaw[j] - yaw[i])[:, 0]
+    looks = ahead / np.sqrt(np.maximum((way * way).sum(1), TINY)) - LOOK
+    return np.maximum(looks, np.minimum(across - np.abs(aside), ahead))
 
 
 def _beside(pair: Pairs, relations: Sequence[Predicate], strict: bool) -> Values:

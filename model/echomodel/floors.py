@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from echomodel.boxes2d import CORNERS, outline
+
 GRID = 6  # the floor's plan is told as signed distances at GRID x GRID places of its bounding box
 FAR = 1e3  # metres: no wall is so far away
 SIDES = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))  # corners and middles of a footprint
@@ -15,7 +17,7 @@ SIDES = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))  
 
 def rectangle(width: float, depth: float) -> Tensor:
     """(4, 2) float32, corners (x, z) of a rectangular floor about the origin, metres."""
-    return torch.tensor([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * torch.tensor([width, depth]) / 2
+    return torch.tensor(CORNERS) * torch.tensor([width, depth]) / 2
 
 
 def centred(floor: Sequence[float] | Sequence[Sequence[float]] | np.ndarray | None) -> Tensor:
@@ -157,11 +159,7 @@ def footprint(size: Tensor, position: Tensor, yaw: Tensor) -> Tensor:
     Returns:
         (N, 8, 2) float32, x and z, metres. Walls that enter between two of these points are not met.
     """
-    half = size[:, None, [0, 2]] / 2
-    local = half * size.new_tensor(SIDES)
-    cos, sin = yaw.cos()[:, None], yaw.sin()[:, None]
-    turned = torch.stack([cos * local[..., 0] + sin * local[..., 1], cos * local[..., 1] - sin * local[..., 0]], -1)
-    return turned + position[:, None, [0, 2]]
+    return outline(size[:, [0, 2]] / 2, yaw, SIDES) + position[:, None, [0, 2]]
 
 
 def plan_features(floor: Tensor) -> Tensor:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import axes
 from echomodel.openings import STEP, WINDOW_DEPTH, Opening, inward_normal, segment
 
 ROW = 10  # x0, z0, x1, z1 of the jambs, x and z of the inward normal, depth that stays free, sill, top, 1 = window
@@ -100,20 +101,13 @@ def _gaps(boxes: Boxes, rows: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, T
     length = (far - near).square().sum(-1).clamp_min(1e-9).sqrt()
     along = (far - near) / length[..., None]
     off = boxes.position[:, None, [0, 2]] - (near + far) / 2
-    side, front = _axes(boxes)
     half = boxes.size[:, None, [0, 2]] / 2
 
     def reach(direction: Tensor) -> Tensor:
-        parts = [(direction * axis[:, None]).sum(-1).abs() for axis in (side, front)]
+        parts = [(direction * axis[:, None]).sum(-1).abs() for axis in axes(boxes.yaw)]
         return (torch.stack(parts, -1) * half).sum(-1)
 
     beside = (off * along).sum(-1).abs() - reach(along) - length / 2
     before = (off * inward).sum(-1) - reach(inward) - rows[..., 6]
     under = rows[..., 7] - (boxes.position[:, 1] + boxes.size[:, 1])[:, None]
     return there, rows[..., 9] > 0.5, beside, before, under
-
-
-def _axes(boxes: Boxes) -> tuple[Tensor, Tensor]:
-    """(N, 2) unit vectors (x, z) to the side and to the front of each box."""
-    cos, sin = boxes.yaw.cos(), boxes.yaw.sin()
-    return torch.stack([cos, -sin], 1), torch.stack([sin, cos], 1)

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from echomodel.boxes2d import CORNERS
+
 KINDS = ("door", "window", "passage")
 HINGES = ("left", "right")
 SWINGS = ("in", "out")
@@ -151,7 +153,7 @@ def overlap(one: Opening, other: Opening) -> float:
 
 def rectangle(width: float, depth: float) -> np.ndarray:
     """(4, 2) float, corners of a floor of x and z extents about the origin: wall 0 at -z, 1 at +x, 2 at +z, 3 at -x."""
-    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * (width / 2, depth / 2)
+    return np.array(CORNERS) * (width / 2, depth / 2)
 
 
 def edge_lengths(polygon: Any) -> np.ndarray:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from echomodel.boxes2d import outline
 from echomodel.files import write_text
 from echomodel.openings import Opening, opening_from_json
 
@@ -136,9 +137,4 @@ def footprints(size: np.ndarray, position: np.ndarray, yaw: np.ndarray) -> np.nd
     Arguments:
         size, position: (n, 3) float, metres, as in `RoomBoxes`. yaw: (n,) float, radians.
     """
-    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    local = signs[None] * (size[:, None, [0, 2]] / 2)
-    cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-    x = cos * local[..., 0] + sin * local[..., 1]
-    z = cos * local[..., 1] - sin * local[..., 0]
-    return np.stack([x, z], -1) + position[:, None, [0, 2]]
+    return np.asarray(outline(size[:, [0, 2]] / 2, yaw) + position[:, None, [0, 2]])

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from echomodel.boxes import Boxes
+from echomodel.boxes2d import hull, seen
 from echomodel.compact.pairs import Pairs
 from echomodel.floors import SIDES, footprint, known, nearest_wall, signed_distance, wall_distances
 
@@ -32,7 +33,7 @@ def wall_features(boxes: Boxes, floor: Tensor) -> Tensor:
     Arguments:
         boxes: N boxes. floor: (N, K, 2) float32, corners of the floor under each, NaN = unknown.
     """
-    ahead = wall_distances(boxes.position[:, [0, 2]], floor) - _hull(boxes)[:, [0, 0, 1, 1]]
+    ahead = wall_distances(boxes.position[:, [0, 2]], floor) - _hull_of(boxes)[:, [0, 0, 1, 1]]
     outline = footprint(boxes.size, boxes.position, boxes.yaw)
     there = known(floor)[:, None].to(ahead.dtype)
     gaps = torch.cat([ahead, signed_distance(outline, floor)], dim=1) * there
@@ -50,10 +51,8 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
     i, j = pairs.receiver, pairs.sender
     apart = boxes.position[j] - boxes.position[i]
     cos, sin = boxes.yaw.cos(), boxes.yaw.sin()
-    hull = _hull(boxes)
-    gap = apart[:, [0, 2]].abs() - hull[i] - hull[j]
-    lateral = cos[i] * apart[:, 0] - sin[i] * apart[:, 2]
-    forward = sin[i] * apart[:, 0] + cos[i] * apart[:, 2]
+    reach = _hull_of(boxes)
+    gap = apart[:, [0, 2]].abs() - reach[i] - reach[j]
     extent = torch.stack([boxes.size.log().sum(1), boxes.size[:, 1].log()], dim=1)
     larger = extent[j] - extent[i]
     lift = boxes.position[j, 1] - boxes.position[i, 1] - boxes.size[i, 1]
@@ -61,7 +60,7 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
     return torch.cat(
         [
             apart / 2, torch.tanh(apart / ROUND_ABOUT), torch.tanh(gap / ROUND_ABOUT), torch.tanh(gap / NEAR),
-            torch.tanh(torch.stack([lateral, forward], 1)), torch.tanh(lift / ROUND_ABOUT)[:, None],
+            torch.tanh(_across(boxes, i, j)), torch.tanh(lift / ROUND_ABOUT)[:, None],
             torch.tanh(mirrored / ROUND_ABOUT), torch.tanh(mirrored / NEAR),
             larger / 2, torch.tanh(larger / RATIO),
             torch.stack([sin[j] * cos[i] - cos[j] * sin[i], cos[j] * cos[i] + sin[j] * sin[i]], 1),
@@ -75,29 +74,22 @@ def pair_features(boxes: Boxes, pairs: Pairs) -> Tensor:
 
 def _across(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
     """(P, 2) metres to the side and to the front of i at which j stands."""
-    apart = (boxes.position[j] - boxes.position[i])[:, [0, 2]]
-    cos, sin = boxes.yaw[i].cos(), boxes.yaw[i].sin()
-    return torch.stack([cos * apart[:, 0] - sin * apart[:, 1], sin * apart[:, 0] + cos * apart[:, 1]], 1)
+    return seen((boxes.position[j] - boxes.position[i])[:, [0, 2]], boxes.yaw[i])
 
 
 def seen_from(boxes: Boxes, i: Tensor, j: Tensor) -> Tensor:
     """Where j stands in the frame of i, the gaps between the two there, and the way from i's front to j: (P, 10)."""
     place = _across(boxes, i, j)
-    turn = boxes.yaw[j] - boxes.yaw[i]
-    cos, sin = turn.cos().abs(), turn.sin().abs()
-    width, depth = boxes.size[j, 0], boxes.size[j, 2]
-    half = torch.stack([cos * width + sin * depth, sin * width + cos * depth], 1) / 2
-    gap = place.abs() - half - boxes.size[i][:, [0, 2]] / 2
+    half = boxes.size[:, [0, 2]] / 2
+    gap = place.abs() - hull(half[j], boxes.yaw[j] - boxes.yaw[i]) - half[i]
     way = place / place.square().sum(1, keepdim=True).clamp_min(1e-4).sqrt()
     scales = [torch.tanh(numbers / scale) for numbers in (place, gap) for scale in (ROUND_ABOUT, NEAR)]
     return torch.cat([*scales, way], 1)
 
 
-def _hull(boxes: Boxes) -> Tensor:
+def _hull_of(boxes: Boxes) -> Tensor:
     """(N, 2) half extents of the boxes along the room's x and z, metres."""
-    cos, sin = boxes.yaw.cos().abs(), boxes.yaw.sin().abs()
-    width, depth = boxes.size[:, 0], boxes.size[:, 2]
-    return torch.stack([cos * width + sin * depth, sin * width + cos * depth], dim=1) / 2
+    return hull(boxes.size[:, [0, 2]] / 2, boxes.yaw)
 
 
 def _scales(gaps: Tensor) -> Tensor:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from echomodel.boxes2d import axes
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -136,8 +137,7 @@ def _walls(rooms: Iterable[RoomBoxes]) -> dict:
     for room in rooms:
         if not len(room):
             continue
-        front = np.stack([np.sin(room.yaw), np.cos(room.yaw)], -1)
-        right = np.stack([np.cos(room.yaw), -np.sin(room.yaw)], -1)
+        right, front = axes(room.yaw)
         plan = room.position[:, [0, 2]]
         reach = [ray_lengths(room.floor_polygon, plan, d) for d in (-front, right, -right, front)]
         back = reach[0] - room.size[:, 2] / 2

@@ -50,6 +50,11 @@ class Item:
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         return self.x + c * lateral + s * forward, self.z - s * lateral + c * forward
 
+    def seen(self, x: float, z: float) -> tuple[float, float]:
+        """How far to its +x side and how far before it a point lies; the inverse of `local`."""
+        c, s, dx, dz = math.cos(self.yaw), math.sin(self.yaw), x - self.x, z - self.z
+        return c * dx - s * dz, s * dx + c * dz
+
 
 class Builder:
     """Places boxes on a floor. Methods return what they placed, or None where nothing fits.
@@ -266,10 +271,8 @@ def overlaps(a: Item, b: Item, play: float) -> bool:
 
 def _separated(a: Item, b: Item, play: float) -> bool:
     """Whether an edge of `a` parts the two (separating axes of a)."""
-    c, s = math.cos(a.yaw), math.sin(a.yaw)
     turn_c, turn_s = abs(math.cos(b.yaw - a.yaw)), abs(math.sin(b.yaw - a.yaw))
-    dx, dz = b.x - a.x, b.z - a.z
-    lateral, forward = abs(c * dx - s * dz), abs(s * dx + c * dz)
+    lateral, forward = map(abs, a.seen(b.x, b.z))
     half_x, half_z = b.size[0] / 2, b.size[2] / 2
     return (
         lateral >= a.size[0] / 2 + turn_c * half_x + turn_s * half_z - play

@@ -479,10 +479,8 @@ def _bed_pendants(room: Builder, bed: Item, count: int) -> None:
         lateral, forward = bed.size[0] / 2 + 0.25, -bed.size[2] / 2 + 0.22
         for item in room.items:
             if item.category == "nightstand":
-                lateral = math.hypot(item.x - bed.x, item.z - bed.z)
-                dx, dz = item.x - bed.x, item.z - bed.z
-                lateral = abs(math.cos(bed.yaw) * dx - math.sin(bed.yaw) * dz)
-                forward = math.sin(bed.yaw) * dx + math.cos(bed.yaw) * dz
+                lateral, forward = bed.seen(item.x, item.z)
+                lateral = abs(lateral)
                 break
         style = room.style()
         for side in (-1, 1):

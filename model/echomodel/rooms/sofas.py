@@ -127,8 +127,7 @@ def _second_sofa(room: Builder, sofa: Item, table: Item | None) -> None:
             forward = (0.0 if table else sofa.size[2] / 2 + size[0] / 2) + room.rng.normal(0.0, 0.1)
             if table:
                 lateral = side * (centre.hull_x + size[2] / 2 + room.uniform(0.25, 0.6))
-                dx, dz = table.x - sofa.x, table.z - sofa.z
-                forward += math.sin(sofa.yaw) * dx + math.cos(sofa.yaw) * dz
+                forward += sofa.seen(table.x, table.z)[1]
                 lateral = side * max(abs(lateral), sofa.size[0] / 2 + size[2] / 2 - 0.2)
             if room.beside(sofa, category, size, lateral, forward, -side * HALF_PI, sofa.style):
                 break
@@ -139,8 +138,7 @@ def _seats(room: Builder, sofa: Item, table: Item | None, style: int) -> None:
     forward_table = sofa.size[2] / 2 + 0.8
     reach = 0.6
     if table:
-        dx, dz = table.x - sofa.x, table.z - sofa.z
-        forward_table = math.sin(sofa.yaw) * dx + math.cos(sofa.yaw) * dz
+        forward_table = sofa.seen(table.x, table.z)[1]
         reach = (table.size[0] if abs(math.cos(table.yaw - sofa.yaw)) > 0.5 else table.size[2]) / 2
     for category in ("armchair", "lounge_chair", "ottoman", "stool"):
         count = room.wanted.get(category, 0)

@@ -40,10 +40,9 @@ def dining_group(
             x = room.uniform(-room.floor.half_x, room.floor.half_x) * spread
             z = room.uniform(-room.floor.half_z, room.floor.half_z) * spread
             yaw = room.pick([0.0, HALF_PI, math.pi, -HALF_PI], [1, 1, 1, 1])
-        if sofa is not None and attempt < 16:  # seats and table stand side by side along the room
-            forward = math.sin(sofa.yaw) * (x - sofa.x) + math.cos(sofa.yaw) * (z - sofa.z)
-            if not -0.6 < forward < 2.6 and room.chance(0.8):
-                continue
+        # seats and table stand side by side along the room
+        if sofa is not None and attempt < 16 and not -0.6 < sofa.seen(x, z)[1] < 2.6 and room.chance(0.8):
+            continue
         # The chairs' places must be free too; later tries are content with less.
         slack = margin if attempt < 26 else 0.1
         around = Item(category, (size[0], size[1], size[2] + 2 * slack + 0.1), x, 0.0, z, yaw)

@@ -9,6 +9,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from echomodel.boxes2d import CORNERS, axes, outline, seen
+
 TINY = 1e-12
 
 
@@ -51,6 +53,11 @@ class PairGeometry:
         return self.position_s - self.position_o
 
     @cached_property
+    def local(self) -> Tensor:
+        """(P, 2) the subject's centre in the object's frame: along its width, along its front."""
+        return seen(self.offset[:, [0, 2]], self.yaw_o)
+
+    @cached_property
     def top_s(self) -> Tensor:
         """(P,) height of the subject's top."""
         return self.position_s[:, 1] + self.size_s[:, 1]
@@ -64,14 +71,14 @@ class PairGeometry:
     def footprint_s(self) -> tuple[Tensor, Tensor]:
         """Half extents (P, 2) along the subject's own axes and its corners (P, 4, 2), about the object's centre."""
         half = self._half(self.size_s)
-        corners = _corners(half, self.yaw_s if self.oriented else torch.zeros_like(self.yaw_s))
+        corners = outline(half, self.yaw_s if self.oriented else torch.zeros_like(self.yaw_s))
         return half, corners + self.offset[:, None, [0, 2]]
 
     @cached_property
     def footprint_o(self) -> tuple[Tensor, Tensor]:
         """As `footprint_s`, for the object."""
         half = self._half(self.size_o)
-        return half, _corners(half, self.yaw_o if self.oriented else torch.zeros_like(self.yaw_o))
+        return half, outline(half, self.yaw_o if self.oriented else torch.zeros_like(self.yaw_o))
 
     def _half(self, size: Tensor) -> Tensor:
         return size[:, [0, 2]] / 2 if self.oriented else size[:, [2, 0]] / 2
@@ -112,15 +119,14 @@ class PairGeometry:
         largest gap over the four edge directions (separating axes), with its sign changed."""
         gaps = [
             _gap(self.footprint_s[1] - self.offset[:, None, [0, 2]], self.footprint_o[1], self.offset, axis)
-            for axis in (*_axes(self.yaw_s), *_axes(self.yaw_o))
+            for axis in (*axes(self.yaw_s), *axes(self.yaw_o))
         ]
         return -torch.stack(gaps, -1).amax(-1)
 
     @cached_property
     def centre_inside(self) -> Tensor:
         """(P,) how far the subject's centre lies inside the object's footprint (negative: outside), metres."""
-        local = _rotate(self.offset[:, [0, 2]], -self.yaw_o)
-        return (self.footprint_o[0] - local.abs()).amin(-1)
+        return (self.footprint_o[0] - self.local.abs()).amin(-1)
 
     def mirror_distance(self, *, point: bool) -> Tensor:
         """(P,) smallest distance of the object to a mirror image of the subject in plan: about the room's x axis, its
@@ -184,10 +190,9 @@ def rectangle_overlap(corners: Tensor, half: Tensor, yaw: Tensor) -> Tensor:
     """
     # Edges that coincide would count twice or not at all: a hair of growth makes one of the two the inner one.
     half = half.abs() + 7.3e-6
-    a = _rotate(corners, -yaw[:, None].expand(corners.shape[:-1]))
+    a = seen(corners, yaw[:, None])
     winding = torch.sign(_cross(a[:, 1] - a[:, 0], a[:, 2] - a[:, 1]))
-    signs = torch.tensor([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], dtype=a.dtype, device=a.device)
-    b = half[:, None] * signs
+    b = half[:, None] * a.new_tensor(CORNERS)
     total = winding * _clipped_cross(a, b) + _clipped_cross(b, a, winding)
     return (total / 2).clamp_min(0)
 
@@ -213,24 +218,6 @@ def _clipped_cross(edges: Tensor, clip: Tensor, winding: Tensor | None = None) -
 
 def _cross(a: Tensor, b: Tensor) -> Tensor:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-
-
-def _rotate(points: Tensor, yaw: Tensor) -> Tensor:
-    """Points (..., 2) in (x, z) turned by yaw about +Y: x' = cos x + sin z, z' = -sin x + cos z."""
-    cos, sin = yaw.cos(), yaw.sin()
-    x, z = points[..., 0], points[..., 1]
-    return torch.stack([cos * x + sin * z, cos * z - sin * x], -1)
-
-
-def _corners(half: Tensor, yaw: Tensor) -> Tensor:
-    """Corners (P, 4, 2) of rectangles centred at the origin, in cyclic order."""
-    signs = torch.tensor([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], dtype=half.dtype, device=half.device)
-    return _rotate(half[:, None] * signs, yaw[:, None].expand(-1, 4))
-
-
-def _axes(yaw: Tensor) -> tuple[Tensor, Tensor]:
-    cos, sin = yaw.cos(), yaw.sin()
-    return torch.stack([cos, -sin], -1), torch.stack([sin, cos], -1)
 
 
 def _gap(corners_s: Tensor, corners_o: Tensor, offset: Tensor, axis: Tensor) -> Tensor:

@@ -14,7 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from echomodel.rules.geometry import BoxesLike, _corners, _rotate
+from echomodel.boxes2d import outline, seen
+from echomodel.rules.geometry import BoxesLike
 from echomodel.vocabulary import Category, vocabulary
 
 AT_WALL = 0.15  # metres between a wall and the side that stands against it
@@ -47,7 +48,7 @@ class Spread:
     @cached_property
     def corners(self) -> Tensor:
         """(K, 4, 2) of the footprint: both of the back, then both of the front, in cyclic order."""
-        return _corners(self.size[:, [0, 2]] / 2, self.yaw) + self.centre[:, None]
+        return outline(self.size[:, [0, 2]] / 2, self.yaw) + self.centre[:, None]
 
     @property
     def centre(self) -> Tensor:
@@ -136,7 +137,7 @@ def between(own: Spread, others: Sequence[Spread], walls: Walls | None, kind: Ca
     reach = reduce(torch.maximum, [(other.corners @ way).amax(1) for other in others])  # (K, directions)
     inside = (reach - own.centre @ way).amin(-1) + WITHIN
     clear = [
-        (_rotate(own.centre - other.centre, -other.yaw).abs() - other.size[:, [0, 2]] / 2).amax(-1) for other in others
+        (seen(own.centre - other.centre, other.yaw).abs() - other.size[:, [0, 2]] / 2).amax(-1) for other in others
     ]
     return reduce(torch.minimum, [inside, *clear])
 
