@@ -22,12 +22,12 @@ from echomodel.boxes import Boxes
 from echomodel.data.roomset import RoomSet, claim, pack_rooms
 from echomodel.files import write_text
 from echomodel.graph import GraphBatch
-from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
+from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.rules.telling import told_of_room
 from echousd.place.placing import place_boxes
-from echousd.place.search import price
+from echousd.place.search import cost_of
 
 if TYPE_CHECKING:
     from echomodel.echo import EchoModel
@@ -172,8 +172,7 @@ def _searched(room: RoomBoxes, triplets: np.ndarray, start: Boxes) -> tuple[floa
     if done.collisions or done.outside or (done.verdict == 0).any() or _missed(made, triplets):
         return None
     plan = plan_of(made, made.categories, made.floor_polygon, made.openings, triplets, height=made.height)
-    with torch.no_grad():
-        return sum(float(price(term, seen, plan).sum()) for term in TERMS if len((seen := term.find(plan)).who)), made
+    return cost_of(plan), made
 
 
 def _missed(room: RoomBoxes, triplets: np.ndarray) -> list:

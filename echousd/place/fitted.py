@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import torch
 
-from echomodel.objective import TERMS, plan_of
+from echomodel.objective import plan_of
 from echomodel.openings import Opening
 from echomodel.rooms.runs import Run, Site, obstacles, runs
 from echomodel.vocabulary import vocabulary
 from echousd.place.problem import Posed
 from echousd.place.relations import relation_margins
-from echousd.place.search import part_of, priced
+from echousd.place.search import cost_of, part_of
 
 MISSED = 3.0  # what a relation costs that a plan breaks
 SHARE = 0.5  # of what a plan costs by itself beside what the objective says of it
@@ -67,10 +66,7 @@ def fitted(
             problem.triplets, given=problem.fixed, height=problem.height, rules=problem.rules, stated=problem.stated,
         )  # fmt: skip
         planned = np.isin(np.arange(len(kinds)), who)
-        with torch.inference_mode():
-            part = part_of(room, planned | fixed)
-            paid = priced([(term, term.find(part)) for term in TERMS], part)[1]
-            cost = float(paid.sum()) + SHARE * run.cost
+        cost = cost_of(part_of(room, planned | fixed)) + SHARE * run.cost
         if cost < least - 1e-4:
             best, least = (Posed(problem, size, position, yaw), planned), cost
     return best

@@ -521,6 +521,12 @@ def priced(rows_of: Sequence[tuple[Term, Found]], room: Plan) -> tuple[Found, to
     return rows, (broken * (rows.margin < 0) + each * weight * missed) * blamed
 
 
+def cost_of(room: Plan) -> float:
+    """What a plan of one room costs by all terms."""
+    with torch.no_grad():
+        return float(priced([(term, term.find(room)) for term in TERMS], room)[1].sum())
+
+
 # What a broken term costs, and a unit that is missed of it, by its kind.
 PRICE = {"relations": (6.0, 4.0), "physics": (3.0, 10.0), "living": (2.0, 1.0), "composition": (1.5, 1.0)}
 
