@@ -11,7 +11,7 @@ from echousd.draw.scenery import Scenery
 from echousd.draw.viewpoints import View
 
 FINE, QUICK = 3, 2  # squared: rays per pixel
-SKY_RAYS, AROUND = 3, 2  # per ray: rays towards the sky; inside a room, to what stands around
+SKY_RAYS, AROUND = 3, 3  # per ray: rays towards the sky; inside a room, to what stands around
 
 
 class RenderUnavailable(ImportError, ValueError):
@@ -22,7 +22,8 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
     Every pixel sends `rays`² rays; together they cover the sun's disc and the sky evenly, each pixel with another
-    shift (randomised quasi-Monte Carlo), so that little noise is left.
+    shift (randomised quasi-Monte Carlo), so that little noise is left. In a `QUICK` picture a pixel's light is that
+    of its first ray wherever its others meet the same piece of surface.
 
     Arguments:
         scenery: triangles and their colours.
@@ -34,13 +35,17 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
     rng = np.random.default_rng(seed)
     scene = _embree(scenery)
     height = round(size / view.aspect)
-    shift = rng.random((height, size, 4)).astype(np.float32)
+    across, down = np.meshgrid(np.arange(size), np.arange(height))
+    shift = ((across[..., None] * LATTICE[0] + down[..., None] * LATTICE[1] + rng.random(4)) % 1.0).astype(np.float32)
     layers = np.zeros((height, size, LAYERS), np.float32)
     rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
     for start in range(0, height, rows):
         block = slice(start, min(height, start + rows))
+        first = None
         for sample in range(rays**2):
-            layers[block] += _shade(scene, scenery, view, size, rays, block, sample, shift[block])
+            got = _shade(scene, scenery, view, size, rays, block, sample, shift[block], first)
+            layers[block] += got
+            first = got if rays <= QUICK and first is None else first
     layers /= rays**2
     light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
     color = layers[..., ALBEDO] * light + layers[..., GLOW]
@@ -49,7 +54,7 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
 
 # What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
 ALBEDO, LIGHT, GLOW, NORMAL, POINT, LAYERS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), 15
-RINGS = (1, 2, 4)  # pixels between neighbours, pass by pass
+RINGS = (1, 2, 4, 8)  # pixels between neighbours, pass by pass
 
 
 def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -90,6 +95,8 @@ OUTSIDE = (  # what is seen through a window: height in it from -1 to 1, linear 
     np.array([-1.0, -0.55, -0.3, 0.2, 1.0]),
     np.array([(0.33, 0.42, 0.25), (0.47, 0.55, 0.40), (0.80, 0.84, 0.84), (0.74, 0.83, 0.92), (0.47, 0.65, 0.88)]),
 )
+# Of each pixel's shifts, a step to the right and one down: neighbours have different ones, so that smoothing sees all.
+LATTICE = np.array([(0.75487767, 0.81917251, 0.54970048, 0.73389190), (0.56984029, 0.67104361, 0.85667488, 0.62870672)])
 R2 = np.array([0.7548776662, 0.5698402910], np.float32)
 
 
@@ -105,9 +112,17 @@ def _embree(scenery: Scenery) -> Any:
 
 
 def _shade(
-    scene: Any, scenery: Scenery, view: View, size: int, rays: int, rows: slice, sample: int, shift: np.ndarray
+    scene: Any,
+    scenery: Scenery,
+    view: View,
+    size: int,
+    rays: int,
+    rows: slice,
+    sample: int,
+    shift: np.ndarray,
+    first: np.ndarray | None,
 ) -> np.ndarray:
-    """(rows, size, LAYERS) what one ray for each pixel of some rows brings back."""
+    """(rows, size, LAYERS) what one ray for each pixel of some rows brings back; light that `first` has is its own."""
     across, down = sample % rays, sample // rays
     x = (np.arange(size, dtype=np.float32) + (across + 0.5) / rays) / size * 2 - 1
     y = 1 / view.aspect - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
@@ -137,11 +152,18 @@ def _shade(
     normal = _unit(normal)
     toward = -direction[seen]
     normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
-    lifted = point + 2e-3 * normal
-    light, shine = (_light_inside if view.inside else _light)(
-        scene, scenery, lifted, normal, toward, face, sample, shift.reshape(-1, 4)[seen]
+    light, glow = np.empty((len(seen), 3), np.float32), scenery.emissive[face]
+    ask = slice(None)
+    if first is not None:
+        known = first.reshape(-1, LAYERS)[seen]
+        same = (_dot(normal, known[:, NORMAL]) > 0.95) & (np.abs(_dot(normal, point - known[:, POINT])) < 0.02)
+        light[same], glow[same] = known[same, LIGHT], known[same, GLOW]
+        ask = np.flatnonzero(~same)
+    lifted = point[ask] + 2e-3 * normal[ask]
+    light[ask], shine = (_light_inside if view.inside else _light)(
+        scene, scenery, lifted, normal[ask], toward[ask], face[ask], sample, shift.reshape(-1, 4)[seen][ask]
     )
-    glow = 0.5 * shine[:, None] + scenery.emissive[face]
+    glow[ask] += 0.5 * shine[:, None]
     out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
     return out.reshape(-1, size, LAYERS)
 
@@ -241,7 +263,7 @@ def _light_inside(
         near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
         hue = scenery.flat_colors[np.clip(other["primID"], 0, None)] / np.float32(THROWN)
         around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.3 + 0.7 * near), 1.0)
-    return light + around / AROUND * thrown, shine * 0.3
+    return light + around / AROUND * thrown + 0.8 * shine[:, None], np.zeros_like(shine)
 
 
 def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
