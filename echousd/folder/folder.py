@@ -69,7 +69,12 @@ def check_writable(folder: Path) -> None:
 
 
 def write_together(
-    folder: Path, files: Mapping[str, bytes], *, last: Iterable[str], remove: Iterable[str]
+    folder: Path,
+    files: Mapping[str, bytes],
+    *,
+    last: Iterable[str],
+    remove: Iterable[str],
+    kept: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Write all files of a room as one step and return the paths that changed.
 
@@ -81,19 +86,22 @@ def write_together(
         last: those of them that are moved after all others, in this order.
         remove: relative paths that no longer belong to the room, deleted at the very end; where nothing changes, they
             are left.
+        kept: files that are not ours -> what each is called from then on; whoever ends the run warns of them.
 
     Raises:
         ValueError: something cannot be written, would be outside of the folder, or another process is writing there;
             then nothing was changed.
     """
     with held(folder):
-        changed = _stage(folder, files, list(last), list(remove))
+        changed = _stage(folder, files, list(last), list(remove), dict(kept or {}))
         if changed:
             finish(folder)
     return changed
 
 
-def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: list[str]) -> list[str]:
+def _stage(
+    folder: Path, files: Mapping[str, bytes], last: list[str], remove: list[str], kept: dict[str, str]
+) -> list[str]:
     """Write what differs and the journal into the staging folder, and return the paths that will change."""
     staging = folder / STAGING
     order = [path for path in files if path not in last] + [path for path in last if path in files]
@@ -115,7 +123,7 @@ def _stage(folder: Path, files: Mapping[str, bytes], last: list[str], remove: li
         ]
         gone = [Removal(path=path, digest=digest_of(folder / path)) for path in remove if (folder / path).is_file()]
         if changed:
-            write_journal(staging, Journal(run=run_of(folder), move=move, remove=gone))
+            write_journal(staging, Journal(run=run_of(folder), move=move, remove=gone, kept=kept))
         else:
             _discard(staging)
     except OSError as error:
@@ -221,6 +229,8 @@ def _finish(folder: Path, journal: Journal) -> None:
         if digest_of(place) == removal.digest:
             place.unlink(missing_ok=True)
         _remove_empty(place.parent, folder)
+    for path, name in journal.kept.items():
+        tell_kept(folder, path, name)
     for place in touched:
         if place.is_dir():
             flush(place)

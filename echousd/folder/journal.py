@@ -39,7 +39,10 @@ class Removal(BaseModel):
 
 
 class Journal(BaseModel):
-    """All that is left to do once every file of a run is staged, in order; `run` is what it does, "" = nobody asks."""
+    """All that is left to do once every file of a run is staged, in order.
+
+    `run` is what it does, "" = nobody asks; `kept` are files that are not ours, and what each is called from then on.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -47,6 +50,7 @@ class Journal(BaseModel):
     run: Annotated[str, Field(max_length=200)] = ""
     move: list[Move]
     remove: list[Removal]
+    kept: dict[str, str] = {}
 
 
 def digest(content: bytes) -> str:

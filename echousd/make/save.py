@@ -119,10 +119,9 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     layers = [layer_file(name, crate=room.options.crate) for name in reversed(LAYERS)]
     last = [*layers, UNFIT, root, manifest]
     drawn = ownership.pictures(folder, room.name)
-    changed = folders.write_together(folder, files, last=last, remove=[*stale, *undone(folder), *drawn])
-    for path, name in kept.items():
-        if name:
-            folders.tell_kept(folder, path, name)
+    remove = [*stale, *undone(folder), *drawn]
+    told_kept = {path: name for path, name in kept.items() if name}
+    changed = folders.write_together(folder, files, last=last, remove=remove, kept=told_kept)
     for fault in unfit:
         warnings.warn(fault, stacklevel=3)
     for path in gone:

@@ -58,15 +58,15 @@ class Sequences(RuleBasedStateMachine):
         self.store = self.top / "store" if store else ""
         self.mine: set[bytes] = set()
         self.moved: set[str] = set()  # paths of the room's files that the person has taken away
-        self.toys: set[str] = set()
+        self.toys: dict[str, tuple[bytes, bool]] = {}  # prim in the root -> what was written, in a finished room
         self.back: list[dict[str, bytes]] = []
         self.ahead: list[dict[str, bytes]] = []
         self.count = 0
         self.patched = plain_files()
         self.patched.__enter__()
-        self.quiet = warnings.catch_warnings()
-        self.quiet.__enter__()
-        warnings.simplefilter("ignore")
+        self.listening = warnings.catch_warnings(record=True)
+        self.told = self.listening.__enter__()
+        warnings.simplefilter("always")
         save_room(plain_room(names, 0), self.folder, preview=False, store=self.store)
         self.now, self.step = self.state(), False
 
@@ -74,10 +74,9 @@ class Sequences(RuleBasedStateMachine):
         if not hasattr(self, "top"):
             return
         try:
-            if not self.folder_pending():
-                self.all_states_can_be_had_again()
+            self.all_states_can_be_had_again()
         finally:
-            self.quiet.__exit__(None, None, None)
+            self.listening.__exit__(None, None, None)
             self.patched.__exit__(None, None, None)
             shutil.rmtree(self.top)
 
@@ -94,12 +93,11 @@ class Sequences(RuleBasedStateMachine):
         if (self.folder / path).is_file():
             before = (self.folder / path).read_bytes()
             self.mine.discard(before)
-            toy = b""
-            if path == self.root.name:
-                toy = b'def Cube "Toy%d" {}\n' % self.number()
-                if not self.folder_pending():  # else whoever finishes the run may keep this root under another name
-                    self.toys.add(f"Toy{self.count}")
-            self.writes(path, before + toy + b"# mine %d\n" % self.number())
+            name = f"Toy{self.number()}" if path == self.root.name else ""
+            after = before + (f'def Cube "{name}" {{}}\n' if name else "").encode() + b"# mine %d\n" % self.number()
+            if name:
+                self.toys[name] = after, not self.folder_pending()
+            self.writes(path, after)
 
     @rule(asset=st.sampled_from(sorted(CATEGORIES)))
     def puts_a_layer_that_needs_an_asset(self, asset):
@@ -116,8 +114,8 @@ class Sequences(RuleBasedStateMachine):
 
     @rule(names=NAMES, kill=KILL, again=AGAIN)
     def edits(self, names, kill, again):
-        folders.recover(self.folder)
         self.follows()
+        folders.recover(self.folder)
         made = plain_room(names, 0, self.root)
         self.runs(lambda: save_room(made, self.folder, preview=False), kill, again)
 
@@ -155,8 +153,14 @@ class Sequences(RuleBasedStateMachine):
             assert content is not None or path in self.moved, path
             ours = content is None or path == self.root.name or digest(content) == recorded
             assert ours or content in self.mine, path
+        kept = {path.relative_to(self.folder).as_posix(): path.read_bytes() for path in self.folder.rglob("*.edited*")}
+        said = [str(each.message) for each in self.told if str(each.message).startswith(str(self.folder))]
+        assert all(any(line.endswith(f"; kept as {path}") for line in said) for path in kept), (kept, said)
         root = Sdf.Layer.OpenAsAnonymous(str(self.root))
-        assert self.toys <= {prim.name for prim in root.rootPrims}
+        there = {prim.name for prim in root.rootPrims}
+        for toy, (content, finished) in self.toys.items():
+            # what is put into a run that has not ended is no part of the room that it makes, and kept beside it
+            assert toy in there or (not finished and content in kept.values()), toy
         if manifest["store"]:
             store = Store.open(self.folder / manifest["store"])
             assert all(store.whole(key) for key in manifest["stored"].values())
@@ -165,8 +169,8 @@ class Sequences(RuleBasedStateMachine):
 
     def all_states_can_be_had_again(self):
         """All the way back, all the way ahead."""
-        folders.recover(self.folder)
         self.follows()
+        folders.recover(self.folder)
         for _ in range(len(self.back)):
             self.runs(lambda: self.steps(history.undo), None, True, step=True)
         assert self.back == []
@@ -193,13 +197,13 @@ class Sequences(RuleBasedStateMachine):
         if not self.folder_pending():
             self.now = self.state()
 
-    def content(self, path):
-        return (self.folder / path).read_bytes() if (self.folder / path).is_file() else None
+    def content(self, path, folder=None):
+        place = (folder or self.folder) / path
+        return place.read_bytes() if place.is_file() else None
 
-    def state(self):
-        manifest = find_manifest(self.folder, "bedroom")
-        paths = (*manifest["files"], "bedroom.json")
-        return {path: content for path in paths if (content := self.content(path)) is not None}
+    def state(self, folder=None):
+        paths = (*find_manifest(folder or self.folder, "bedroom")["files"], "bedroom.json")
+        return {path: content for path in paths if (content := self.content(path, folder)) is not None}
 
     def folder_pending(self):
         return half_written(self.folder)
@@ -211,6 +215,7 @@ class Sequences(RuleBasedStateMachine):
                 return step(self.root)
             except ValueError as error:
                 if str(error).endswith(("no edit to take back", "can be made again")):
+                    assert not (self.back if step is history.undo else self.ahead)
                     return ()
                 if step is history.redo and not self.ahead and ".zip: is damaged" in str(error):
                     return ()  # the person's archive might have been one of an edit
@@ -234,6 +239,7 @@ class Sequences(RuleBasedStateMachine):
         with dying(kill) as state:
             act()
         if state.died and again:
+            self.follows()
             act()
         if not state.died or again:
             assert not (self.folder / STAGING).exists()
@@ -241,15 +247,21 @@ class Sequences(RuleBasedStateMachine):
         self.follows()
 
     def follows(self):
-        """What was announced, as the room says now."""
-        if self.folder_pending():
-            return
-        now = self.state()
+        """What was announced, as the room says now, or will say once the run that has not ended is finished."""
+        if not self.folder_pending():
+            return self.announced(self.state(), self.folder)
+        with tempfile.TemporaryDirectory() as place:
+            copy = Path(shutil.copytree(self.folder, Path(place) / "bedroom", symlinks=True))
+            folders.recover(copy)
+            self.announced(self.state(copy), copy)
+
+    def announced(self, now, folder):
         if now.get("bedroom.json") == self.now.get("bedroom.json"):
             theirs = {path for path, content in self.now.items() if content in self.mine or path == self.root.name}
             self.same(now, {path: content for path, content in self.now.items() if path not in theirs})
             if not self.step and now != self.now:  # the root alone was written anew: what was taken back is gone
                 self.ahead = []
+                assert history.undone(folder) == []
             self.now = now
             return
         length = len(json.loads(now["bedroom.json"])["history"])
@@ -267,7 +279,9 @@ class Sequences(RuleBasedStateMachine):
         elif length == 0:
             self.back, self.ahead = [], []
         else:
+            assert not self.step
             assert length == len(self.back) + 1
+            assert history.undone(folder) == []
             self.back, self.ahead = [*self.back, self.now], []
         self.now = now
 
