@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import zipfile
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any, BinaryIO
 
 from trimesh.resolvers import Resolver
 
+from echomodel.files import unpacking
 from echousd.textures import FORMATS, MAX_BYTES, MAX_PIXELS
 
 STAGES = (".usd", ".usda", ".usdc", ".usdz")
@@ -89,7 +89,7 @@ class ModelFile:
     @contextmanager
     def opened(self) -> Iterator[BinaryIO]:
         """The model's bytes; raises ValueError for a file that is missing, no regular file, empty or too large."""
-        try:
+        with unpacking(self):
             if not self.path.is_file():
                 found = "not a regular file" if self.path.exists() else "no such file"
                 raise ValueError(f"{self}: {found}")
@@ -101,8 +101,6 @@ class ModelFile:
             archive = _archive(self.path, self.path.stat().st_mtime_ns)
             _check_size(self, archive.getinfo(self.member).file_size)
             yield io.BytesIO(archive.read(self.member))
-        except (zipfile.BadZipFile, zlib.error, KeyError, OSError, EOFError, RuntimeError) as error:  # or encrypted
-            raise ValueError(f"{self}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
     def beside(self) -> Beside:
         """The files that the model may name."""
@@ -137,8 +135,9 @@ class Beside(Resolver):
         said = name.decode("utf-8", "replace") if isinstance(name, bytes) else str(name)
         said = said.replace("\\", "/").strip()
         try:
-            content = self._member(said) if self.model.member else self._file(said)
-        except (OSError, KeyError, ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error):
+            with unpacking(self.model):
+                content = self._member(said) if self.model.member else self._file(said)
+        except ValueError:
             self.missing.append(said)
             raise ValueError(f"{self.model}: names {said!r}, which is not there") from None
         self.images[said] = content

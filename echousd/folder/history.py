@@ -6,14 +6,13 @@ import io
 import json
 import os
 import zipfile
-import zlib
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from echomodel.files import within_memory
+from echomodel.files import unpacking, within_memory
 from echousd.folder import folder as folders
 from echousd.folder import ownership
 from echousd.folder.manifest import find_manifest, read_manifest
@@ -275,10 +274,8 @@ def _read_archive(folder: Path, path: str, *, only: str = "", digest: str = "") 
         raise ValueError(f"{folder / path}: is missing, so that the room cannot be put back")
     if digest and folders.digest(content) != digest:
         raise ValueError(f"{folder / path}: was changed since it was written, so that the room cannot be put back")
-    try:
-        with within_memory(folder / path), zipfile.ZipFile(io.BytesIO(content)) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
-                raise zipfile.BadZipFile(f"more than {LARGEST >> 20} MiB")
-            return {e.filename: archive.read(e) for e in archive.infolist() if only in ("", e.filename)}
-    except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError) as error:
-        raise ValueError(f"{folder / path}: is damaged ({error})") from None
+    place = folder / path
+    with unpacking(place), within_memory(place), zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
+            raise ValueError(f"{place}: is damaged (more than {LARGEST >> 20} MiB)")
+        return {e.filename: archive.read(e) for e in archive.infolist() if only in ("", e.filename)}

@@ -162,6 +162,32 @@ def within_memory(path: Path, name: str = "", *, size: int | None = None) -> Ite
         resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
+@contextmanager
+def unpacking(name: object) -> Iterator[None]:
+    """Raises ValueError that names an archive where the block, which reads it, meets damage or a form unknown.
+
+    Python's module for archives raises what each of their ways of packing raises.
+    """
+    import lzma
+    import zipfile
+
+    try:
+        yield
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        lzma.LZMAError,
+        EOFError,
+        OSError,
+        KeyError,
+        RuntimeError,
+        ValueError,
+    ) as error:
+        if isinstance(error, ValueError) and str(error).startswith(str(name)):
+            raise  # what the block itself has to say
+        raise ValueError(f"{name}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+
+
 def bounded_lines(file: BinaryIO, most: int, name: str | os.PathLike[str]) -> Iterator[bytes]:
     """Lines of an open file that anybody may have put there; raises ValueError for one of more than `most` bytes."""
     for number, line in enumerate(iter(lambda: file.readline(most + 1), b""), 1):

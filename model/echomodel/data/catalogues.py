@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import re
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from echomodel.files import within_memory
+from echomodel.files import unpacking, within_memory
 
 MESH_FILES = (".obj", ".glb", ".gltf", ".ply", ".stl")
 CATALOGUE = "PluginFurnitureCatalog.properties"
@@ -45,13 +44,8 @@ def read_library(path: Path) -> list[MeshEntry]:
     """Entries of a Sweet Home 3D furniture library; raises ValueError for a file that is none."""
     if not path.is_file():
         raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)")
-    try:
-        with within_memory(path):
-            return _library(path)
-    except zipfile.BadZipFile:
-        raise ValueError(f"{path}: not a furniture library (.sh3f is a zip archive)") from None
-    except (zlib.error, EOFError, RuntimeError) as error:  # damaged, encrypted, or packed in a way that nobody knows
-        raise ValueError(f"{path}: cannot be unpacked ({error})") from None
+    with unpacking(path), within_memory(path):
+        return _library(path)
 
 
 def _library(path: Path) -> list[MeshEntry]:
@@ -72,8 +66,11 @@ def _library(path: Path) -> list[MeshEntry]:
         if missing:
             continue  # not a model of its own
         key = f"{path.stem}/{Path(item['model']).stem}"
-        centimetres = [float(item[axis]) for axis in ("width", "height", "depth")]
-        turn = np.array([float(v) for v in item.get("modelRotation", "1 0 0 0 1 0 0 0 1").split()]).reshape(3, 3)
+        try:
+            centimetres = [float(item[axis]) for axis in ("width", "height", "depth")]
+            turn = np.array([float(v) for v in item.get("modelRotation", "1 0 0 0 1 0 0 0 1").split()]).reshape(3, 3)
+        except ValueError:
+            continue
         if not all(0 < length < 1e5 for length in centimetres) or not np.isfinite(turn).all():
             continue  # nothing that could stand anywhere
         entries.append(

@@ -113,7 +113,7 @@ def test_archives_that_cannot_be_unpacked_are_told(folder, fault):
         path.write_bytes(bytes(content))
     else:
         changed(path, *((6, 1) if fault == "encrypted" else (8, 99)))
-    with pytest.raises(ValueError, match=r"x.sh3f: cannot be unpacked|x.sh3f: Bad CRC"):
+    with pytest.raises(ValueError, match=r"x.sh3f: cannot be read"):
         indexed(folder)
 
 

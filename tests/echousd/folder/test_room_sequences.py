@@ -217,7 +217,7 @@ class Sequences(RuleBasedStateMachine):
                 if str(error).endswith(("no edit to take back", "can be made again")):
                     assert not (self.back if step is history.undo else self.ahead)
                     return ()
-                if step is history.redo and not self.ahead and ".zip: is damaged" in str(error):
+                if step is history.redo and not self.ahead and ".zip: cannot be read (" in str(error):
                     return ()  # the person's archive might have been one of an edit
                 named = TOUCHED.match(str(error))
                 if not named:
