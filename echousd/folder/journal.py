@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import warnings
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echomodel.files import flush
+from echomodel.files import digest, flush
 from echousd.folder.manifest import LARGEST, Digest
 from echousd.folder.within import check_links, inside
 from echousd.pending import JOURNAL, STAGING
@@ -51,11 +50,6 @@ class Journal(BaseModel):
     move: list[Move]
     remove: list[Removal]
     kept: dict[str, str] = {}
-
-
-def digest(content: bytes) -> str:
-    """Short content hash, as manifest and journal record it."""
-    return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
 def digest_of(path: Path) -> str:

@@ -14,6 +14,7 @@ from echousd.folder.journal import digest, digest_of
 from echousd.folder.within import inside
 from echousd.naming import free_name
 from echousd.pending import STAGING
+from echousd.stage.apart import check_harmless
 from echousd.stage.paths import coarse_file, component_file, payload_file
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ def loses_text(layer: bytes) -> bool:
 
 
 def _dependencies(layer: Path) -> list[str]:
+    check_harmless(layer)
     try:
         return [word for words in UsdUtils.ExtractExternalReferences(str(layer)) for word in words]
     except Tf.ErrorException:  # no layer that could refer to anything

@@ -14,6 +14,7 @@ from pxr import Sdf, Tf, Usd, Vt
 
 from echousd.draw.surfaces import DRESSING, Surfaces, read_surfaces
 from echousd.folder.within import inside
+from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.encoding import StageError
 from echousd.stage.files import layer_bytes, open_stage
 from echousd.stage.paths import UNFIT
@@ -66,7 +67,9 @@ def read_looks(folder: Path, paths: Iterable[str]) -> list[Look]:
     found = []
     for path in paths:
         try:
-            layer = Sdf.Layer.OpenAsAnonymous(str(inside(folder, path.removeprefix("./"), "a look")))
+            place = inside(folder, path.removeprefix("./"), "a look")
+            check_harmless(place)
+            layer = Sdf.Layer.OpenAsAnonymous(str(place))
         except (ValueError, Tf.ErrorException):
             continue
         look = read_look(layer, path.removeprefix("./")) if layer else None
@@ -188,6 +191,7 @@ def refitted(
             place = Path(scratch) / path
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(content)
+            just_written([place])
         try:
             unfit = unfitting(looks, open_stage(Path(scratch) / root))
         except (StageError, ValueError):  # nothing there to paint any more

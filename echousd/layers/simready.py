@@ -17,6 +17,7 @@ from echousd.folder.manifest import find_manifest
 from echousd.folder.stored import asset_from, shelf_of
 from echousd.folder.within import inside
 from echousd.pending import check_written
+from echousd.stage.apart import check_harmless, just_written
 from echousd.stage.files import layer_bytes, write_all
 from echousd.stage.paths import coarse_file, coarse_name, component_file, payload_file, payload_name
 from echousd.stage.turning import rescale, turn_up
@@ -89,6 +90,7 @@ def package(name: str, files: Mapping[str, bytes], *, author: str, source: str) 
         layer.customLayerData = {**layer.customLayerData, "SimReady_Metadata": _facts(main, author, source)}
         main.write_bytes(layer_bytes(layer, ".usda"))
         written = [path for path in scratch.rglob("*") if path.is_file()]
+        just_written(written)
         made = {path.relative_to(scratch).as_posix(): path.read_bytes() for path in written}
         return made | {f".thumbs/256x256/{name}.usda.png": picture(main)}
 
@@ -135,4 +137,7 @@ def _files(root: Path, manifest: Mapping[str, Any], name: str) -> Mapping[str, b
     if shelf is not None and f"assets/{name}" in shelf.keys:
         return asset_from(shelf, name)
     paths = [path for path in manifest["files"] if path.startswith(f"assets/{name}/")]
-    return {path: inside(root.parent, path, f"asset {name!r}").read_bytes() for path in paths}
+    places = {path: inside(root.parent, path, f"asset {name!r}") for path in paths}
+    for place in (place for path, place in places.items() if path.endswith((".usda", ".usdc"))):
+        check_harmless(place)
+    return {path: place.read_bytes() for path, place in places.items()}

@@ -25,6 +25,7 @@ from echousd.place.living import living_faults
 from echousd.room import LayoutOutcome, RoomData
 from echousd.shapes.geometry import Geometry
 from echousd.shapes.sources.retrieval import beside
+from echousd.stage.apart import check_harmless
 from echousd.stage.files import open_stage, write_whole
 from echousd.stage.layouts import layout_names
 from echousd.stage.paths import UNFIT, layer_file
@@ -80,6 +81,8 @@ def _save_layers(room: RoomData, folder: Path, old: Mapping[str, Any], shelf: Sh
     current = ownership.read(folder, root)
     painted: Mapping[str, bytes] = {}
     unfit: Sequence[str] = ()
+    if current is not None:
+        check_harmless(folder / root)
     if current is not None or room.edited is not None:
         from echousd.layers.paintings import refitted
 

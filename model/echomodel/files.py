@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -101,6 +102,11 @@ def write_picture(path: Path, picture: Image) -> None:
 def write_json(path: Path, content: object) -> None:
     """Write something as indented JSON; the file appears whole."""
     write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def digest(content: bytes) -> str:
+    """Short content hash, as manifests and journals record it."""
+    return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
 def flush(path: Path) -> None:
