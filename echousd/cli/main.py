@@ -9,7 +9,6 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import typer
@@ -94,9 +93,6 @@ def run(arguments: Sequence[str]) -> int:
         return _complain("interrupted", INTERRUPTED, debug)
     except Exception as error:
         message, code = _explained(error)
-        if isinstance(error, UnicodeDecodeError):  # USD hands on a damaged layer's bytes without its name
-            given = next((word for word in arguments if Path(word).is_file()), "a file")
-            message = f"{given}: it or what it names holds what is no text in UTF-8 ({error.reason})"
         lines = getattr(error, "lines", [message])  # all faults of a graph's file
         for line in lines:
             _complain(line, code, debug and line == lines[-1])

@@ -5,13 +5,17 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+
 import pytest
-from flips import KINDS, Flip, fault, files_of
+from flips import KINDS, Flip, end_of, fault, files_of
+from mutations import COMMANDS
 from small_room import BARE, StandIn, small_graph
 
 import echousd
 
-COMMANDS = ("graph", "check --json", "glb")
+DAMAGED = ("graph", "check --json", "glb")
 
 
 @pytest.fixture(scope="module")
@@ -20,10 +24,21 @@ def room(tmp_path_factory):
     return made.save(tmp_path_factory.mktemp("rooms") / "bedroom", preview=False)
 
 
+@pytest.mark.parametrize("command", ["graph --json", "check --json", "usda"])
+@pytest.mark.parametrize("name", ["bedroom.usda", "layers/graph.usda", "assets/bed/bed.usda"])
+def test_bytes_that_are_no_text(room, name, command, tmp_path):
+    """OpenUSD hands them on, in values, in names, and where it quotes a layer that it cannot read."""
+    folder = shutil.copytree(room.parent, tmp_path / "bedroom")
+    text = (folder / name).read_bytes()
+    for place in [found.start(found.lastindex) for found in re.finditer(rb'"(\w)|@(\w)|\n +(\w)', text) if found[1]][:4]:
+        (folder / name).write_bytes(text[:place] + b"\xff" + text[place + 1 :])
+        assert not end_of(COMMANDS[command](folder / room.name, tmp_path / "out"), tmp_path)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("ending", [".usda", ".usdc", ".json"])
 def test_a_damaged_file_is_named(room, kind, ending):
     names = [name for name in files_of(room) if name.endswith(ending)]
     number = KINDS.index(kind)
     flip = Flip(names[number % len(names)], kind, number)
-    assert not fault(room, flip, COMMANDS[number % len(COMMANDS)])
+    assert not fault(room, flip, DAMAGED[number % len(DAMAGED)])
