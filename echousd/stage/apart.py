@@ -116,8 +116,10 @@ def _read(paths: list[Path]) -> tuple[Path | None, str, list[Path]]:
     words = [sys.executable, "-P", str(READER)]
     given = json.dumps({"files": [str(path) for path in paths], "memory": [files.HELD, files.EACH]})
     try:
-        quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}  # USD quotes a damaged layer there
-        done = subprocess.run(words, input=given, text=True, timeout=PATIENCE, check=False, **quiet)
+        done = subprocess.run(
+            words, input=given, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,  # USD quotes a damaged layer there
+            text=True, timeout=PATIENCE, check=False,
+        )  # fmt: skip
         code, told = done.returncode, done.stdout
     except subprocess.TimeoutExpired as late:
         code, told = None, (late.stdout or b"").decode() if isinstance(late.stdout, bytes) else late.stdout or ""
