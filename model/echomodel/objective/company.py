@@ -25,6 +25,8 @@ SIDE = 0.6  # metres: what is further from its seat stands for itself
 ELBOW, KNEES = 0.2, 0.3  # share of a sofa's width that an armchair may stand before, and metres from which on all of it
 LEFT, OWN = 1.8, 0.6  # metres from its group from which on an armchair stands apart, and to what is its own: all real
 ALONE = 0.45  # metres from everything: nothing small stands so in a room
+# Metres less from furniture: 98 % of real plants are at a wall, the others touch something; of side tables within 0.3.
+OF_PLANTS, OF_TABLES = 0.35, 0.15
 EDGE = 0.8  # metres between a wall and an armchair that belongs to no group
 
 
@@ -177,8 +179,10 @@ def not_alone(plan: Plan) -> Found:
     who = plan.those(small & plan.walled)
     half = plan.size[who][:, [0, 2]].amax(1) / 2
     wall = plan.inside(plan.position[who][:, None, [0, 2]], who)[:, 0] - half
-    away = torch.where(loner[who], wall - (EDGE - ALONE), torch.minimum(gap[who], wall))
-    lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, away))
+    free = torch.where(plan.of("decor"), OF_PLANTS, torch.where(plan.stands("beside"), OF_TABLES, 0.0))[who]
+    away = torch.minimum(gap[who] + free, wall)
+    away = torch.where(loner[who], wall - (EDGE - ALONE), away)
+    lonely = found(who, ALONE - away, measure=torch.where(loner[who], wall, torch.minimum(gap[who], wall)))
     others = plan.of("light", "storage", "board") | plan.stands("beside", "company")
     i, j = plan.pairs(company, others & plan.standing, least=True)
     gap, _ = plan.worst(i, plan.apart(i, j), j)

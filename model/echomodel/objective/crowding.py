@@ -22,6 +22,7 @@ AT = 0.5  # metres: a chair further from its table is not pulled back from it
 KNEES, KNEES_WALL = 0.4, 0.6  # metres before a sofa or armchair, before furniture of other groups and before a wall
 ROOM = 0.25  # metres before a seat to its own group's lamps and other seats
 TOUCHED = 0.08  # metres between a coffee table and a second sofa or an ottoman: 95 % of real ottomans keep 0.12
+HAND = 0.05  # metres between two seats of a group: 90 % of real ones, most others overlap
 FOOT = 0.35  # metres between the foot of a bed and furniture: one passes sideways
 LAMP, AT_BED = 0.6, 0.35  # metres before a front that lamps and plants keep free, before a nightstand's
 MET = 0.25  # share of a width from which on something is before it
@@ -161,6 +162,19 @@ def seat_room(plan: Plan) -> Found:
     who = who[~torch.isin(who, found_one.who[found_one.margin < 0])]
     touched = found(who, least[who], other=about[who], measure=(least[who] + TOUCHED).clamp_min(0.0))
     return joined(found_one, touched)
+
+
+def loungers_apart(plan: Plan) -> Found:
+    """Sofas and armchairs of one group do not touch."""
+    lounging = _loungers(plan)
+    i, j = plan.pairs(lounging, lounging, least=True)
+    keep = (plan.smaller[i] < plan.smaller[j]) & plan.kin(i, j)
+    i, j = i[keep], j[keep]
+    if not len(i):
+        return nobody(plan.size)
+    least, about = plan.worst(i, plan.apart(i, j) - HAND, j)
+    who = (least < FAR).nonzero()[:, 0]
+    return found(who, least[who], other=about[who], measure=(least[who] + HAND).clamp_min(0.0))
 
 
 def _clear(

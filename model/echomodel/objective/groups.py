@@ -21,6 +21,8 @@ WITHIN = 0.35  # share of a sofa's width that the table's middle may lie beside 
 BESIDE = 0.4  # metres between a bed and its nightstand: 95 % of real ones are nearer
 PAIR = 0.15  # metres by which the gaps of the two nightstands of a bed may differ: 98 % of real ones differ less
 IN_BED = 0.4  # metres by which a nightstand may reach into the box of a bed whose board is wider than it is
+FOOT = 0.35  # metres between a bed's foot and the bench there: 95 % of real ones
+ALONG = 0.38  # share of the bed's width by which its middle may lie beside the bed's: 95 % of real ones
 HEAD = 0.45  # metres between the level of the headboard and the nightstand's back
 TURNED = math.radians(45.0)  # 94 % of real nightstands look the same way as their bed
 
@@ -116,6 +118,19 @@ def nightstands_alike(plan: Plan) -> Found:
     return found(
         torch.where(swap, i[other], i[one]), PAIR - apart, other=torch.where(swap, i[one], i[other]), measure=apart
     )
+
+
+def bench_at_foot(plan: Plan) -> Found:
+    """A bench or ottoman at the foot of a bed stands close to it, within its width."""
+    i, j = plan.attended("foot")
+    i, j = (of[plan.of("bed")[j]] for of in (i, j))
+    if not len(i):
+        return nobody(plan.size)
+    lateral, forward = plan.local(i, j)
+    _, half_depth = plan.reach(i, j)
+    gap = forward - half_depth - plan.size[j, 2] / 2
+    margin = torch.stack([FOOT - gap, ALONG * plan.size[j, 0] - lateral.abs()], -1)
+    return _first_of(i, j, margin, torch.stack([gap, lateral.abs()], -1))
 
 
 def _rank_at(anchor: Tensor, distance: Tensor) -> Tensor:

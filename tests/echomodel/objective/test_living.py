@@ -74,13 +74,25 @@ SET = Room({
                           "yaw": np.pi * (z > 0)} for x in (-1, 1) for z in (-1, 1)},
     "lamp": {"kind": "floor_lamp", "size": (0.4, 1.6, 0.4), "at": (2.2, 1.7)},
 })  # fmt: skip
+BENCH = Room({**BEDROOM.things, "bench": {
+    "kind": "bench", "size": (1.2, 0.45, 0.4), "at": (0.2, 0.4),
+}})  # fmt: skip
+SMALL = Room(
+    {
+        **LIVING.things,
+        "plant": {"kind": "plant", "size": (0.4, 1.2, 0.4), "at": (-2.2, 1.7)},
+        "side": {"kind": "side_table", "size": (0.45, 0.5, 0.45), "at": (-1.4, -1.6)},
+    }
+)
 SOFAS = Room({**LIVING.things, "other": {
     "kind": "loveseat_sofa", "size": (1.5, 0.85, 0.9), "at": (-1.7, -0.1), "yaw": HALF,
 }})  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "room", [BEDROOM, LIVING, DINING, SET, SOFAS], ids=["bedroom", "living", "dining", "set", "sofas"]
+    "room",
+    [BEDROOM, LIVING, DINING, SET, SOFAS, BENCH, SMALL],
+    ids=["bedroom", "living", "dining", "set", "sofas", "bench", "small"],
 )
 def test_a_tidy_room_has_no_fault(room):
     assert room.found() == {}
@@ -112,6 +124,12 @@ FAULTS = [
     ),
     (SET.moved("chair_1_1", at=(0.62, 0.7)), ("table", "chairs_opposite"), "sides of table are staggered by 0.2"),
     (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
+    (SMALL.moved("plant", at=(-1.3, 0.0)), ("plant", "not_alone"), "plant stands alone in the room, 0.55 m from"),
+    (SMALL.moved("plant", at=(0.0, 1.18)), ("plant", "not_alone"), "plant stands alone in the room, 0.20 m from"),
+    (SMALL.moved("side", at=(-1.7, -1.1)), ("side", "not_alone"), "side stands alone in the room, 0.37 m from"),
+    (SOFAS.moved("armchair", at=(1.5, -0.7)), ("armchair", "loungers_apart"), "armchair leaves only 0.00 m to sofa"),
+    (BENCH.moved("bench", at=(0.2, 0.8)), ("bench", "bench_at_foot"), "bench stands 0.48 m from the foot of bed"),
+    (BENCH.moved("bench", at=(0.9, 0.4)), ("bench", "bench_at_foot"), "bench lies 0.90 m beside the middle of bed"),
     (LIVING.moved("armchair", at=(1.9, -0.3), yaw=HALF), ("armchair", "knees_free"), "m before it, then a wall"),
     (SOFAS.moved("other", yaw=np.pi, at=(0.0, 0.6)), ("stand", "view_free"), "other stands between"),
     (SOFAS.moved("other", yaw=-HALF, at=(-2.0, -0.1)), ("other", "sofas_in_circle"), "turns its back on the group"),
