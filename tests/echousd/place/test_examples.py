@@ -17,6 +17,7 @@ from echousd.place.examples import ExamplesPlan, search_examples
 @pytest.fixture(autouse=True)
 def _few(monkeypatch):
     monkeypatch.setattr(examples, "GRAPHS", 2)
+    monkeypatch.setattr(examples, "PLAIN", 12)
     monkeypatch.setattr(examples, "HALLS", 0.0)
 
 
@@ -28,8 +29,9 @@ def test_found_rooms_miss_nothing_and_a_search_goes_on(tmp_path, monkeypatch):
     assert (tmp_path / "found-00000.npz").read_bytes() == first
     with (tmp_path / "log.csv").open() as file:
         rows = list(csv.DictReader(file))
+    assert min(sum(int(row[name]) for row in rows) for name in ("kept", "plain")) > 0
     assert [row["shard"] for row in rows] == ["0", "1"]
-    assert sum(int(row["kept"]) for row in rows) == len(rooms) > 0
+    assert sum(int(row["kept"]) + int(row["plain"]) for row in rows) == len(rooms)
     for number in range(len(rooms)):
         room = rooms.room(number)
         found = plan_of(room, room.categories, room.floor_polygon, room.openings, height=room.height)
