@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -153,15 +153,15 @@ def _shade(
     toward = -direction[seen]
     normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
     light, glow = np.empty((len(seen), 3), np.float32), scenery.emissive[face]
-    ask = slice(None)
+    ask = np.arange(len(seen))
     if first is not None:
         known = first.reshape(-1, LAYERS)[seen]
         same = (_dot(normal, known[:, NORMAL]) > 0.95) & (np.abs(_dot(normal, point - known[:, POINT])) < 0.02)
         light[same], glow[same] = known[same, LIGHT], known[same, GLOW]
         ask = np.flatnonzero(~same)
-    lifted = point[ask] + 2e-3 * normal[ask]
+    hits = Hits(point[ask] + 2e-3 * normal[ask], normal[ask], toward[ask], scenery.gloss[face[ask]])
     light[ask], shine = (_light_inside if view.inside else _light)(
-        scene, scenery, lifted, normal[ask], toward[ask], face[ask], sample, shift.reshape(-1, 4)[seen][ask]
+        scene, scenery, hits, sample, shift.reshape(-1, 4)[seen][ask]
     )
     glow[ask] += 0.5 * shine[:, None]
     out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
@@ -182,18 +182,22 @@ def outside(panes: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.
     return out
 
 
-def _light(
-    scene: Any,
-    scenery: Scenery,
-    point: np.ndarray,
-    normal: np.ndarray,
-    toward: np.ndarray,
-    face: np.ndarray,
-    sample: int,
-    shift: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
+class Hits(NamedTuple):
+    """Where rays met something: points just before it, its normals, the ways back (n, 3) float32, and gloss (n,)."""
+
+    point: np.ndarray
+    normal: np.ndarray
+    toward: np.ndarray
+    gloss: np.ndarray
+
+    def shine(self, light: np.ndarray) -> np.ndarray:
+        """(n,) how strongly light from its directions (3,) or (n, 3) is mirrored towards the eye."""
+        return self.gloss * np.clip(_dot(self.normal, _unit(self.toward + light)), 0, None) ** (4 + 90 * self.gloss)
+
+
+def _light(scene: Any, scenery: Scenery, hits: Hits, sample: int, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
-    count = len(point)
+    point, normal, count = hits.point, hits.normal, len(hits.point)
     sun = ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
     sun = _unit(sun)
     facing = np.clip(normal @ ABOVE, 0, None)
@@ -213,24 +217,14 @@ def _light(
         open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
-    half = _unit(toward + ABOVE)
-    gloss = scenery.gloss[face]
-    shine = gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * lit
-    return 0.55 * direct + 1.05 * sky, shine
+    return 0.55 * direct + 1.05 * sky, hits.shine(ABOVE) * lit
 
 
 def _light_inside(
-    scene: Any,
-    scenery: Scenery,
-    point: np.ndarray,
-    normal: np.ndarray,
-    toward: np.ndarray,
-    face: np.ndarray,
-    sample: int,
-    shift: np.ndarray,
+    scene: Any, scenery: Scenery, hits: Hits, sample: int, shift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
-    lights, count = scenery.lights, len(point)
+    lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
     spot, turn = _even(sample, shift[:, :2]), _even(sample, shift[:, 2:])
     light, shine = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
     if len(scenery.panes):  # one place in one window for each ray
@@ -242,9 +236,7 @@ def _light_inside(
         seen *= 0.3 + 0.7 * np.clip(0.5 + 2 * way[:, 1], 0, 1)  # sky above, ground below
         share = _free(scene, point, way, away, seen > 1e-4) * seen
         light += share[:, None] * (len(scenery.panes) * SKY * lights.sky / np.pi) * SKY_LIGHT
-        half = _unit(toward + way)
-        gloss = scenery.gloss[face]
-        shine += gloss * np.clip(_dot(normal, half), 0, None) ** (4 + 90 * gloss) * (share > 0)
+        shine = hits.shine(way) * (share > 0)
     if lights.sun is not None and len(scenery.panes):
         towards = _unit(lights.sun[0] + 0.02 * _on_sphere(spot))
         facing = np.clip(_dot(normal, towards), 0, None)
