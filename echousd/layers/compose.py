@@ -16,7 +16,7 @@ from echomodel.dressing import KINDS
 from echousd.draw.pictures import thumbnails
 from echousd.draw.sight import Furniture
 from echousd.dressing import Dressing, dress
-from echousd.layers import assets, cameras, component, coverings, lights, materials, physics, structure
+from echousd.layers import assets, cameras, coverings, lights, materials, physics, structure
 from echousd.layers.cameras import room_points, room_volume
 from echousd.layers.dressing import dressing_layer
 from echousd.naming import free_name
@@ -301,6 +301,8 @@ def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Pa
             original = replace(geometry.original, layer=kept, files={}) if kept else geometry.original
             geometry, folder = replace(geometry, original=original), shelf.place
         assert geometry.original is not None
+        from echousd.layers import component
+
         if name in room.carried:
             return Asset(name, {}, component.carried(name, geometry.original, room.carried[name], folder))
         data = _asset_data(room, name, geometry)

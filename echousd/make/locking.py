@@ -40,8 +40,10 @@ def with_earlier_locks(graph: SceneGraph, earlier: Path | None) -> tuple[SceneGr
 
     folder = earlier if earlier is None or earlier.is_dir() else earlier.parent
     manifest = find_manifest(folder, earlier.stem) if earlier and folder and folder.is_dir() else None
+    if not manifest:
+        return graph, ()
     try:
-        old = SceneGraph.from_json(json.dumps((manifest or {}).get("graph")))
+        old = SceneGraph.from_json(json.dumps(manifest.get("graph")))
     except ValueError:  # no graph that can be read
         return graph, ()
     kept = [
