@@ -249,11 +249,11 @@ class ElsewhereModel:
     """
 
     def __init__(self, own: RoomModel, answers: tuple[bytes, ...]) -> None:
-        self._own = own
+        self.own = own
         self._answers: Iterator[bytes] = iter(answers)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._own, name)
+        return getattr(self.own, name)
 
     def sample_layout(self, graph: GraphBatch, **rest: Any) -> Boxes:
         """As of the model; raises SamplesWanted."""

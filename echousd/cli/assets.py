@@ -10,8 +10,7 @@ from typing import Annotated
 import typer
 
 from echousd.cli.options import AsJson
-from echousd.cli.output import say
-from echousd.cli.report import say_written
+from echousd.cli.report import say_done
 
 assets_app = typer.Typer(
     help="Libraries of furniture: index them, look through them; a room's own as packages.", no_args_is_help=True
@@ -59,18 +58,15 @@ def index(
             descriptors=descriptors,
             progress=lambda count, of: bar.update(task, completed=count, total=of),
         )
-    if json:
-        counts = {"models": done.models, "usable": done.usable, "read": done.read}
-        say_written([output], started, more={**counts, "left_out": list(map(str, done.faults))})
-        return
-    for fault in done.faults[:SHOWN]:
-        say(f"left out {fault}")
+    counts = {"models": done.models, "usable": done.usable, "read": done.read}
+    lines = [f"left out {fault}" for fault in done.faults[:SHOWN]]
     if len(done.faults) > SHOWN:
-        say(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
-    say(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")
+        lines.append(f"left out {len(done.faults) - SHOWN} more: echousd assets review {output}")
+    lines.append(f"index    {output}: {done.models} models, {done.usable} usable, {done.read} read")
     for folder in folders:
         if not folder.resolve().is_relative_to(output.resolve().parent):
-            say(f"note     {folder} is not below the index: generate asks for --allow-outside {folder}")
+            lines.append(f"note     {folder} is not below the index: generate asks for --allow-outside {folder}")
+    say_done(json, [output], started, lines, {**counts, "left_out": list(map(str, done.faults))})
 
 
 @assets_app.command(epilog="Example: echousd assets review models.parquet")
@@ -99,15 +95,14 @@ def review(
     table = library.with_suffix(".csv")
     write_table(table, records, read_corrections(table) if table.exists() else None)
     reasons = {reason: len(members) for reason, members in left_out(records).items()}
-    if json:
-        more = {"models": len(records), "left_out": reasons}
-        say_written([folder / "review.html", *sheets, table], started, more=more)
-        return
-    for reason, count in reasons.items():
-        say(f"left out {count}: {reason}")
-    say(f"page     {folder / 'review.html'}")
-    say(f"sheets   {len(sheets)} in {folder}")
-    say(f"table    {table}: correct it and run echousd assets index again")
+    page = folder / "review.html"
+    lines = [
+        *(f"left out {count}: {reason}" for reason, count in reasons.items()),
+        f"page     {page}",
+        f"sheets   {len(sheets)} in {folder}",
+        f"table    {table}: correct it and run echousd assets index again",
+    ]
+    say_done(json, [page, *sheets, table], started, lines, {"models": len(records), "left_out": reasons})
 
 
 @assets_app.command(epilog="Example: echousd assets pack out/bedroom -o packages")
@@ -128,12 +123,7 @@ def pack(
 
     started = time.perf_counter()
     done = write(room_at(room), output, names=asset or (), author=author, force=force)
-    if json:
-        say_written(list(done.layers), started, more={"left_out": list(done.left), "hangs": list(done.hangs)})
-        return
-    for sentence in done.left:
-        say(f"left out {sentence}")
-    for path in done.layers:
-        say(f"package  {path}")
-    for sentence in done.hangs:
-        say(f"note     {sentence}")
+    lines = [f"left out {sentence}" for sentence in done.left]
+    lines += [f"package  {path}" for path in done.layers]
+    lines += [f"note     {sentence}" for sentence in done.hangs]
+    say_done(json, list(done.layers), started, lines, {"left_out": list(done.left), "hangs": list(done.hangs)})

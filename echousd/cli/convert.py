@@ -8,8 +8,7 @@ from pathlib import Path
 import typer
 
 from echousd.cli.options import AsJson
-from echousd.cli.output import say
-from echousd.cli.report import say_written
+from echousd.cli.report import say_done
 
 SOURCE = typer.Argument(..., metavar="IN.pth", help="Published checkpoint, a file written by torch.save.")
 OUTPUT = typer.Option(..., "--output", "-o", metavar="OUT.safetensors", help="File to write.")
@@ -54,13 +53,11 @@ def convert(
     config = checkpoint.convert(source, output, classes=names, statistics=statistics)
     parts = [name for name in ("encoder", "layout", "shape", "vqvae") if getattr(config, name) is not None]
     echo = config.layout or config.shape
-    if json:
-        has = {"parts": parts, "bytes": output.stat().st_size, "boxes": statistics is not None}
-        say_written([output], started, more={**has, "classes": config.encoder.classes if config.encoder else None})
-        return
-    say(f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB")
+    lines = [f"{output}: {', '.join(parts)}, {output.stat().st_size / 1e6:.1f} MB"]
     if config.encoder:
         timed = "with" if echo and echo.time_in_echo else "without"
-        say(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
+        lines.append(f"{config.encoder.classes} classes, {timed} time embedding in the echo")
     if config.layout and statistics is None:
-        say("no box statistics: sampling boxes needs a conversion with --bounds")
+        lines.append("no box statistics: sampling boxes needs a conversion with --bounds")
+    has = {"parts": parts, "bytes": output.stat().st_size, "boxes": statistics is not None}
+    say_done(json, [output], started, lines, {**has, "classes": config.encoder.classes if config.encoder else None})

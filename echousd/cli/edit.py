@@ -11,7 +11,7 @@ import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import say
-from echousd.cli.report import report, say_written, telling_faults
+from echousd.cli.report import report, say_done, telling_faults
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
@@ -20,23 +20,12 @@ if TYPE_CHECKING:
 def register(app: typer.Typer) -> None:
     """Add the command."""
     example = 'echousd edit out/bedroom/bedroom.usda --add stool:stool --relate "stool close by bed"'
-    add_room_command(app, edit, example, edits=True)
+    add_room_command(app, edit, example, edits=True, asks=True)
     add_room_command(app, update, "echousd update out/bedroom/mine.usda", edits=True)
 
 
 def edit(
     room: Annotated[Path, typer.Argument(help="Room that generate made: root layer or folder.", show_default=False)],
-    add: Annotated[list[str] | None, typer.Option(help="Object to add, as name:category.")] = None,
-    remove: Annotated[list[str] | None, typer.Option(help="Object to remove.")] = None,
-    relabel: Annotated[list[str] | None, typer.Option(help="Other category in its place, name:category.")] = None,
-    relate: Annotated[list[str] | None, typer.Option(help='Relation to add: "stool close by bed".')] = None,
-    unrelate: Annotated[list[str] | None, typer.Option(help="Relation to take out.")] = None,
-    lock: Annotated[list[str] | None, typer.Option(help="Object that stays as it stands.")] = None,
-    unlock: Annotated[list[str] | None, typer.Option(help="Object that may move and change again.")] = None,
-    move: Annotated[list[str] | None, typer.Option(help="Where to, name:x,z or name:x,y,z, metres.")] = None,
-    turn: Annotated[list[str] | None, typer.Option(help="Heading, name:degrees; 0 looks along +Z.")] = None,
-    resize: Annotated[list[str] | None, typer.Option(help="Size at heading 0, name:x,y,z, metres.")] = None,
-    restyle: Annotated[list[str] | None, typer.Option(help="Style, name:style.")] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would change and who would move; write nothing.")
     ] = False,
@@ -58,17 +47,16 @@ def edit(
     """
     from echousd.folder.found import refuse_house, room_at
     from echousd.make.reading import read_room
-    from echousd.make.wishes import Wishes, wished
+    from echousd.make.wishes import wished
+    from echousd.options import EditRequest
 
     if not recover:
         refuse_house(room)
         room = room_at(room)
-    wishes = Wishes(
-        remove or (), unrelate or (), relabel or (), add or (), relate or (), lock or (), unlock or (), move or (),
-        turn or (), resize or (), restyle or (),
-    )  # fmt: skip
+    asked = {kind: given.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
+    wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
     if undo or redo or recover:
-        if wishes != Wishes() or dry_run or output is not None or undo + redo + recover > 1:
+        if wishes != EditRequest() or dry_run or output is not None or undo + redo + recover > 1:
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
             does = "--recover finishes what was interrupted" if recover else does
             raise ValueError(f"{does} and does nothing else; leave the other options out")
@@ -168,12 +156,8 @@ def _drawn(room: Path) -> list[Path]:
 def _say_steps(
     room: Path, pictures: Sequence[Path], word: str, steps: Sequence[str], started: float, json: bool
 ) -> None:
-    if json:
-        say_written([room, *pictures], started, more={word: list(steps)})
-        return
-    for step in steps:
-        say(f"{word:<8} {step}")
-    say(f"room     {room}")
+    lines = [*(f"{word:<8} {step}" for step in steps), f"room     {room}"]
+    say_done(json, [room, *pictures], started, lines, {word: list(steps)})
 
 
 def _change(
@@ -215,12 +199,9 @@ def _change(
             raise ValueError(nothing)
         if dry_run:
             fresh, moving = touched(old, graph)
-            if json:
-                plan = {"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}
-                say_written([], started, more=plan)
-                return
-            for step in (*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))):
-                say(step)
+            plan = {"changes": list(steps), "new": sorted(fresh), "moves": sorted(moving)}
+            lines = [*steps, *(f"new      {n}" for n in sorted(fresh)), *(f"moves    {n}" for n in sorted(moving))]
+            say_done(json, [], started, lines, plan)
             return
         with telling_faults(), progress_bar() as listen:
             made = change(root, graph, progress=listen, **options)

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.output import say
-from echousd.cli.report import say_written
+from echousd.cli.options import Layout, Room, Written
+from echousd.cli.report import say_done
 
 
 def register(app: typer.Typer) -> None:
@@ -18,7 +18,7 @@ def register(app: typer.Typer) -> None:
 
 
 def export(
-    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)],
+    room: Room,
     output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)],
     arkit: Annotated[
         bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
@@ -27,7 +27,7 @@ def export(
         list[Path] | None,
         typer.Option(help="Folder besides the room's own whose files may be taken along; may be repeated."),
     ] = None,
-    layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    layout: Layout = None,
     physics: Annotated[
         bool | None,
         typer.Option(
@@ -38,7 +38,7 @@ def export(
         bool, typer.Option("--pictures/--no-pictures", help="Images, or plain colours alone (MuJoCo reads no JPEG).")
     ] = True,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is in the way.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
+    json: Written = False,
 ) -> None:
     """Write a room as one file: usdz for the web or ARKit, glb, or flat USD.
 
@@ -53,7 +53,4 @@ def export(
     path = write(
         room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
     )
-    if json:
-        say_written([path], started)
-    else:
-        say(str(path))
+    say_done(json, [path], started, [str(path)])

@@ -11,7 +11,7 @@ import typer
 
 from echousd.cli.options import AsJson
 from echousd.cli.output import check_picture, safe, say, say_json
-from echousd.cli.report import say_written
+from echousd.cli.report import say_done
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -133,11 +133,8 @@ def new(
     except OSError as error:
         raise GraphError(f"{out.parent}: cannot be made ({(error.strerror or str(error)).lower()})") from None
     save_graph(made, out)
-    if json:
-        counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
-        say_written([out], started, more=counts)
-        return
-    say(f"wrote {out}: {_summary(made)}")
+    counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
+    say_done(json, [out], started, [f"wrote {out}: {_summary(made)}"], counts)
 
 
 def _counted(text: str) -> tuple[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -11,6 +12,9 @@ from typing import Annotated, Any, get_type_hints
 import typer
 from typer.core import TyperCommand
 
+Room = Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)]
+Layout = Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)]
+Written = Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")]
 Made = Annotated[bool, typer.Option("--json", help="Say what was made as JSON.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over what is not ours.")]
@@ -27,12 +31,19 @@ LONG = 8  # characters in place of a value; longer ones would leave no room for 
 
 
 def add_room_command(
-    app: typer.Typer, command: Callable[..., Any], example: str, *, edits: bool = False, batch: bool = False
+    app: typer.Typer,
+    command: Callable[..., Any],
+    example: str,
+    *,
+    edits: bool = False,
+    asks: bool = False,
+    batch: bool = False,
 ) -> None:
     """Add a command that takes a room's options: in place of its `**given` those of the table that are used.
 
     Arguments:
-        edits: only what an edit may set. batch: the table of a batch, whose seed is not among the rooms'.
+        edits: only what an edit may set. asks: and what it changes (`EditRequest`).
+        batch: the table of a batch, whose seed is not among the rooms'.
     """
     hints = get_type_hints(command, include_extras=True)
     given = [one for one in signature(command).parameters.values() if one.kind is not Parameter.VAR_KEYWORD]
@@ -46,7 +57,7 @@ def add_room_command(
 
         def make_context(self, *values: Any, **extra: Any) -> Any:
             if not self.flags:
-                found = _flags(edits=edits, batch=batch)
+                found = _flags(edits=edits, asks=asks, batch=batch)
                 self.flags = frozenset(one.name for one in found)
                 self.params[len(own) : len(own)] = click_options(*found)
             return super().make_context(*values, **extra)
@@ -77,8 +88,8 @@ def click_options(*flags: Parameter) -> list[Any]:
     return list(typer.main.get_command(alone).params)
 
 
-def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
-    from echousd.options import GROUPS, OF_NEW, RoomOptions
+def _flags(*, edits: bool, asks: bool, batch: bool) -> list[Parameter]:
+    from echousd.options import GROUPS, OF_NEW, EditRequest, RoomOptions
 
     table = RoomOptions
     if batch:
@@ -86,7 +97,15 @@ def _flags(*, edits: bool, batch: bool) -> list[Parameter]:
     rows: dict[str, Any] = dict(table.model_fields)
     chosen = OF_NEW if edits else [name for name in rows if not (batch and name == "seed")]
     ordered = sorted(chosen, key=lambda name: GROUPS.index(rows[name].json_schema_extra["group"]))
-    return [_flag(name, rows[name]) for name in ordered]
+    wishes = [
+        Parameter(one.name, Parameter.KEYWORD_ONLY, default=None, annotation=_several(one.metadata["help"]))
+        for one in (fields(EditRequest) if asks else ())
+    ]
+    return [*wishes, *(_flag(name, rows[name]) for name in ordered)]
+
+
+def _several(help: str) -> Any:
+    return Annotated[list[str] | None, typer.Option(help=help, show_default=False)]
 
 
 def _flag(name: str, row: Any) -> Parameter:

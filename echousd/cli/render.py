@@ -9,8 +9,9 @@ from typing import Annotated
 
 import typer
 
-from echousd.cli.output import check_picture, say
-from echousd.cli.report import say_written
+from echousd.cli.options import Layout, Room, Written
+from echousd.cli.output import check_picture
+from echousd.cli.report import say_done
 
 TURN = "turntable"
 
@@ -21,7 +22,7 @@ def register(app: typer.Typer) -> None:
 
 
 def render(
-    room: Annotated[Path, typer.Argument(help="Room (.usda, .usdc, .usd, .usdz) or its folder.", show_default=False)],
+    room: Room,
     output: Annotated[
         Path,
         typer.Option(
@@ -45,9 +46,9 @@ def render(
     samples: Annotated[int, typer.Option(help="Rays through a pixel, a square number.", min=1, max=256)] = 9,
     frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
-    layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    layout: Layout = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is no picture of ours.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print what was written and seconds as JSON.")] = False,
+    json: Written = False,
 ) -> None:
     """Draw a room from inside, from above, from a corner, from all around, or through each of its cameras."""
     from echousd.draw.pictures import gif, png
@@ -84,8 +85,4 @@ def render(
         else:
             files = {output: png(draw(room, view=view, size=size, colors=colors, rays=rays, layout=layout))}
     write_all(files)
-    if json:
-        say_written(list(files), started)
-        return
-    for path in files:
-        say(str(path))
+    say_done(json, list(files), started, map(str, files))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,6 +67,17 @@ def say_written(
     """
     told = {"ok": not faults, "written": [str(path) for path in files], "faults": list(faults)}
     say_json({**told, "seconds": round(time.perf_counter() - since, 3), **(more or {})}, indent=2)
+
+
+def say_done(
+    json: bool, files: Sequence[Path], since: float, lines: Iterable[str], more: Mapping[str, Any] | None = None
+) -> None:
+    """Say what a command has written: as one JSON object (`say_written`), or in lines."""
+    if json:
+        say_written(files, since, more=more)
+    else:
+        for line in lines:
+            say(line)
 
 
 def _room(written: Written) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from echousd.cli.options import AsJson, Wait
+from echousd.cli.options import AsJson, Layout, Wait
 from echousd.cli.output import say
-from echousd.cli.report import say_written
+from echousd.cli.report import say_done
 
 if TYPE_CHECKING:
     from echousd.texturing import Job
@@ -38,7 +38,7 @@ def export(
         int | None,
         typer.Option(help="Texels along an object's picture; default 2048 (SceneTex: 4096 for all).", min=64),
     ] = None,
-    layout: Annotated[int | None, typer.Option(help="Which layout; default: the one it shows.", min=0)] = None,
+    layout: Layout = None,
     shell: Annotated[
         bool | None,
         typer.Option("--shell/--no-shell", help="Floor and walls too; default: not for hunyuan and mvpainter."),
@@ -56,13 +56,11 @@ def export(
         room, output, tool, prompt=prompt, dressing=dressing, resolution=resolution, layout=layout, shell=shell,
         force=force,
     )  # fmt: skip
-    if json:
-        told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
-        say_written([output / "job.json"], started, more=told)
-        return
-    say(f"job      {output / 'job.json'}")
-    say(f"objects  {len(job.objects)}, prompt {job.prompt!r}")
-    _tell(job)
+    told = {"objects": [thing.name for thing in job.objects], "prompt": job.prompt, "left_out": job.left_out}
+    lines = [f"job      {output / 'job.json'}", f"objects  {len(job.objects)}, prompt {job.prompt!r}"]
+    say_done(json, [output / "job.json"], started, lines, told)
+    if not json:
+        _tell(job)
 
 
 @texture_app.command("import", epilog="Example: echousd texture import out/bedroom/bedroom.usda out/job --name oil")
@@ -83,15 +81,15 @@ def import_(
     started = time.perf_counter()
     room = room_at(room)
     look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
-    if json:
-        told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
-        say_written([look.layer], started, more={**told, "left_out": list(look.skipped)})
-        return
-    say(f"look     {look.layer}")
-    say(f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without")
+    lines = [
+        f"look     {look.layer}",
+        f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without",
+    ]
     for words, what in ((look.unpainted, "no result"), (look.skipped, "left out")):
         if words:
-            say(f"as it was: {', '.join(words)} ({what})")
+            lines.append(f"as it was: {', '.join(words)} ({what})")
+    told = {"look": look.name, "painted": list(look.painted), "no_result": list(look.unpainted)}
+    say_done(json, [look.layer], started, lines, {**told, "left_out": list(look.skipped)})
 
 
 def _tell(job: Job) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from echomodel.boxes import Boxes
+from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.openings import free_area
 from echomodel.roomboxes import footprints
@@ -80,7 +81,7 @@ def sample_boxes(
         extra = {"known": Boxes.cat([known] * count), "known_mask": given.repeat(count)}
     if draws.steps is not None:
         extra["steps"] = draws.steps
-    if not draws.guided and model.preset == "compact":
+    if not draws.guided and isinstance(getattr(model, "own", model), EchoModel):  # ours, though another process has it
         extra["relation_guidance"] = 0.0
     if draws.change is not None:
         extra["edit"] = repeated(draws.change, len(nodes), count)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,37 +11,13 @@ from echousd.graph import GraphError, SceneGraph
 from echousd.graph.sentences import stating, without
 from echousd.graph.titles import composed, identifier_of, is_title, name_of
 from echousd.make.reading import SavedRoom, read_room
+from echousd.options import EditRequest
 
 MOVED = 1e-3  # metres: a place further from the room's own is somebody's wish
 TURNED = math.radians(0.1)
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """Changes to one room, in the words of the command line; several of each kind are applied in their order.
-
-    Arguments:
-        remove: names. unrelate: relations, `stool close by bed`. relabel: `name:category`; the object keeps its place.
-        add: `name:category`. relate: relations. lock, unlock: names.
-        move: `name:x,z` or `name:x,y,z`, metres in the room's frame.
-        turn: `name:angle`, degrees about +Y (or `1.5 rad`).
-        resize: `name:x,y,z`, metres at yaw 0. restyle: `name:style`, an empty style for none.
-    """
-
-    remove: Sequence[str] = ()
-    unrelate: Sequence[str] = ()
-    relabel: Sequence[str] = ()
-    add: Sequence[str] = ()
-    relate: Sequence[str] = ()
-    lock: Sequence[str] = ()
-    unlock: Sequence[str] = ()
-    move: Sequence[str] = ()
-    turn: Sequence[str] = ()
-    resize: Sequence[str] = ()
-    restyle: Sequence[str] = ()
-
-
-def wished(saved: SavedRoom, wishes: Wishes) -> SceneGraph:
+def wished(saved: SavedRoom, wishes: EditRequest) -> SceneGraph:
     """The graph of a room after some wishes; raises `GraphError` for what cannot be read or is not there.
 
     An object that is moved, turned or resized keeps the rest of its box as it is.

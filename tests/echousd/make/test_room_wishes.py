@@ -13,7 +13,8 @@ from small_room import BARE, StandIn, small_graph
 import echousd
 from echousd.graph import GraphError
 from echousd.make.reading import read_room
-from echousd.make.wishes import Wishes, wished
+from echousd.make.wishes import wished
+from echousd.options import EditRequest
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +92,7 @@ def test_wishes_that_cannot_be_read(root, echousd_command, words, said):
 
 def test_unlocked_things_may_move_again(root):
     saved = read_room(root)
-    locked = wished(saved, Wishes(lock=("bed",)))
+    locked = wished(saved, EditRequest(lock=("bed",)))
     assert locked.node("bed").position is not None
     free = locked.update_node("bed", locked=False, position=None, yaw=None)
     assert free == saved.graph
@@ -103,25 +104,25 @@ def test_titles_in_any_script_name_what_changes(tmp_path):
         tmp_path / "bedroom", preview=False
     )
     saved = read_room(root)
-    by_title = Wishes(
+    by_title = EditRequest(
         lock=("Große Liege",), move=("衣柜:1.2,1.0",), turn=("衣柜:180",), resize=("Große Liege:1.6,0.5,2.0",),
         restyle=("Große Liege:oak",), add=("Größter Stuhl:stool",), relate=("Größter Stuhl close by 衣柜",),
     )  # fmt: skip
-    by_name = Wishes(
+    by_name = EditRequest(
         lock=("bed",), move=("wardrobe:1.2,1.0",), turn=("wardrobe:180",), resize=("bed:1.6,0.5,2.0",),
         restyle=("bed:oak",), add=("Groesster_Stuhl:stool",), relate=("Groesster_Stuhl close by wardrobe",),
     )  # fmt: skip
     changed = wished(saved, by_title)
     assert changed.node("Groesster_Stuhl").title == "Größter Stuhl"
     assert changed.update_node("Groesster_Stuhl", title=None) == wished(saved, by_name)
-    assert wished(saved, Wishes(remove=("衣柜",))) == saved.graph.remove_node("wardrobe")
-    assert wished(saved, Wishes(relabel=("衣柜:desk",))) == wished(saved, Wishes(relabel=("wardrobe:desk",)))
-    assert not wished(saved, Wishes(lock=("衣柜",), unlock=("衣柜",))).node("wardrobe").locked
+    assert wished(saved, EditRequest(remove=("衣柜",))) == saved.graph.remove_node("wardrobe")
+    assert wished(saved, EditRequest(relabel=("衣柜:desk",))) == wished(saved, EditRequest(relabel=("wardrobe:desk",)))
+    assert not wished(saved, EditRequest(lock=("衣柜",), unlock=("衣柜",))).node("wardrobe").locked
     for twice in (saved, replace(saved, graph=saved.graph.update_node("lamp", title="Große Liege"))):
         with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
-            wished(twice, Wishes(add=("Große Liege:single_bed",)))
+            wished(twice, EditRequest(add=("Große Liege:single_bed",)))
     with pytest.raises(GraphError, match="object 'Große Liege' is in this graph"):
-        wished(saved, Wishes(add=("Große Liege:single_bed",)))
+        wished(saved, EditRequest(add=("Große Liege:single_bed",)))
 
 
 def test_a_stronger_layers_transform_is_the_artists_wish(root, echousd_command):
