@@ -22,7 +22,7 @@ FLOORS = (12.0, 22.0, 34.0)  # m² of floor from which on one, two, three corner
 
 def bare_walls(setting: Setting) -> None:
     """A picture as wide as suits the stretch on the two longest bare ones, three equal ones where it is very long."""
-    if not setting.walls:
+    if not setting.walls or setting.use:
         return
     found = [(length, middle, wall) for wall in walls_of(setting) for length, middle in stretches(setting, wall)]
     for length, middle, wall in sorted(found, key=lambda one: -one[0])[: None if setting.full else 2]:

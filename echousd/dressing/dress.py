@@ -9,6 +9,7 @@ import numpy as np
 
 from echomodel.dressing import KINDS
 from echomodel.dressing import thing as solids_of
+from echomodel.vocabulary import vocabulary
 from echousd.draw.sight import Furniture
 from echousd.dressing import bareness, corners, floors, hangings, tabletops, upholstery, walls
 from echousd.dressing.nodes import graph_of
@@ -35,6 +36,8 @@ RULES = (
     floors.by_doors,
     floors.baskets,
     hangings.coats,
+    hangings.hung_up,
+    floors.toys,
     hangings.tall_mirror,
     hangings.shelves,
     hangings.clock,
@@ -135,7 +138,7 @@ def setting_of(room: RoomData, layout: int = 0) -> Setting:
     floor = np.asarray(room.floor if corners is None else corners, float)
     return Setting(
         objects, floor, tuple(room.graph.room.openings), room.height, room.options.walls,
-        room.options.dress == "full", room.provenance.seed,
+        room.options.dress == "full", room.provenance.seed, vocabulary().room_type(room.graph.room.type).use,
     )  # fmt: skip
 
 

@@ -86,7 +86,7 @@ def _lies(setting: Setting, plan: shapely.Polygon, group: set[str]) -> bool:
 def by_doors(setting: Setting) -> None:
     """A pair of shoes beside a door, toes to the wall."""
     for _, door in setting.ways:
-        if door.kind != "door" or not setting.walls:
+        if door.kind != "door" or not setting.walls or setting.use:
             continue
         rng = setting.rng(door.name, "shoes")
         size = usual_size("shoes", rng)
@@ -116,3 +116,17 @@ def baskets(setting: Setting) -> None:
         wanted = (Thing("basket", size, host.on_floor(*spot), host.yaw, "", variant) for spot in spots)
         if setting.put_first(wanted, margin=0.03):
             return
+
+
+def toys(setting: Setting) -> None:
+    """A ball, blocks and a bear on the floor before a chest of toys."""
+    for host in (o for o in setting.objects.values() if o.row.top == "toy_box"):
+        ahead = float(host.size[2]) / 2
+        for number, kind in enumerate(("toy_ball", "blocks", "bear")):
+            rng = setting.rng(host.name, kind)
+            size, variant = usual_size(kind, rng), int(rng.integers(1 << 30))
+            away = [(x, z) for z in rng.uniform(0.25, 0.9, 4) for x in rng.uniform(-0.8, 0.8, 2)]
+            spots = (host.on_floor(x, ahead + z) for x, z in away)
+            things = (Thing(kind, size, spot, float(rng.uniform(-3, 3)), "", variant) for spot in spots)
+            if number < 2 or setting.full:
+                setting.put_first(things, margin=0.05)

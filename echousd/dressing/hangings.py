@@ -8,7 +8,7 @@ import numpy as np
 
 from echomodel.dressing import thing as solids_of
 from echomodel.dressing import usual_size
-from echousd.dressing.setting import Setting, Thing, standing
+from echousd.dressing.setting import Setting, Standing, Thing, standing
 from echousd.dressing.surfaces import surfaces
 from echousd.dressing.tabletops import shelved_books
 from echousd.dressing.walls import SIDE, Wall, meets, walls_of
@@ -85,6 +85,35 @@ def coats(setting: Setting) -> None:
             one = Thing("coats", size, np.zeros(3), 0.0, "", variant)
             if _hang_first(setting, one, spots, 1.78 - float(size[1]), 0.02):
                 return
+
+
+def hung_up(setting: Setting) -> None:
+    """Coats side by side on a rack, towels over the rungs of a radiator."""
+    for host in setting.of("storage"):
+        kind = {"coat_rack": "coats", "towel_radiator": "towel"}.get(host.row.top, "")
+        if not kind:
+            continue
+        rng = setting.rng(host.name, kind)
+        size = usual_size(kind, rng)
+        w, h, d = (float(side) for side in host.size)
+        if kind == "coats":
+            count, high = max(1, int((w - 0.04) / size[0])), min(1.7, 0.9 * h) - float(size[1])
+            z = 0.0 if d > 2 * size[2] and _posts(host) else -d / 2 + 0.03 + float(size[2]) / 2
+        else:
+            size[0] = min(size[0], w - 0.1)
+            count, high, z = 1, 0.86 * h - float(size[1]), d / 2 - 0.02
+        for k in range(count):
+            x = (k - (count - 1) / 2) * w / count
+            variant = int(rng.integers(1 << 30))
+            place = host.to_room(np.array([[x, high, z]]))[0]
+            if kind == "towel" or k == 0 or rng.random() < 0.7:
+                setting.placed.append(Thing(kind, size, place, host.yaw, host.name, variant))
+
+
+def _posts(host: Standing) -> bool:
+    """Whether a coat rack is a rail on posts, open behind."""
+    box = host.geometry.mesh.vertices
+    return not bool(((box[:, 1] > 0.6 * host.size[1]) & (box[:, 2] < -0.4 * host.size[2])).any())
 
 
 def tall_mirror(setting: Setting) -> None:

@@ -100,7 +100,7 @@ class Setting:
         floor: (k, 2) float corners, metres. openings: in its edges.
         height: of the room, metres. walls: whether there are any to hang things on.
         full: place as much as looks good, not only a little.
-        seed: of all choices.
+        seed: of all choices. use: of the room (`echomodel.rows.RoomType`).
         placed: the things so far. carriers: those of them that others stand on.
         curtained: names of the windows that have curtains.
     """
@@ -112,6 +112,7 @@ class Setting:
     walls: bool
     full: bool
     seed: int
+    use: str = ""
     placed: list[Thing] = field(default_factory=list)
     carriers: dict[str, Standing] = field(default_factory=dict)
     curtained: set[str] = field(default_factory=set)

@@ -63,11 +63,15 @@ TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
         (("cup", "clock"), FRONT, True),
     ),
     "worktop": (
-        (("bowl", "small_plant"), ENDS, False),
-        (("cup", "book_stack"), BACK, False),
+        (("bottles", "small_plant"), BACK, False),
+        (("bowl", "tray"), ENDS, False),
+        (("plates", "cup"), OTHER, False),
         (("glass", "cup"), CORNERS, True),
     ),
-    "washbasin": ((("small_plant", "glass"), ((-0.85, -0.6), (0.85, -0.6)), False), (("candles",), CORNERS, True)),
+    "kids_table": ((("blocks", "pens"), MIDDLE, False), (("notebook",), FRONT, False)),
+    "toy_box": ((("bear", "blocks"), MIDDLE, False),),
+    "hall": ((("bowl", "vase"), ENDS, False), (("photo", "small_plant"), OTHER, False)),
+    "washbasin": ((("bottles", "glass"), ((-0.85, -0.6), (0.85, -0.6)), False), (("candles",), CORNERS, True)),
     "dining_table": ((("flowers", "bowl", "candles"), MIDDLE, False), (("candles",), ENDS, True)),
     "sideboard": (
         (("flowers", "vase"), ENDS, False),
@@ -85,6 +89,8 @@ TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
         (("photo",), ENDS, True),
     ),
 }
+WARE = ("plates", "bowl", "glass", "cup", "bottles")  # in kitchens
+BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no books
 SHELVED = ("book_stack", "vase", "small_plant", "bowl", "photo", "candles", "basket", "clock")
 
 
@@ -101,7 +107,7 @@ def tabletops(setting: Setting) -> None:
         tops = [s for s in levels if s.area.area > 0.3 * footprint and s.host.position[1] + s.y < EYE]
         if name in TOPS and tops:
             _top(setting, host, tops[0], name)
-        if host.row.role == "storage" and host.row.look in CASES:
+        if host.row.role == "storage" and host.row.look in CASES and name not in BARE:
             for surface in levels:
                 if surface is not (tops[0] if tops and name in TOPS else None):
                     _shelf(setting, host, surface)
@@ -168,7 +174,8 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     x0, z0, x1, z1 = surface.bounds
     wide, deep = x1 - x0, z1 - z0
     side = 1.0 if rng.random() < 0.5 else -1.0
-    if rng.random() < (0.95 if setting.full else 0.75):
+    ware = bool(host.row.task)
+    if rng.random() < (0.95 if setting.full else 0.75) and not ware:
         length = wide * rng.uniform(0.35, 0.65)
         for share in (1.0, 0.6, 0.35):
             if length * share < 0.1:
@@ -183,7 +190,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
                 if setting.full:
                     shelved_books(setting, row, rng)
                 break
-    wanted = [str(kind) for kind in rng.permutation(SHELVED)]
+    wanted = [str(kind) for kind in rng.permutation(WARE if ware else SHELVED)]
     for number in range(2 if setting.full else 1):
         if rng.random() < 0.75:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]

@@ -60,7 +60,9 @@ def curtains(setting: Setting) -> None:
     for wall in walls_of(setting):
         for window in (o for o in setting.openings if o.kind == "window" and o.edge == wall.edge):
             rail = window.sill + window.height + above
-            if rail > setting.height - 0.05:
+            if setting.use == "outdoor":
+                continue
+            if setting.use == "wet" or rail > setting.height - 0.05:
                 _blind(setting, wall, window)
                 continue
             rng = setting.rng(window.name, "curtain")
@@ -102,7 +104,7 @@ def _blind(setting: Setting, wall: Wall, window: Opening) -> None:
 
 def pictures(setting: Setting) -> None:
     """A picture or a mirror over what stands at a wall; on an empty wall of a full room, too."""
-    if not setting.walls:
+    if not setting.walls or setting.use:
         return
     every = walls_of(setting)
     for host in setting.inviting("picture", "mirror"):

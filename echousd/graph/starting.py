@@ -33,8 +33,11 @@ def starting_graph(
         if isinstance(count, bool) or not isinstance(count, int) or not 0 <= count <= MAX_COUNT:
             raise GraphError(f"count of {word}: found {count!r}, allowed: an integer from 0 to {MAX_COUNT}")
         wanted[vocabulary().category(word).name] = count
+    places = dict(vocabulary().room_type(room.type).places)
     nodes: dict[str, list[Node]] = {
-        category: [_node(category, i, count) for i in range(count)] for category, count in wanted.items() if count
+        category: [_node(category, i, count, places.get(category)) for i in range(count)]
+        for category, count in wanted.items()
+        if count
     }
     usual: list[Relation] = []
     for habit in vocabulary().habits:
@@ -56,13 +59,13 @@ def starting_graph(
     return graph.replaced(relations=(*kept[stated:], *kept[:stated]))
 
 
-def _node(category: str, position: int, count: int) -> Node:
+def _node(category: str, position: int, count: int, place: str | None) -> Node:
     """Several objects of a category are numbered and share a style; fitted units have that of the room."""
     if count == 1:
-        return Node(category, category)
+        return Node(category, category, place=place)
     fitted = vocabulary().category(category).stands in ("row", "over")
     fields: dict[str, Any] = {} if fitted else {"style": category}
-    return Node(f"{category}_{position + 1}", category, **fields)
+    return Node(f"{category}_{position + 1}", category, place=place, **fields)
 
 
 def _related(habit: Habit, nodes: list[Node], anchors: list[Node]) -> list[Relation]:

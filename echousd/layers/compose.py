@@ -228,11 +228,11 @@ def room_looks(
             table[name] = looks.look(harmony, slot, voice)
             bindings[path] = name
     table |= {f"{ROOM_STYLE}_{slot}": looks.look(harmony, slot) for slot in small}
-    table |= {slot: looks.look(harmony, slot) for slot in ("wall", "wallpaper")} | structure.LOOKS
+    table |= {slot: looks.look(harmony, slot) for slot in ("wall", "wallpaper", "wall_tiles")} | structure.LOOKS
     table["floor"] = looks.look(harmony, coverings.floor_slot(room))
-    paper = {"wall": "wallpaper"} if (papered := coverings.papered_wall(room)) else {}
+    covered = {f"{SHELL}/{name}": slot for name, slot in coverings.covered_walls(room).items()}
     for part in built:
-        own = paper if part.path == f"{SHELL}/{papered}" else {}
+        own = {"wall": covered.get(part.path, "wall")}
         bindings |= {mesh.path: own.get(mesh.look, mesh.look) for mesh in part.meshes}
     used = {*bindings.values(), *(f"{ROOM_STYLE}_{slot}" for slot in small)}
     return {name: look for name, look in table.items() if name in used}, bindings

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 
 import numpy as np
 
 from echomodel.openings import direction, edge_lengths, inward_normal
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import Category, vocabulary
 from echousd.room import RoomData
 from echousd.shapes.walls import wall_name
 
@@ -18,18 +19,38 @@ HOSTS = ("bed", "sofa")  # roles of what a papered wall stands behind
 
 def floor_slot(room: RoomData) -> str:
     """The material slot of the room's floor."""
-    other = vocabulary().room_type(room.graph.room.type).flooring
-    return other if other and _drawn(room, "floor") else "floor"
+    row = vocabulary().room_type(room.graph.room.type)
+    return row.flooring if row.flooring and (row.use or _drawn(room, "floor")) else "floor"
+
+
+def covered_walls(room: RoomData) -> dict[str, str]:
+    """Name of a wall -> the slot of what covers it, for walls that are not plain: tiles where it is wet, paper."""
+    wet = vocabulary().room_type(room.graph.room.type).use == "wet" and room.options.walls
+    if wet and not _behind(room, lambda row: row.task == "cook"):
+        return {wall_name(edge): "wall_tiles" for edge in range(len(_corners(room)))}
+    if wet:
+        return dict.fromkeys(_behind(room, lambda row: row.stands == "row"), "wall_tiles")
+    paper = papered_wall(room)
+    return {paper: "wallpaper"} if paper else {}
 
 
 def papered_wall(room: RoomData) -> str:
     """Name of the wall that has paper, behind the bed or the sofa, "" = none has."""
     if not (room.options.walls and _drawn(room, "paper")):
         return ""
-    corners = np.asarray(room.floor if room.graph.room.corners is None else room.graph.room.corners, float)
+    return next(iter(_behind(room, lambda row: row.role in HOSTS)), "")
+
+
+def _corners(room: RoomData) -> np.ndarray:
+    return np.asarray(room.floor if room.graph.room.corners is None else room.graph.room.corners, float)
+
+
+def _behind(room: RoomData, asked: Callable[[Category], bool]) -> list[str]:
+    """Names of the walls behind objects whose rows answer a question with yes, in the order of the graph."""
+    corners, out = _corners(room), list[str]()
     size, position, yaw = (np.asarray(v, float) for v in (room.boxes.size, room.boxes.position, room.boxes.yaw))
     for number, node in enumerate(room.graph.nodes):
-        if vocabulary().category(node.category).role not in HOSTS:
+        if not asked(vocabulary().category(node.category)):
             continue
         front = np.array([np.sin(yaw[number]), np.cos(yaw[number])])
         back = position[number, [0, 2]] - front * size[number, 2] / 2
@@ -37,8 +58,9 @@ def papered_wall(room: RoomData) -> str:
             inside, off = inward_normal(corners, edge), back - corners[edge]
             before = 0 <= float(off @ direction(corners, edge)) <= length  # not beside it, before another wall in line
             if length > 1.0 and front @ inside > 0.97 and before and abs(float(off @ inside)) < NEAR:
-                return wall_name(edge)
-    return ""
+                out.append(wall_name(edge))
+                break
+    return out
 
 
 def _drawn(room: RoomData, what: str) -> bool:

@@ -12,6 +12,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdSemantics
 
 from echomodel.furniture.solids import Joint
 from echomodel.openings import Opening
+from echomodel.vocabulary import vocabulary
 from echousd.layers import assets
 from echousd.room import RoomData
 from echousd.shapes.finishes.harmonies import linear
@@ -73,7 +74,8 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
     slab = Piece(piece_name("Floor", "mesh"), "floor", floor_mesh(room.floor))
     parts = [ShellPart("Floor", "floor", (slab,))]
     if room.options.walls:
-        parts += walls(plan, room.height, room.graph.room.openings, bare)
+        outdoor = vocabulary().room_type(room.graph.room.type).use == "outdoor"
+        parts += walls(plan, room.height, room.graph.room.openings, bare, outdoor=outdoor)
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]

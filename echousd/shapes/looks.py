@@ -91,7 +91,7 @@ BANDS: Mapping[str, tuple[Part, ...]] = {
     "plant": (Part("ceramic", 0.27), Part("leaf")),
     "tv": (Part("screen"),),
     "metal_box": (Part("metal"),),
-    "porcelain": (Part("ceramic"),),
+    "porcelain": (Part("enamel"),),
 }
 HEADBOARD = 0.09  # metres at the back of a bed that are wood to the top
 FOLD = 0.42  # share of a bed's length, from the foot, that the blanket covers

@@ -34,8 +34,9 @@ STEEL = Matter(7850.0, 0.0015)
 FOAM = Matter(220.0, 0.010, core=45.0)  # upholstery: cloth, webbing and a light frame about the foam
 # Material of a solid -> what it stands for.
 MATTER: Mapping[str, Matter] = {
-    "wood": WOOD, "accent": WOOD, "frame": WOOD, "metal": STEEL, "glass": Matter(2500.0, 0.004),
-    "mirror": Matter(2500.0, 0.003), "ceramic": Matter(2200.0, 0.005), "shade": Matter(1200.0, 0.0012),
+    "wood": WOOD, "accent": WOOD, "frame": WOOD, "metal": STEEL, "steel": STEEL, "glass": Matter(2500.0, 0.004),
+    "mirror": Matter(2500.0, 0.003), "ceramic": Matter(2200.0, 0.005),
+    "enamel": Matter(2200.0, 0.005), "worktop": Matter(2200.0, 0.005), "shade": Matter(1200.0, 0.0012),
     "screen": Matter(1500.0, 0.0015), "fabric": FOAM, "cushion": Matter(40.0), "linen": Matter(50.0),
     "blanket": Matter(20.0), "accent_cloth": Matter(40.0), "accent_plain": Matter(40.0), "leather": Matter(300.0),
     "wicker": Matter(400.0, 0.006), "leaf": Matter(120.0), "petal": Matter(120.0), "stem": Matter(500.0),
@@ -53,9 +54,9 @@ PARTS: Mapping[tuple[str, str], Matter] = {
     ("pot", "ceramic"): Matter(2200.0, 0.005, core=400.0),  # half full of damp soil
     ("stone", "ceramic"): Matter(2200.0, 0.015),  # of a mantel: slabs
     ("stove", "screen"): Matter(7200.0, 0.004, core=60.0),  # cast, lined with brick
-    ("machine", "ceramic"): Matter(7850.0, 0.0008, core=150.0),  # sheet about a drum, a motor and a counterweight
-    ("cold", "metal"): Matter(7850.0, 0.0006, core=45.0),  # sheet about foam, shelves and a compressor
-    ("cold", "ceramic"): Matter(7850.0, 0.0006, core=45.0),
+    ("machine", "enamel"): Matter(7850.0, 0.0008, core=150.0),  # sheet about a drum, a motor and a counterweight
+    ("cold", "steel"): Matter(7850.0, 0.0006, core=45.0),  # sheet about foam, shelves and a compressor
+    ("cold", "enamel"): Matter(7850.0, 0.0006, core=45.0),
     ("case", "wood"): Matter(620.0, 0.02, core=260.0),  # of a piano: an iron frame, strings and action
     ("case", "screen"): Matter(620.0, 0.02, core=260.0),
     ("housing", "metal"): Matter(3000.0, 0.0015),  # of a screen: sheet and plastic about electronics

@@ -17,6 +17,8 @@ from echousd.shapes.fittings import WALL
 from echousd.shapes.shell import THICKNESS
 from echousd.stage.paths import piece_name
 
+PARAPET = 1.05  # metres, height of a wall outdoors that nothing opens
+
 
 @dataclass(frozen=True, eq=False)
 class Piece:
@@ -46,21 +48,25 @@ class ShellPart:
 
 
 def walls(
-    polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset()
-) -> list[ShellPart]:
+    polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset(),
+    *, outdoor: bool = False,
+) -> list[ShellPart]:  # fmt: skip
     """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
 
     Arguments:
         polygon: (k, 2) float, corners (x, z) of the floor, metres, in the turn that the openings count edges in.
         height: of the room, metres.
         openings: in these walls. bare: names of the windows that have no curtain rail.
+        outdoor: walls without an opening are parapets.
     """
     corners = np.ascontiguousarray(polygon, float)
-    return list(_walls(corners.tobytes(), height, tuple(openings), bare))
+    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor))
 
 
 @lru_cache(maxsize=4)  # furniture is moved away from them before they are written
-def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str]) -> tuple[ShellPart, ...]:
+def _walls(
+    corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool
+) -> tuple[ShellPart, ...]:
     polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
     parts = []
@@ -70,7 +76,8 @@ def _walls(corners: bytes, height: float, openings: tuple[Opening, ...], bare: f
         name = wall_name(edge)
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
-        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, height, here), frame))]
+        tall = min(height, PARAPET) if outdoor and not here else height
+        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here), frame))]
         boards = fittings.skirting(here, float(length))
         if boards is not None:
             pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))

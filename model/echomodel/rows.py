@@ -158,6 +158,9 @@ class RoomType:
             tell none, "" = there is none.
         floor: 5th percentile, median and 95th percentile of the area, square metres, and of the short side, metres,
             where real rooms tell none: what such rooms are planned with, measured on none.
+        use: `wet` = its floor is tiled, so are walls that get wet, its windows have blinds; `outdoor` = nothing hangs
+            on its walls and windows; "" = neither.
+        places: (category, placement): where some of its contents stand in a first graph.
         maybe: (category, share): what such a room of the generator holds besides its contents, now and then.
         cover: share of the floor that furniture covers, median. used: share of the floor that use can take, the rest
             are ways and corners. aspect: long side over short side, median. cut: share of floors with a corner cut off.
@@ -176,6 +179,8 @@ class RoomType:
     like: str = ""
     floor: tuple[tuple[float, ...], ...] = ()
     maybe: tuple[tuple[str, float], ...] = ()
+    use: Literal["", "wet", "outdoor"] = ""
+    places: tuple[tuple[str, str], ...] = ()
     cover: float = 0.35
     used: float = 0.66
     aspect: float = 1.3

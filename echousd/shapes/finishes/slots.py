@@ -38,6 +38,9 @@ SLOTS: Mapping[str, Slot] = {
     "blanket": Slot("blanket", 0.95, "linen", 0.6, material="wool"),
     "metal": Slot("metal", 0.35, "brushed", 0.3, metallic=0.85),
     "ceramic": Slot("ceramic", 0.35, "stone", 0.35),
+    "enamel": Slot("f3f2ee", 0.14, material="ceramic"),
+    "worktop": Slot("ceramic", 0.3, "stone", 0.35, mix=("b9b3a9", 0.55), material="ceramic"),
+    "steel": Slot("b3b5b7", 0.33, "brushed", 0.3, metallic=0.8, material="metal"),
     "leaf": Slot("4f7d3c", 0.6, "leaf", 0.3, material="foliage"),
     "soil": Slot("4a3a2c", 0.95),
     "shade": Slot("f6e7c8", 0.8, material="fabric"),
@@ -69,6 +72,7 @@ SLOTS: Mapping[str, Slot] = {
     "floor": Slot("floor", 0.5, "planks", 1.6, material="wood"),
     "carpet": Slot("curtain", 0.97, "carpet", 1.6, mix=("8d8376", 0.35), material="wool"),
     "tiles": Slot("floor", 0.3, "tiles", 1.6, mix=("e6e1d8", 0.65), material="ceramic"),
+    "wall_tiles": Slot("wall", 0.2, "tiles", 0.8, mix=("f2f0ea", 0.6), material="ceramic"),
     "wall": Slot("wall", 0.92, "plaster", 1.4, material="plaster"),
     "wallpaper": Slot("wall", 0.9, "papered", 1.4, mix=("8f9a94", 0.22), material="paper"),
 }

@@ -84,3 +84,33 @@ def cable(size: Size, rng: np.random.Generator) -> list[Solid]:
     line = np.stack([x, np.full_like(x, radius), (along - 0.5) * (d - h)], 1)
     plug = box((-0.011, 0, -d / 2), (0.011, h, -d / 2 + 0.04), "screen", h * 0.3)
     return [tube(line, radius, "screen"), plug]
+
+
+def toy_ball(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A ball with a band of another colour."""
+    half = np.asarray(size, float) / 2
+    rim = (1.01 * half[0], 1.01 * half[2])
+    band = turned((0.0, 0.42 * size[1], 0.0), rim, 0.16 * size[1], material="linen")
+    return [ball((0.0, half[1], 0.0), half, "accent_plain"), band]
+
+
+def blocks(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """Three blocks of wood and a fourth on top of them."""
+    w, h, d = size
+    side = min(h / 2, w / 3 - 0.006, d)
+    at = [(-1.02 * side, 0.0), (0.0, 0.0), (1.02 * side, 0.0), (0.4 * side, side)]
+    colours = rng.permutation(["accent_plain", "blanket", "frame", "fruit"])
+    return [
+        box((x - side / 2, y, -side / 2), (x + side / 2, y + side, side / 2), str(colour), 0.003)
+        for (x, y), colour in zip(at, colours, strict=True)
+    ]
+
+
+def bear(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A bear that sits: a body, a head with a snout and ears, four paws."""
+    w, h, d = size
+    balls = [(0.0, 0.3, -0.1, 0.3), (0.0, 0.72, -0.05, 0.24), (0.0, 0.67, 0.2, 0.1)]  # x, y, z, radius: shares
+    balls += [(s * x, y, z, r) for x, y, z, r in ((0.2, 0.93, -0.08, 0.07), (0.36, 0.42, 0.05, 0.12),
+                                                  (0.24, 0.12, 0.3, 0.12)) for s in (-1, 1)]  # fmt: skip
+    material = ("leather", "accent_cloth", "wicker")[int(rng.integers(3))]
+    return [ball((x * w, y * h, z * d), np.full(3, r * h), material) for x, y, z, r in balls]

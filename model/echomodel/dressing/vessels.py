@@ -165,3 +165,26 @@ def _moved(part: Solid, by: tuple[float, float, float]) -> Solid:
     from dataclasses import replace
 
     return replace(part, centre=part.centre + np.array(by))
+
+
+def plates(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """A pile of plates, a bowl or two on top."""
+    w, h, d = size
+    count = max(2, int(h * 0.6 / 0.012))
+    one, top = vessel(_outline([0.55, 0.7, 0.95, 1.0], np.array([w, 0.016, d])), 0.004, "enamel", 0.25), 0.012 * count
+    cups = vessel(_outline([0.42, 0.7, 0.9, 1.0], np.array([0.6 * w, h - top, 0.6 * d])), 0.005, "ceramic")
+    return [*(_moved(one, (0.0, 0.012 * number, 0.0)) for number in range(count)), _moved(cups, (0.0, top, 0.0))]
+
+
+def bottles(size: Size, rng: np.random.Generator) -> list[Solid]:
+    """Oil, vinegar and salt, or soap and cream: three vessels of different heights."""
+    w, h, d = size
+    parts: list[Solid] = []
+    for number, (tall, material) in enumerate(zip((1.0, 0.78, 0.45), rng.permutation(["glass", "leather", "enamel"]),
+                                                  strict=True)):  # fmt: skip
+        radius = min(w / 3, d) / 2 * 0.92
+        outline = np.array([[radius, 0.0], [radius, 0.62 * tall * h], [0.4 * radius, 0.78 * tall * h],
+                            [0.4 * radius, tall * h]])  # fmt: skip
+        centre = np.array([(number - 1) * w / 3, 0.0, 0.0])
+        parts.append(Lathe(centre=centre, profile=outline, material=str(material)))
+    return parts

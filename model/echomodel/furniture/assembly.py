@@ -19,7 +19,7 @@ THINNEST = 0.6  # half thickness in voxels below which a part is thickened, so t
 THINNEST_ROD_OR_LEAF = 1.0  # likewise: rods and leaves hold too little volume to be learnt otherwise
 MATERIALS = (
     "wood", "accent", "fabric", "metal", "glass", "ceramic", "leaf", "soil", "shade", "screen",
-    "cushion", "linen", "blanket", "mirror", "book", "stem",
+    "cushion", "linen", "blanket", "mirror", "book", "stem", "enamel", "worktop", "steel",
 )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, of_role, post
+from echomodel.furniture.carpentry import Size, around, box, of_role, post
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
 from echomodel.furniture.kitchens import spout
@@ -38,7 +38,7 @@ def toilet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         seat - 0.03 - low,
         (0.46 * w, half - 0.01),
         power=2.6,
-        material="ceramic",
+        material="enamel",
         role="bowl",
     )
     lid = turned(
@@ -48,14 +48,14 @@ def toilet(size: Size, style: Style, choices: Choices) -> list[Solid]:
         (0.47 * w, half),
         power=2.6,
         rounding=0.008,
-        material="ceramic",
+        material="enamel",
         role="lid",
     )
     plate = box((-0.1, h - 0.1, z0 - 0.003), (0.1, h - 0.03, z0 + 0.008), "metal", 0.003, "plate")
     if not hung:
         plate = box((-0.03, h - 0.004, -d / 2 + 0.06), (0.03, h + 0.006, -d / 2 + 0.12), "metal", 0.003, "button")
-    case = box((-tank[0], 0 if hung else seat - 0.05, -d / 2), (tank[0], h, z0), "ceramic", 0.008, "cistern")
-    joined = box((-0.3 * w, low + 0.02, z0 - 0.02), (0.3 * w, seat - 0.035, middle), "ceramic", 0.0, "bowl")
+    case = box((-tank[0], 0 if hung else seat - 0.05, -d / 2), (tank[0], h, z0), "enamel", 0.008, "cistern")
+    joined = box((-0.3 * w, low + 0.02, z0 - 0.02), (0.3 * w, seat - 0.035, middle), "enamel", 0.0, "bowl")
     return [bowl, lid, case, plate, joined]
 
 
@@ -65,23 +65,13 @@ def washbasin(size: Size, style: Style, choices: Choices) -> list[Solid]:
     h = float(size[1]) - TAP
     half, z0, z1 = min(0.38 * w, 0.3), -d / 2 + 0.13, d / 2 - 0.05
     thick = 0.13
-    rim: list[Solid] = [
-        box((-w / 2, h - thick, -d / 2), (w / 2, h, z0), "ceramic", 0.006, "basin"),
-        box((-w / 2, h - thick, z1), (w / 2, h, d / 2), "ceramic", 0.006, "basin"),
-        box((-w / 2, h - thick, z0 - 0.006), (-half, h, z1 + 0.006), "ceramic", 0.006, "basin"),
-        box((half, h - thick, z0 - 0.006), (w / 2, h, z1 + 0.006), "ceramic", 0.006, "basin"),
-        box(
-            (-half - 0.006, h - thick, z0 - 0.006),
-            (half + 0.006, h - thick + 0.012, z1 + 0.006),
-            "ceramic",
-            0.0,
-            "basin",
-        ),
-    ]
+    rim = around((-w / 2, w / 2, -d / 2, d / 2), (-half, half, z0, z1), h - thick, h, "enamel", "basin", 0.006)
+    bottom = (-half - 0.006, h - thick, z0 - 0.006), (half + 0.006, h - thick + 0.012, z1 + 0.006)
+    rim.append(box(*bottom, "enamel", 0.0, "basin"))
     rim += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.1)
     if w < 0.62 and choices.chance("kind", 0.35):
         column = turned(
-            (0, 0, -0.05), (0.11, 0.1), h - thick + 0.004, 0.085, power=2.8, material="ceramic", role="foot"
+            (0, 0, -0.05), (0.11, 0.1), h - thick + 0.004, 0.085, power=2.8, material="enamel", role="foot"
         )
         return [*rim, column]
     foot = 0.25 if choices.chance("raised", 0.6) else 0.08
@@ -101,7 +91,7 @@ def shower(size: Size, style: Style, choices: Choices) -> list[Solid]:
     w, h, d = size
     tray = 0.05
     x, z = w / 2, d / 2
-    parts: list[Solid] = [box((-x, 0, -z), (x, tray, z), "ceramic", 0.006, "tray")]
+    parts: list[Solid] = [box((-x, 0, -z), (x, tray, z), "enamel", 0.006, "tray")]
     parts.append(turned((0, tray - 0.002, 0), 0.05, 0.006, material="metal", role="drain"))
     parts.append(box((x - 0.02, tray - 0.002, -z), (x - 0.02 + GLASS, h, z - 0.012), "glass", 0.0, "pane"))
     if not choices.chance("kind", 0.3):  # else one walks in at its front
@@ -129,7 +119,7 @@ def bathtub(size: Size, style: Style, choices: Choices) -> list[Solid]:
     taps = spout(0.42 * w - wall, h, -d / 2 + 0.035, TAP, 0.14)
     if choices.chance("kind", 0.3):
         shell = turned(
-            (0, 0, 0), (0.42 * w, 0.4 * d), floor, (w / 2, d / 2), power=2.6, material="ceramic", role="shell"
+            (0, 0, 0), (0.42 * w, 0.4 * d), floor, (w / 2, d / 2), power=2.6, material="enamel", role="shell"
         )
         half = bent(
             (0, floor - 0.004, 0),
@@ -138,18 +128,13 @@ def bathtub(size: Size, style: Style, choices: Choices) -> list[Solid]:
             h - floor,
             h - floor,
             power=2.6,
-            material="ceramic",
+            material="enamel",
             role="shell",
         )
         return [shell, half, replace(half, turn=rotation(y=np.pi)), *spout(0.0, h, wall / 2 - d / 2, TAP, 0.14)]
-    parts: list[Solid] = [
-        box((-w / 2, 0, -d / 2), (w / 2, floor, d / 2), "ceramic", 0.0, "shell"),
-        box((-w / 2, floor - 0.004, -d / 2), (w / 2, h, -z), "ceramic", 0.012, "shell"),
-        box((-w / 2, floor - 0.004, z), (w / 2, h, d / 2), "ceramic", 0.012, "shell"),
-        box((-w / 2, floor - 0.004, -d / 2), (-x, h, d / 2), "ceramic", 0.012, "shell"),
-        box((x, floor - 0.004, -d / 2), (w / 2, h, d / 2), "ceramic", 0.012, "shell"),
-    ]
-    return parts + taps
+    base = box((-w / 2, 0, -d / 2), (w / 2, floor, d / 2), "enamel", 0.0, "shell")
+    rim = around((-w / 2, w / 2, -d / 2, d / 2), (-x, x, -z, z), floor - 0.004, h, "enamel", "shell", 0.012)
+    return [base, *rim, *taps]
 
 
 def mirror_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -170,11 +155,11 @@ def towel_radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Two uprights and rungs in groups, on brackets at the wall."""
     w, h, d = size
     x, z, rungs = w / 2 - 0.02, d / 2 - 0.02, max(6, round(h / 0.07))
-    parts: list[Solid] = [post(s * x, z, 0.02, 0, h, "ceramic", 0.006, "upright") for s in (-1, 1)]
+    parts: list[Solid] = [post(s * x, z, 0.02, 0, h, "enamel", 0.006, "upright") for s in (-1, 1)]
     for number, y in enumerate(np.linspace(0.05, h - 0.05, rungs).tolist()):
         if number % 6 != 5:
             points = np.array([[-x, y, z], [x, y, z]])
-            parts.append(tube(points, 0.011, "ceramic", "rung"))
+            parts.append(tube(points, 0.011, "enamel", "rung"))
     for y in (0.12 * h, 0.88 * h):
         parts += [
             box((s * x - 0.012, y, -d / 2), (s * x + 0.012, y + 0.024, z), "metal", 0.0, "bracket") for s in (-1, 1)
@@ -193,9 +178,9 @@ def washing_machine(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
     knob = turned((0.12, h - 0.075, z), 0.025, 0.025, 0.022, turn=ahead)
     return [
-        box((-w / 2, 0, -d / 2), (w / 2, h, z), "ceramic", 0.006, "machine"),
+        box((-w / 2, 0, -d / 2), (w / 2, h, z), "enamel", 0.006, "machine"),
         box((-w / 2 + 0.02, h - 0.12, z - 0.004), (w / 2 - 0.02, h - 0.03, z + 0.004), "screen", 0.0, "switches"),
-        box((-w / 2 + 0.03, h - 0.115, z), (-w / 2 + 0.2, h - 0.035, z + 0.012), "ceramic", 0.002, "drawer_front"),
+        box((-w / 2 + 0.03, h - 0.115, z), (-w / 2 + 0.2, h - 0.035, z + 0.012), "enamel", 0.002, "drawer_front"),
         *of_role("knob", [knob], material="metal"),
         disc(0.19, 0.022, "metal", "door"),
         disc(0.155, 0.032, "screen", "door"),

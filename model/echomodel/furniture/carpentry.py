@@ -34,6 +34,15 @@ def post(
     return box((x - half, y0, z - half), (x + half, y1, z + half), material, radius, role)
 
 
+def around(
+    outer: tuple, inner: tuple, low: float, high: float, material: str, role: str, radius: float = 0.0
+) -> list[Solid]:
+    """Four bars from a height to another about a hole: two rectangles (x0, x1, z0, z1), the long bars along x."""
+    (a, b, c, d), (x0, x1, z0, z1) = outer, inner
+    bars = ((a, b, c, z0), (a, b, z1, d), (a, x0, z0 - radius, z1 + radius), (x1, b, z0 - radius, z1 + radius))
+    return [box((p, low, r), (q, high, s), material, radius, role) for p, q, r, s in bars]
+
+
 def core(low: tuple, high: tuple, material: str = "wood") -> Block:
     """What boards enclose between two corners (3,): a body for distances, without a mesh (`Solid.core`)."""
     return replace(box(low, high, material), core=True)

@@ -65,7 +65,7 @@ def radiator(size: Size, style: Style, choices: Choices) -> list[Solid]:
         for x in np.arange(-w / 2 + 0.04, w / 2 - 0.02, 0.05):
             parts.append(box((x - 0.012, low + 0.03, d / 2 - 0.014), (x + 0.012, h - 0.03, d / 2), radius=0.004))
     feet = [box((s * 0.35 * w - 0.02, 0, -d / 2), (s * 0.35 * w + 0.02, low + 0.05, 0.0)) for s in (-1, 1)]
-    return [*of_role("body", parts, material="ceramic"), *of_role("foot", feet, material="metal")]
+    return [*of_role("body", parts, material="enamel"), *of_role("foot", feet, material="metal")]
 
 
 def fireplace(size: Size, style: Style, choices: Choices) -> list[Solid]:
@@ -106,7 +106,7 @@ def piano(size: Size, style: Style, choices: Choices) -> list[Solid]:
         box((-w / 2, 0, -d / 2), (w / 2, h - 0.03, z), material, 0.004, "case"),
         box((-w / 2, h - 0.034, -d / 2), (w / 2, h, z + 0.02), material, 0.004, "lid"),
         box((-w / 2, keys - 0.1, z - 0.004), (w / 2, keys - 0.02, d / 2), material, 0.004, "bed"),
-        box((-w / 2 + t, keys - 0.024, z), (w / 2 - t, keys, d / 2 - 0.03), "ceramic", 0.001, "keys"),
+        box((-w / 2 + t, keys - 0.024, z), (w / 2 - t, keys, d / 2 - 0.03), "enamel", 0.001, "keys"),
         box((-0.45 * w, keys + 0.2, z - 0.004), (0.45 * w, keys + 0.22, z + 0.03), material, 0.0, "desk"),
     ]
     for s in (-1, 1):

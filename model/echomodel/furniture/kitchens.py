@@ -9,13 +9,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from echomodel.furniture.carpentry import Size, box, core, of_role
+from echomodel.furniture.carpentry import Size, around, box, core, of_role
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import front
 from echomodel.furniture.solids import Solid, Tube, Turned, rotation
 from echomodel.furniture.style import Style
 
 PLINTH, WORKTOP = 0.1, 0.04  # metres: height of the plinth, thickness of the worktop
+SPOUT = 0.0094  # metres that a tap is thick over its line
 TAP = 0.27  # metres over the worktop
 GRIP = 0.04  # metres that the worktop covers of the handles
 RECESS = 0.05  # metres that the plinth stands back, for feet
@@ -70,7 +71,7 @@ def sink_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
     half, deep = min(0.27, 0.4 * w), 0.18
     x0, x1, z0, z1 = -half, half, -0.16, d / 2 - 0.09
     parts = _worktop(np.array([w, h, d]), hole=(x0, x1, z0, z1))
-    parts += basin((x0, x1, z0, z1), h, deep, "metal")
+    parts += basin((x0, x1, z0, z1), h, deep, "steel")
     parts += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.16)
     y, top, (back, z) = h - WORKTOP - deep - 0.01, h - WORKTOP, _deep(d)
     parts += [box((x, y, back), (x + SIDE, top + 0.002, z), role="side") for x in (-w / 2, w / 2 - SIDE)]
@@ -84,12 +85,12 @@ def hob_unit(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A glass hob with four rings on the worktop, the oven below it."""
     w, h, d = size
     half = min(0.29, 0.45 * w)
-    parts = _worktop(size)
-    parts.append(box((-half, h - 0.004, -0.24), (half, h + 0.005, 0.26), "screen", 0.002, "hob"))
+    parts = _worktop(size, hole=(-half, half, -0.24, 0.26))
+    parts.append(box((-half, h - WORKTOP, -0.24), (half, h - 0.002, 0.26), "screen", 0.0, "hob"))
     for x, z, radius in ((-0.14, -0.1, 0.08), (0.14, -0.1, 0.1), (-0.14, 0.13, 0.1), (0.14, 0.13, 0.08)):
         ring = Turned(
-            centre=np.array([x * half / 0.29, h + 0.003, z]), low=(radius, radius), high=(radius, radius),
-            height=0.0035, material="metal", role="hob",
+            centre=np.array([x * half / 0.29, h - 0.0035, z]), low=(radius, radius), high=(radius, radius),
+            height=0.0035, material="steel", role="hob",
         )  # fmt: skip
         parts.append(ring)
     side = (w - UNIT) / 2
@@ -108,14 +109,14 @@ def dishwasher(size: Size, style: Style, choices: Choices) -> list[Solid]:
     _, z = _deep(d)
     parts += _shell(-w / 2, w / 2, (PLINTH, h - WORKTOP), _deep(d), closed=True)
     panel = h - WORKTOP - 0.11
-    parts.append(box((-w / 2, panel + 0.003, z - 0.004), (w / 2, h - WORKTOP, z + 0.018), "metal", 0.002, "switches"))
+    parts.append(box((-w / 2, panel + 0.003, z - 0.004), (w / 2, h - WORKTOP, z + 0.018), "steel", 0.002, "switches"))
     return parts + front((-w / 2, PLINTH), (w / 2, panel), z, 1, 1, "door", style)
 
 
 def fridge(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A cold body of steel or enamel with two doors above each other, tall handles at one side."""
     w, h, d = size
-    material = choices.pick("cover", ["metal", "ceramic"], [0.5, 0.5])
+    material = choices.pick("cover", ["steel", "enamel"], [0.5, 0.5])
     z, foot = d / 2 - 0.06, 0.05
     split = foot + (h - foot) * choices.pick("split", [0.36, 0.62])
     parts: list[Solid] = [
@@ -127,7 +128,7 @@ def fridge(size: Size, style: Style, choices: Choices) -> list[Solid]:
         y = (high - 0.12, high - 0.5) if high == split else (low + 0.12, low + 0.5)
         points = np.array([[w * 0.4, min(y), z + 0.04], [w * 0.4, min(y), z + 0.06], [w * 0.4, max(y), z + 0.06],
                            [w * 0.4, max(y), z + 0.04]])  # fmt: skip
-        parts.append(Tube(points=points, radius=0.009, material="metal", role="handle"))
+        parts.append(Tube(points=points, radius=0.009, material="steel", role="handle"))
     return parts
 
 
@@ -135,13 +136,13 @@ def range_hood(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A steel hood: a slab below a chimney, or a hood that slopes up to it."""
     w, h, d = size
     lip = 0.06
-    chimney = box((-0.15, lip, -d / 2), (0.15, h, -d / 2 + 0.26), "metal", 0.002, "chimney")
-    slab = box((-w / 2, 0, -d / 2), (w / 2, lip, d / 2), "metal", 0.004, "hood")
+    chimney = box((-0.15, lip, -d / 2), (0.15, h, -d / 2 + 0.26), "steel", 0.002, "chimney")
+    slab = box((-w / 2, 0, -d / 2), (w / 2, lip, d / 2), "steel", 0.004, "hood")
     if choices.chance("kind", 0.5):
         return [slab, chimney]
     slope = Turned(
         centre=np.array([0, lip - 0.002, 0.0]), low=(w / 2 * 0.98, d / 2 * 0.98), high=(0.2, d * 0.22),
-        height=max(0.1, 0.35 * h), power=np.inf, material="metal", role="hood",
+        height=max(0.1, 0.35 * h), power=np.inf, material="steel", role="hood",
     )  # fmt: skip
     return [slab, slope, chimney]
 
@@ -152,7 +153,7 @@ def kitchen_island(size: Size, style: Style, choices: Choices) -> list[Solid]:
     over = min(0.3, 0.35 * d)
     z0 = over - d / 2
     parts: list[Solid] = [
-        box((-w / 2, h - WORKTOP, -d / 2), (w / 2, h, d / 2), "ceramic", 0.004, "worktop"),
+        box((-w / 2, h - WORKTOP, -d / 2), (w / 2, h, d / 2), "worktop", 0.0, "worktop"),
         box((0.02 - w / 2, 0, z0 + RECESS), (w / 2 - 0.02, PLINTH, d / 2 - RECESS - GRIP), "accent", 0.0, "plinth"),
     ]
     kind = choices.pick("kind", ["door", "drawer"])
@@ -176,18 +177,10 @@ def _plinth(size: Size) -> list[Solid]:
 def _worktop(size: Size, hole: tuple[float, float, float, float] | None = None) -> list[Solid]:
     """A plinth and a worktop, with a hole (x0, x1, z0, z1) in it."""
     w, h, d = size
-    low = h - WORKTOP
-
-    def slab(x0: float, x1: float, z0: float, z1: float) -> Solid:
-        return box((x0, low, z0), (x1, h, z1), "ceramic", 0.0 if hole else 0.004, "worktop")
-
+    x, z, low = w / 2, d / 2, h - WORKTOP
     if hole is None:
-        return [*_plinth(size), slab(-w / 2, w / 2, -d / 2, d / 2)]
-    x0, x1, z0, z1 = hole
-    return [
-        *_plinth(size), slab(-w / 2, w / 2, -d / 2, z0), slab(-w / 2, w / 2, z1, d / 2),
-        slab(-w / 2, x0, z0, z1), slab(x1, w / 2, z0, z1),
-    ]  # fmt: skip
+        return [*_plinth(size), box((-x, low, -z), (x, h, z), "worktop", 0.0, "worktop")]
+    return [*_plinth(size), *around((-x, x, -z, z), hole, low, h, "worktop", "worktop")]
 
 
 def _deep(d: float) -> Span:
@@ -228,14 +221,14 @@ def _oven(low: float, high: float, span: Span, deep: Span) -> list[Solid]:
     top = y1 - 0.11
     parts = _shell(low, high, span, deep, closed=True)
     parts += [
-        box((low + 0.003, y0 + 0.003, z - 0.004), (high - 0.003, top, z + 0.016), "metal", 0.002, "oven"),
+        box((low + 0.003, y0 + 0.003, z - 0.004), (high - 0.003, top, z + 0.016), "steel", 0.002, "oven"),
         box((low + 0.06, y0 + 0.07, z + 0.012), (high - 0.06, top - 0.1, z + 0.0185), "screen", 0.001, "pane"),
-        box((low + 0.003, top + 0.003, z - 0.004), (high - 0.003, y1 - 0.003, z + 0.016), "metal", 0.002, "switches"),
+        box((low + 0.003, top + 0.003, z - 0.004), (high - 0.003, y1 - 0.003, z + 0.016), "steel", 0.002, "switches"),
     ]
     y = top - 0.045
     grip = np.array([[low + 0.07, y, z + 0.012], [low + 0.07, y, z + 0.045], [high - 0.07, y, z + 0.045],
                      [high - 0.07, y, z + 0.012]])  # fmt: skip
-    parts.append(Tube(points=grip, radius=0.007, material="metal", role="handle"))
+    parts.append(Tube(points=grip, radius=0.007, material="steel", role="handle"))
     for x in np.linspace(low + 0.1, high - 0.1, 4):
         centre, ahead = np.array([x, (top + y1) / 2, z + 0.014]), rotation(x=np.pi / 2)
         knob = Turned(centre=centre, low=(0.016, 0.016), high=(0.014, 0.014), height=0.02, turn=ahead)
@@ -246,24 +239,16 @@ def _oven(low: float, high: float, span: Span, deep: Span) -> list[Solid]:
 def basin(rect: tuple[float, float, float, float], rim: float, deep: float, material: str) -> list[Solid]:
     """An open trough of five sheets below a rim, over a rectangle (x0, x1, z0, z1)."""
     (x0, x1, z0, z1), y, t = rect, rim - deep, 0.008
-    edge = 0.012  # over the worktop's edge, so that it rests on it
-    return [
-        box((x0, y, z0), (x1, y + t, z1), material, 0.0, "basin"),
-        *(
-            box((a, y, z0 - edge), (b, rim + 0.002, z1 + edge), material, 0.0, "basin")
-            for a, b in ((x0 - edge, x0 + t), (x1 - t, x1 + edge))
-        ),
-        *(
-            box((x0, y, a), (x1, rim + 0.002, b), material, 0.0, "basin")
-            for a, b in ((z0 - edge, z0 + t), (z1 - t, z1 + edge))
-        ),
-    ]
+    over = x0 - 0.012, x1 + 0.012, z0 - 0.012, z1 + 0.012  # over the worktop's edge, so that it rests on it
+    sheets = around(over, (x0 + t, x1 - t, z0 + t, z1 - t), y, rim + 0.002, material, "basin")
+    return [box((x0, y, z0), (x1, y + t, z1), material, 0.0, "basin"), *sheets]
 
 
 def spout(x: float, y: float, z: float, high: float, reach: float) -> list[Solid]:
-    """A spout that bends forward over the basin, and its lever."""
-    bend = np.array([[0, 0, 0], [0, 0.75 * high, 0], [0, 0.95 * high, 0.12 * reach], [0, high, 0.5 * reach],
-                     [0, 0.93 * high, 0.9 * reach], [0, 0.8 * high, reach]])  # fmt: skip
+    """A spout that bends forward over the basin, `high` in all, and its lever."""
+    high -= SPOUT
+    bend = np.array([[0, 0, 0], [0, 0.75 * high, 0], [0, 0.95 * high, 0.12 * reach], [0, high, 0.42 * reach],
+                     [0, high, 0.58 * reach], [0, 0.93 * high, 0.9 * reach], [0, 0.8 * high, reach]])  # fmt: skip
     lever = np.array([[0, 0.2 * high, 0], [0.06, 0.28 * high, 0]])
     foot = Turned(centre=np.array([x, y - 0.003, z]), low=(0.024, 0.024), high=(0.024, 0.024), height=0.015)
     at = np.array([x, y, z])

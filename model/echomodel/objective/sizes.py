@@ -127,7 +127,8 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
         ends = 2 * TUCKED * at_ends
         least, most = a_side * (width + ELBOWS) + ends, a_side * max(PLACE, width + ELBOWS) + ends + SPARE
         out[table, long] = np.clip(size[table, long], least, most)
-        out[table, 2 - long] = np.clip(size[table, 2 - long], LEAST_DEPTH, MOST_DEPTH)
+        if not kinds[table].like:  # a child's table is as it comes
+            out[table, 2 - long] = np.clip(size[table, 2 - long], LEAST_DEPTH, MOST_DEPTH)
     return out
 
 

@@ -45,7 +45,8 @@ def _run(room: Builder) -> list[Item]:
         site = Site(np.array(room.floor.polygon), room.floor.in_the_way)
         spot = room.uniform(-1, 1) * room.floor.half_x, 0.0, room.uniform(-1, 1) * room.floor.half_z
         draft = np.tile(spot, (len(kinds), 1))  # towards one end of the room or the other
-        plans = [plan for plan in runs(kinds, size, free, site, draft=draft, most=TRIED) if len(plan.which) == len(kinds)]
+        plans = runs(kinds, size, free, site, draft=draft, most=TRIED)
+        plans = [plan for plan in plans if len(plan.which) == len(kinds)]
         if plans or units < 2:
             break
         less = next((name for name in GIVEN_UP if wanted.get(name, 0) > (name == "base_unit")), None)

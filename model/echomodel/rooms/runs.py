@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
@@ -31,8 +31,7 @@ WIDEST = 1.5  # metres of a unit that is stretched, where less does not fill the
 SLIVER = 0.35  # metres of wall that are not left over beside a run
 LANDING = 0.4  # metres of worktop beside a hob
 TRIANGLE = (3.6, 8.0)  # metres, sum of the ways between hob, sink and fridge
-ENOUGH = 4000  # plans of one room that are looked at
-BUILT = 100  # of these with what hangs over them
+BUILT = 100  # plans of one room that are looked at with what hangs over them
 Interval = tuple[float, float]
 Obstacle = tuple[np.ndarray, float, float, bool]
 
@@ -50,15 +49,12 @@ class Run:
 
 @dataclass(frozen=True)
 class Leg:
-    """A part of a run: a wall, from where to where, and whether it owns the corners there or ends at another leg."""
+    """A part of a run: a wall, from where to where; of each end whether it `owns` a corner or `meets` another leg."""
 
     wall: int
     low: float
     high: float
-    own_low: bool = False
-    own_high: bool = False
-    meets_low: bool = False
-    meets_high: bool = False
+    ends: tuple[str, str] = ("", "")
 
     @property
     def length(self) -> float:
@@ -97,10 +93,7 @@ class Site:
 
     def free(self, wall: int, deep: float, low: float, high: float) -> list[Interval]:
         """What is left of a wall."""
-        left = [(0.0, self.walls[wall].length)]
-        for a, b in self.blocked(wall, deep, low, high):
-            left = [part for lo, hi in left for part in ((lo, min(hi, a)), (max(lo, b), hi)) if part[1] - part[0] > 0]
-        return [part for part in left if part[1] - part[0] >= LEAST_LEG]
+        return _without((0.0, self.walls[wall].length), self.blocked(wall, deep, low, high), LEAST_LEG)
 
     def ahead(self, wall: int, along: float, away: float) -> bool:
         """Whether a point before a wall lies on the floor."""
@@ -116,21 +109,19 @@ class Site:
         free = [self.free(k, deep, 0.0, 0.9) for k in range(len(self.walls))]
         for k, parts in enumerate(free):
             yield from ((Leg(k, lo, hi),) for lo, hi in parts)
-        for k in range(len(self.walls)):
-            one, two = k, (k + 1) % len(self.walls)
-            for first in free[one][-1:] if self._corner(one) else ():
-                for second in free[two][:1]:
-                    if first[1] < self.walls[one].length - 1e-6 or second[0] > 1e-6:
-                        continue
-                    yield Leg(one, *first, own_high=True), Leg(two, deep, second[1], meets_low=True)
-                    yield Leg(one, first[0], first[1] - deep, meets_high=True), Leg(two, *second, own_low=True)
-                    three = (k + 2) % len(self.walls)
-                    whole = second[1] > self.walls[two].length - 1e-6 and second[1] > 2 * deep + AISLE
-                    for third in free[three][:1] if whole and self._corner(two) and three != one else ():
-                        if third[0] < 1e-6:
-                            yield (Leg(one, first[0], first[1] - deep, meets_high=True),
-                                   Leg(two, *second, own_low=True, own_high=True),
-                                   Leg(three, deep, third[1], meets_low=True))  # fmt: skip
+        for one in range(len(self.walls)):
+            two, three = (one + 1) % len(self.walls), (one + 2) % len(self.walls)
+            if not (self._corner(one) and free[one] and free[two]):
+                continue
+            (a, b), (c, d) = free[one][-1], free[two][0]
+            if b < self.walls[one].length - 1e-6 or c > 1e-6:
+                continue
+            yield Leg(one, a, b, ("", "owns")), Leg(two, deep, d, ("meets", ""))
+            yield Leg(one, a, b - deep, ("", "meets")), Leg(two, c, d, ("owns", ""))
+            wide = self.walls[two].length - 1e-6 < d > 2 * deep + AISLE and self._corner(two) and three != one
+            if wide and free[three] and free[three][0][0] < 1e-6:
+                yield (Leg(one, a, b - deep, ("", "meets")), Leg(two, c, d, ("owns", "owns")),
+                       Leg(three, deep, free[three][0][1], ("meets", "")))  # fmt: skip
         for k, here in enumerate(self.walls):
             for m, there in enumerate(self.walls[:k]):
                 apart = (there.x - here.x) * math.sin(here.yaw) + (there.z - here.z) * math.cos(here.yaw)
@@ -188,6 +179,14 @@ def _even(kinds: Sequence[Category], size: np.ndarray, free: np.ndarray) -> np.n
     return out
 
 
+def _without(span: Interval, closed: Sequence[Interval], least: float) -> list[Interval]:
+    """What is left of a span, as far as it is long enough."""
+    left = [span]
+    for a, b in closed:
+        left = [part for lo, hi in left for part in ((lo, min(hi, a)), (max(lo, b), hi)) if part[1] > part[0]]
+    return [part for part in left if part[1] - part[0] >= least]
+
+
 def _hangs(kind: Category) -> bool:
     """Whether it is a cupboard above a worktop."""
     return kind.stands == "over" and kind.task == "store"
@@ -231,71 +230,46 @@ class _Planner:
         return list(found)
 
     def plans(self) -> Iterator[tuple[float, tuple[Leg, ...], tuple[tuple[int, ...], ...]]]:
-        orders, looked = self.orders(), 0
+        orders = self.orders()
         least = {order: np.cumsum([0.0, *(self.least[i] for i in order)]).tolist() for order in orders}
         for legs in self.site.shapes(self.deep):
             if sum(leg.length for leg in legs) < sum(self.least.values()):
                 continue
-            for order in orders:
-                for cuts in self._cuts(len(order), len(legs)):
-                    ends = [0, *cuts, len(order)]
-                    if any(least[order][b] - least[order][a] > leg.length + 1e-6
-                           for leg, (a, b) in zip(legs, pairwise(ends), strict=True)):  # fmt: skip
-                        continue
-                    parts = tuple(order[a:b] for a, b in pairwise(ends))
+            for order, cuts in product(orders, combinations(range(1, len(self.units)), len(legs) - 1)):
+                ends = list(pairwise((0, *cuts, len(order))))
+                if all(least[order][b] - least[order][a] < leg.length + 1e-6
+                       for leg, (a, b) in zip(legs, ends, strict=True)):  # fmt: skip
+                    parts = tuple(order[a:b] for a, b in ends)
                     cost = self.cost(legs, parts)
                     if cost is not None:
                         yield cost, legs, parts
-                        looked += 1
-                        if looked > ENOUGH * len(legs):
-                            break
 
-    @staticmethod
-    def _cuts(count: int, legs: int) -> list[tuple[int, ...]]:
-        if legs == 1:
-            return [()]
-        if legs == 2:
-            return [(k,) for k in range(1, count)]
-        return [(k, m) for k in range(1, count - 1) for m in range(k + 1, count)]
-
-    def widths(self, leg: Leg, part: Sequence[int]) -> list[float] | None:
-        """How wide the units of a leg are; None where they do not fit."""
-        least = [self.least[i] for i in part]
-        for owns, at in ((leg.own_low, 0), (leg.own_high, -1)):
-            if owns:
-                if not self.elastic[part[at]] or self.size[part[at], 1] > TALL:
+    def widths(self, leg: Leg, part: Sequence[int]) -> np.ndarray | None:
+        """(u,) float: how wide the units of a leg are, metres; None where they do not fit."""
+        least, soft = np.array([self.least[i] for i in part]), np.array([self.elastic[i] for i in part])
+        for at, end in zip((0, -1), leg.ends, strict=True):
+            if end == "owns":
+                if not soft[at] or self.size[part[at], 1] > TALL:
                     return None
                 least[at] = max(least[at], self.deep + BLIND)
-        spare = leg.length - sum(least)
-        if spare < -1e-6:
-            return None
-        want = [max(float(self.size[i, 0]), low) for i, low in zip(part, least, strict=True)]
-        soft = [self.elastic[i] for i in part]
-        more = sum(w - low for w, low, e in zip(want, least, soft, strict=True) if e)
-        if more > max(spare, 0.0):
-            return [
-                low + (w - low) * max(spare, 0.0) / more if e else low
-                for w, low, e in zip(want, least, soft, strict=True)
-            ]
-        out = [w if e else low for w, low, e in zip(want, least, soft, strict=True)]
-        room = [max(WIDEST - w, 0.0) if e else 0.0 for w, e in zip(out, soft, strict=True)]
-        left, total = leg.length - sum(out), sum(room)
-        if total and left - total > -1e-9 and left - total < SLIVER:  # rather a wide unit than a gap beside a wall
-            room = [r * left / total for r in room]
-            total = left
-        share = min(left / total, 1.0) if total else 0.0
-        return [w + share * r for w, r in zip(out, room, strict=True)]
+        want = np.where(soft, np.maximum(self.size[list(part), 0], least), least)
+        spare, less = leg.length - want.sum(), want - least
+        if spare < 0:
+            return want + less * spare / max(less.sum(), 1e-9) if less.sum() > -spare - 1e-6 else None
+        more = np.where(soft, np.maximum(WIDEST - want, 0.0), 0.0)
+        if more.sum() < spare < more.sum() + SLIVER and soft.any():  # rather a wide unit than a gap beside a wall
+            more += soft * (spare - more.sum()) / soft.sum()
+        out: np.ndarray = want + more * min(spare / max(more.sum(), 1e-9), 1.0)
+        return out
 
     def spans(self, leg: Leg, part: Sequence[int]) -> list[Interval] | None:
         """From where to where along its wall each unit of a leg stands."""
         widths = self.widths(leg, part)
         if widths is None:
             return None
-        left = leg.length - sum(widths)
-        ends = (leg.low < 1e-6 or leg.meets_low or leg.own_low), (leg.meets_high or leg.own_high)
-        start = leg.low if ends[0] and not ends[1] else leg.high - sum(widths) if ends[1] else leg.low + left
-        edges = np.cumsum([start, *widths]).tolist()
-        return list(pairwise(edges))
+        left = leg.length - widths.sum()
+        start = leg.high - widths.sum() if leg.ends[1] else leg.low + left * (leg.low > 1e-6 and not leg.ends[0])
+        return list(pairwise(np.cumsum([start, *widths]).tolist()))
 
     def cost(self, legs: Sequence[Leg], parts: Sequence[Sequence[int]]) -> float | None:
         """What a person objects to in a plan, without its distances to the rest of the room; None = it cannot be."""
@@ -309,7 +283,7 @@ class _Planner:
             left = leg.length - (spans[-1][1] - spans[0][0])
             total += 0.25 * left + 1.0 * (0.01 < left < SLIVER)
             for number, (i, (lo, hi)) in enumerate(zip(part, spans, strict=True)):
-                inner = (leg.meets_low and number == 0) or (leg.meets_high and number == len(part) - 1)
+                inner = "meets" in (leg.ends[0] * (number == 0), leg.ends[1] * (number == len(part) - 1))
                 if self.size[i, 1] > TALL:
                     tall = self.site.blocked(leg.wall, float(self.size[i, 2]), TALL, float(self.size[i, 1]))
                     if any(lo < b and hi > a for a, b in tall):
@@ -397,12 +371,9 @@ class _Planner:
             closed += [span for _, wall, span, _ in hoods if wall == leg.wall]
             closed += self.site.blocked(leg.wall, float(deep), low, low + float(high))
             start, end = mine[0][1][0], mine[-1][1][1]
-            start = min(start, float(deep)) if leg.meets_low else start
-            end = max(end, self.site.walls[leg.wall].length - float(deep)) if leg.meets_high else end
-            left = [(start, end)]
-            for a, b in closed:
-                left = [part for lo, hi in left for part in ((lo, min(hi, a)), (max(lo, b), hi)) if part[1] > part[0]]
-            gaps += [(leg.wall, part) for part in left if part[1] - part[0] >= least]
+            start = min(start, float(deep)) if leg.ends[0] == "meets" else start
+            end = max(end, self.site.walls[leg.wall].length - float(deep)) if leg.ends[1] == "meets" else end
+            gaps += [(leg.wall, part) for part in _without((start, end), closed, least)]
         count = [0] * len(gaps)
         for _ in units:  # each to where it is widest
             room = [(b - a) / (n + 1) for (_, (a, b)), n in zip(gaps, count, strict=True)]
