@@ -249,6 +249,8 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
     """With the back to every wall that is long enough, from corner to corner and where the draft is nearest."""
     width, depth = float(setting.size[i, 0]), float(setting.size[i, 2])
     gap = 0.0 if setting.kinds[i].support == "wall" else float(setting.behind[i])
+    told = {(one.placement, one.subject) for one in setting.problem.stated}
+    fills = setting.kinds[i].clear > 0 and ("in_corner", i) in told  # a tub does, other things stand near one
     rows = []
     for start, along, length, yaw in setting.walls:
         free = length - width
@@ -256,7 +258,8 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
             continue
         low, high = min(0.01, max(free, 0) / 2), max(free - 0.01, max(free, 0) / 2)
         drawn = float((setting.draft[i, [0, 2]] - start) @ along) - width / 2
-        offsets = np.unique(np.clip([low, high, free / 2, drawn, *np.arange(low, high, STEP)], low, high).round(3))
+        steps = [] if fills else [free / 2, drawn, *np.arange(low, high, STEP)]
+        offsets = np.unique(np.clip([low, high, *steps], low, high).round(3))
         normal = np.array([math.sin(yaw), math.cos(yaw)])
         for offset in offsets.tolist():
             x, z = start + along * (offset + width / 2) + normal * (depth / 2 + gap)

@@ -36,7 +36,7 @@ FOAM = Matter(220.0, 0.010, core=45.0)  # upholstery: cloth, webbing and a light
 MATTER: Mapping[str, Matter] = {
     "wood": WOOD, "accent": WOOD, "frame": WOOD, "metal": STEEL, "steel": STEEL, "glass": Matter(2500.0, 0.004),
     "mirror": Matter(2500.0, 0.003), "ceramic": Matter(2200.0, 0.005),
-    "enamel": Matter(2200.0, 0.005), "worktop": Matter(2200.0, 0.005), "shade": Matter(1200.0, 0.0012),
+    "enamel": Matter(2200.0, 0.005), "worktop": Matter(2400.0, 0.006), "shade": Matter(1200.0, 0.0012),
     "screen": Matter(1500.0, 0.0015), "fabric": FOAM, "cushion": Matter(40.0), "linen": Matter(50.0),
     "blanket": Matter(20.0), "accent_cloth": Matter(40.0), "accent_plain": Matter(40.0), "leather": Matter(300.0),
     "wicker": Matter(400.0, 0.006), "leaf": Matter(120.0), "petal": Matter(120.0), "stem": Matter(500.0),

@@ -66,7 +66,7 @@ KINDS: dict[str, Kind] = {
         Kind("plates", "plate", vessels.plates, (0.2, 0.06, 0.2), (0.26, 0.12, 0.26)),
         Kind("bottles", "bottle", vessels.bottles, (0.17, 0.2, 0.07), (0.24, 0.3, 0.08)),
         Kind("ball", "ball", floorware.toy_ball, (0.16, 0.16, 0.16), (0.24, 0.24, 0.24), faces=600),
-        Kind("blocks", "plaything", floorware.blocks, (0.2, 0.12, 0.14), (0.26, 0.17, 0.18), faces=400),
+        Kind("blocks", "plaything", floorware.blocks, (0.2, 0.13, 0.065), (0.26, 0.17, 0.085), faces=400),
         Kind("bear", "plaything", floorware.bear, (0.2, 0.26, 0.17), (0.26, 0.34, 0.22)),
         Kind("towel", "towel", textiles.towel, (0.36, 0.4, 0.05), (0.48, 0.6, 0.06), True),
         Kind("basket", "basket", vessels.basket, (0.36, 0.36, 0.36), (0.46, 0.48, 0.46)),

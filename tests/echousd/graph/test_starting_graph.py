@@ -109,3 +109,9 @@ def test_armchairs_keep_the_first_sofa_company():
     mine = [r for r in graph.relations if r.subject.startswith("armchair")]
     beside = {r.object for r in mine if r.predicate in ("left", "right")}
     assert beside == {"multi_seat_sofa_1"}
+
+
+def test_a_bath_has_its_shower_in_a_corner_and_kitchens_one_style():
+    assert {node.name: node.place for node in starting_graph("bathroom").nodes}["shower"] == "in_corner"
+    assert {node.place for node in starting_graph("hallway").nodes} == {None, "against_wall"}
+    assert {node.style for node in starting_graph("kitchen", {"wall_unit": 3}).nodes} == {None}

@@ -12,7 +12,7 @@ from small_room import StandIn, small_graph
 import echousd
 from echomodel.boxes import Boxes
 from echousd.graph import Node, RoomSpec, SceneGraph
-from echousd.layers.coverings import floor_slot, papered_wall
+from echousd.layers.coverings import covered_walls, floor_slot, papered_wall
 from echousd.options import RoomOptions
 from echousd.room import Provenance
 
@@ -67,3 +67,18 @@ def test_coverings_are_bound_and_have_their_images(room, tmp_path):
     names = {path.name.split("_")[0] for path in (root.parent / "textures").iterdir()}
     assert {"carpet", "papered"} <= names
     assert "planks" not in names
+
+
+def wet(room, kind, word, walls=True):
+    graph = SceneGraph(RoomSpec(kind, size=(3.0, 2.4)), (Node("it", word),), ())
+    boxes = Boxes(torch.tensor([[0.6, 0.9, 0.6]]), torch.tensor([[0.0, 0.0, -0.89]]), torch.zeros(1))
+    return replace(room, graph=graph, boxes=boxes, options=RoomOptions(walls=walls, dress="none"))
+
+
+def test_where_it_is_wet_there_are_tiles(room):
+    bath = wet(room, "bathroom", "toilet")
+    assert covered_walls(bath) == {f"Wall_{n}": "wall_tiles" for n in range(1, 5)}
+    assert covered_walls(wet(room, "kitchen", "hob_unit")) == {"Wall_1": "wall_tiles"}  # behind the run alone
+    assert covered_walls(wet(room, "bathroom", "toilet", walls=False)) == {}
+    assert {floor_slot(seeded(bath, seed)) for seed in range(9)} == {"tiles"}
+    assert set(covered_walls(seeded(room, 0)).values()) <= {"wallpaper"}

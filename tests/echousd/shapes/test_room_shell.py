@@ -150,3 +150,11 @@ def test_doors_articulate(tmp_path) -> None:
             door.GetVariantSets().SetSelection("articulation", state)
             leaf.GetAttribute("xformOp:rotateY").Set(90.0)
             assert [one.message for one in extents(Reading(stage))] == []
+
+
+def test_outdoors_walls_without_an_opening_are_parapets():
+    plan = np.array([(-2.0, -1.5), (2.0, -1.5), (2.0, 1.5), (-2.0, 1.5)])
+    door = Opening("door", "door", 2, 0.3, 0.9, 2.0)
+    for outdoor, heights in ((False, [2.6] * 4), (True, [1.05, 1.05, 2.6, 1.05])):
+        made = walls(plan, 2.6, (door,), outdoor=outdoor)
+        assert [round(float(part.pieces[0].mesh.bounds[1, 1]), 3) for part in made] == heights

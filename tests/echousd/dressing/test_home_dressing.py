@@ -1,0 +1,80 @@
+"""What hangs, stands and lies in the rooms of a home: dishes on worktops, coats on racks, towels, toys, blinds."""
+
+import numpy as np
+import pytest
+
+from echomodel.dressing import KINDS
+from echomodel.furniture import Choices, Style, solids
+from echomodel.openings import Opening
+from echousd.dressing import bareness, floors, hangings, tabletops, walls
+from echousd.dressing.setting import Setting, standing
+from echousd.shapes.geometry import Origin
+from echousd.shapes.joinery import assembled
+
+FLOOR = np.array([(-2.0, -1.5), (2.0, -1.5), (2.0, 1.5), (-2.0, 1.5)])
+WINDOW = Opening("window", "window", 0, 1.2, 1.4, 1.2, 0.9)
+SIZES = {
+    "base_unit": (1.2, 0.9, 0.6), "wall_unit": (1.2, 0.7, 0.35), "coat_rack": (1.3, 1.9, 0.4),
+    "towel_radiator": (0.5, 1.2, 0.09), "toy_box": (0.8, 0.45, 0.45), "shoe_cabinet": (0.8, 1.1, 0.25),
+}  # fmt: skip
+
+
+def setting(word="", *, seed=1, use="", openings=()):
+    objects = {}
+    if word:
+        rng, size = np.random.default_rng(seed), np.array(SIZES[word])
+        parts = solids(word, Style.draw(rng), Choices.draw(rng), size)
+        made = assembled(parts, size, faces=3000, origin=Origin("parts"))
+        low = {"wall_unit": 1.4, "towel_radiator": 0.35}.get(word, 0.0)
+        objects[word] = standing(word, word, size, np.array([0.0, low, -1.49 + size[2] / 2]), 0.0, made)
+    return Setting(objects, FLOOR, tuple(openings), 2.6, True, False, seed, use)
+
+
+@pytest.mark.parametrize("word", ["base_unit", "wall_unit", "coat_rack", "toy_box", "shoe_cabinet"])
+def test_no_books_lie_where_nobody_reads(word):
+    kinds = set()
+    for seed in range(6):
+        room = setting(word, seed=seed)
+        tabletops.tabletops(room)
+        kinds |= {thing.kind for thing in room.placed}
+    assert not any(KINDS[kind].name.startswith("book") for kind in kinds)
+    assert {"base_unit": {"bowl", "bottles", "plates"}, "toy_box": {"bear"}}.get(word, set()) <= kinds
+
+
+@pytest.mark.parametrize(("word", "kind", "least"), [("coat_rack", "coats", 1), ("towel_radiator", "towel", 1)])
+def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
+    for seed in range(6):
+        room = setting(word, seed=seed)
+        hangings.hung_up(room)
+        host = room.objects[word]
+        assert len(room.placed) >= least
+        for thing in room.placed:
+            assert thing.kind == kind
+            assert thing.position[1] > 0.3
+            assert thing.position[1] + thing.size[1] < host.top
+            assert abs(thing.position[0]) + thing.size[0] / 2 < host.size[0] / 2 + 0.01
+
+
+def test_toys_lie_before_their_chest():
+    room = setting("toy_box")
+    floors.toys(room)
+    assert {thing.kind for thing in room.placed} == {"toy_ball", "blocks"}
+    assert all(thing.position[2] > -1.05 and thing.position[1] == 0 for thing in room.placed)
+    bare = setting("base_unit")
+    floors.toys(bare)
+    assert bare.placed == []
+
+
+@pytest.mark.parametrize(("use", "kinds"), [("", {"curtain"}), ("wet", {"blind"}), ("outdoor", set())])
+def test_windows_have_what_suits_the_room(use, kinds):
+    room = setting(use=use, openings=[WINDOW])
+    walls.curtains(room)
+    assert {thing.kind for thing in room.placed} == kinds
+
+
+@pytest.mark.parametrize("use", ["", "wet", "outdoor"])
+def test_pictures_and_shoes_stay_out_of_baths_and_off_balconies(use):
+    room = setting(use=use, openings=[Opening("door", "door", 1, 0.2, 0.9, 2.0)])
+    floors.by_doors(room)
+    bareness.bare_walls(room)
+    assert {thing.kind for thing in room.placed} == ({"shoes", "picture"} if not use else set())
