@@ -73,9 +73,7 @@ def test_only_samples_are_called_for():
     with pytest.raises(SamplesWanted) as wanted:
         model.sample_shapes(None, None, generator=generator, progress=print)
     assert wanted.value.call
-    with pytest.raises(
-        ValueError, match="'load' is no call for samples, allowed: sample_layout, sample_shapes"
-    ):
+    with pytest.raises(ValueError, match="'load' is no call for samples, allowed: sample_layout, sample_shapes"):
         sampled(None, pickle.dumps(("load", (), None, {})))
 
 

@@ -1,10 +1,12 @@
 """Damaged files of a finished room: every command works, or says in one line which file or prim is at fault.
 
-`benchmarks/flipped_files.py` tries many more.
+The gate draws a few; `ECHOUSD_MUTATIONS=200` draws so many.
 """
 
 from __future__ import annotations
 
+import os
+import random
 import re
 import shutil
 
@@ -15,6 +17,7 @@ from small_room import BARE, StandIn, small_graph
 
 import echousd
 
+MANY = int(os.environ.get("ECHOUSD_MUTATIONS", "0").replace("all", "600")) or 6
 DAMAGED = ("graph", "check --json", "glb")
 
 
@@ -42,3 +45,19 @@ def test_a_damaged_file_is_named(room, kind, ending):
     number = KINDS.index(kind)
     flip = Flip(names[number % len(names)], kind, number)
     assert not fault(room, flip, DAMAGED[number % len(DAMAGED)])
+
+
+@pytest.fixture
+def stand_in(monkeypatch):
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    monkeypatch.setattr("echousd.make.save.PREVIEW", 16)
+
+
+def test_any_damage_of_any_file(room, stand_in):
+    faults, names = [], files_of(room)
+    for number in range(MANY):
+        draw = random.Random(number)
+        flip, command = Flip(draw.choice(names), draw.choice(KINDS), number), draw.choice(sorted(COMMANDS))
+        found = fault(room, flip, command)
+        faults += [f"echousd {command} with {flip}: {found}"] if found else []
+    assert not faults, "\n".join(faults)

@@ -182,9 +182,11 @@ def test_end_of_a_batch(tmp_path):
     assert batch(tmp_path / "graphs.jsonl", tmp_path / "made", executor=Inline(), **QUICK).complete
     folder = tmp_path / "top"
 
-    def read():
-        texts = [place.read_text() if place.is_file() else "" for place in (folder / name for name in names)]
-        return tuple([json.loads(line) for line in text.splitlines()] for text in texts)
+    finish(shutil.copytree(tmp_path / "made", folder))
+    names = sorted({path.name for path in folder.iterdir()} - {path.name for path in (tmp_path / "made").iterdir()})
+    assert {"manifest.jsonl", "summary.json"} < set(names)
 
-    names = ("manifest.jsonl",)
+    def read():
+        return tuple(place.read_bytes() if place.is_file() else b"" for place in (folder / name for name in names))
+
     at_every_operation(folder, lambda: shutil.copytree(tmp_path / "made", folder), lambda: finish(folder), read)
