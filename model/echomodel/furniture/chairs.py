@@ -27,12 +27,13 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts += chair_legs(style, w * 0.86, d * 0.76, seat - thick * 0.5, leg_thick)
     if style.back == "shell":
         arms = seat + (h - seat) * (0.35 + 0.3 * style.arm_height)
+        wall = 0.035 + 0.04 * style.softness
         shell = bent(
-            (0, seat - thick * 0.6, d * 0.15),
+            (0, seat - wall, d * 0.15),  # whose floor is what is sat on
             (w / 2, d * 0.62),
-            0.035 + 0.04 * style.softness,
-            h - seat,
-            arms - seat,
+            wall,
+            h - seat + wall,
+            arms - seat + wall,
             power=2.4 + style.corner,
             ease=2.5,
             material="fabric",
@@ -55,7 +56,7 @@ def chinese_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Ming style: round posts, a board seat, a splat in the middle, a yoke or a horseshoe arm, stretchers all round."""
     w, h, d = size
     r = 0.016 * (0.9 + 0.3 * style.bulk)
-    seat = min(0.5, h * 0.52)
+    seat = min(0.46, h * 0.56)
     x, z = w / 2 - r * 1.5, d / 2 - r * 1.5
     parts: list[Solid] = [box((-w / 2, seat - 0.04, -d / 2), (w / 2, seat, d / 2), "wood", 0.01, "seat")]
     corners = [(sx * x, sz * z) for sx in (-1, 1) for sz in (-1, 1)]
@@ -176,7 +177,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
 def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """Five feet with casters, a column, a seat, a raked back, and arms."""
     w, h, d = size
-    seat, reach = min(0.48, h * 0.52), min(w, d) * 0.48
+    seat, reach = min(0.46, h * 0.56), min(w, d) * 0.48
     wheel = 0.028
     parts: list[Solid] = []
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 2:

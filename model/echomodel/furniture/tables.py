@@ -12,7 +12,7 @@ from echomodel.furniture.fronts import case, front
 from echomodel.furniture.solids import Block, Solid, rotation, turned
 from echomodel.furniture.style import Style
 
-KNEES = 0.45  # metres between what stands on both sides of a seat
+KNEES, LAP = 0.5, 0.605  # metres between what stands on both sides of a seat, and below what is above the knees
 
 
 def _leg(style: Style, width: float, height: float) -> float:
@@ -230,7 +230,7 @@ def desk(size: Size, style: Style, choices: Choices) -> list[Solid]:
     else:
         parts += base(style, w * 0.96, d * 0.94, y1, _leg(style, w * 0.6, desk_height), legs)
         if kind == "shallow":
-            low, high = (-w * 0.42, y1 - 0.12), (w * 0.42, y1)
+            low, high = (-w * 0.42, max(y1 - 0.12, LAP)), (w * 0.42, y1)
             parts += case((*low, -d * 0.42), (*high, d * 0.42))
             parts += front(low, high, d * 0.42, 1, choices.whole("columns", 2, 4), "drawer", style, d * 0.8)
     if hutch:
@@ -253,13 +253,14 @@ def dressing_table(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """A small desk with drawers and, when tall enough, a round, oval or square mirror."""
     w, h, d = size
     mirror = h > 0.95
-    table = min(0.76, h * 0.6) if mirror else h
+    table = 0.76 if mirror else h
     t = max(style.top * 0.9, 0.02)
     shape = "corners" if style.corner > 0.5 else "square"
     parts: list[Solid] = [top(shape, w, d, table, t, style)]
     w, d = w * within(shape, style), d * within(shape, style)
-    legs = "tapered" if style.legs in ("plinth", "bun", "trestle") else style.legs
-    y1, low = table - t, table - t - 0.14
+    narrow = style.legs == "splayed" and w < 1.0  # they meet the case nearer to its middle
+    legs = "tapered" if narrow or style.legs in ("plinth", "bun", "trestle") else style.legs
+    y1, low = table - t, max(table - t - 0.14, LAP)
     widest = 0.48 * w - KNEES / 2  # of the cupboards, which leave room for knees
     if choices.chance("kind", 0.5) or widest < 0.15:
         parts += base(style, w * 0.95, d * 0.92, low, 0.045 * style.bulk, legs)
