@@ -46,7 +46,7 @@ graph = echousd.SceneGraph(
 more = graph.add_node("lamp", "table_lamp").relate("lamp", "standing on", "desk").lock("lamp")
 print("\n".join(graph.diff(more).lines()))
 assert echousd.SceneGraph.from_yaml(more.to_yaml()) == more
-more.to_stage("study.usda")
+echousd.write_graph(more, "study.usda")
 """,
     "Room": r"""
 import echousd

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from echousd.stage.read import read_rooms
     from echousd.stage.update import update_graph
     from echousd.texturing import export_job as export_texture_job
-    from echousd.texturing import import_look
+    from echousd.texturing import import_job as import_texture_job
 
 __version__ = "0.1.0"
 
@@ -53,7 +53,7 @@ _HOME = {
     "edit": "echousd.make.edit",
     "export": "echousd.exporting",
     "export_texture_job": "echousd.texturing:export_job",
-    "import_look": "echousd.texturing",
+    "import_texture_job": "echousd.texturing:import_job",
     "load_model": "echomodel.loading",
     "render": "echousd.draw.rendering",
     "vocabulary": "echomodel.vocabulary",
@@ -73,7 +73,7 @@ __all__ = [
     "export_texture_job",
     "generate",
     "generate_many",
-    "import_look",
+    "import_texture_job",
     "load_model",
     "read_dressing",
     "read_graph",

@@ -76,11 +76,11 @@ def import_(
 ) -> None:
     """Bring what a tool painted back as a layer of your own over the room, and a variant of `looks`."""
     from echousd.folder.found import room_at
-    from echousd.texturing import import_look
+    from echousd.texturing import import_job
 
     started = time.perf_counter()
     room = room_at(room)
-    look = import_look(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
+    look = import_job(room, job, name=name, skip=tuple(skip or ()), preview=preview, force=force, wait=wait)
     lines = [
         f"look     {look.layer}",
         f"painted  {len(look.painted)} objects; variant {look.name!r} of `looks` on the room, `made` is without",

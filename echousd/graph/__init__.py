@@ -1,6 +1,6 @@
 """Scene graphs as plain data: objects, relations and the room, with validation, edits, text forms and pictures.
 
-Nothing here imports pxr or torch; `SceneGraph.from_stage` and `SceneGraph.to_stage` load `echousd.stage` when called.
+Nothing here imports pxr or torch; `load_graph` and `save_graph` load `echousd.stage` for a stage.
 """
 
 from echousd.graph.consistency import GraphError

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import stat
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from echomodel.files import whole_file, within_memory
 from echousd.graph.consistency import GraphError
@@ -30,7 +31,8 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     if path.is_dir():
         raise GraphError(f"{path}: is a directory, allowed: a {', '.join((*TEXT_FORMS, *STAGE_FORMS))} file")
     if path.suffix.lower() in STAGE_FORMS:
-        return SceneGraph.from_stage(path, room=room)
+        graph: SceneGraph = _stages("graphs").read_graph(path, room=room)
+        return graph
     if path.suffix.lower() not in TEXT_FORMS:
         raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join((*TEXT_FORMS, *STAGE_FORMS))}")
     try:
@@ -63,7 +65,7 @@ def save_graph(graph: SceneGraph, path: str | os.PathLike[str]) -> None:
         if path.suffix.lower() not in STAGE_FORMS[:-1]:
             allowed = ", ".join((*TEXT_FORMS, *STAGE_FORMS[:-1]))
             raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {allowed}")
-        graph.to_stage(path)
+        _stages("graphs").write_graph(graph, path)
         return
     write_text(path, graph.to_json() if form == "json" else graph.to_yaml())
 
@@ -76,3 +78,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
             beside.write_text(text, "utf-8")
     except OSError as error:
         raise GraphError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+
+
+def _stages(module: str) -> Any:
+    """A module of `echousd.stage`, which builds on this package and is therefore found by name, when it is needed."""
+    return importlib.import_module(f"echousd.stage.{module}")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import os
 from collections import Counter
 from functools import cached_property
 from typing import Any
@@ -181,21 +179,6 @@ class SceneGraph(PlainModel):
     def to_yaml(self) -> str:
         """The short YAML form that a person would write."""
         return graph_to_yaml(self)
-
-    @classmethod
-    def from_stage(cls, stage: Any, room: str | None = None) -> SceneGraph:
-        """Read the graph of a stage or of the file at a path; `room` is the prim path of one room of several."""
-        graph: SceneGraph = _stages("graphs").read_graph(stage, room=room)
-        return graph
-
-    def to_stage(self, path: str | os.PathLike[str]) -> None:
-        """Write a stage that holds this graph; raises where `path` cannot be written."""
-        _stages("files").save_layer(_stages("write").graph_layer(self), path)
-
-
-def _stages(module: str) -> Any:
-    """A module of `echousd.stage`, which builds on this package and is therefore found by name, when it is needed."""
-    return importlib.import_module(f"echousd.stage.{module}")
 
 
 def plain(graph: SceneGraph) -> dict[str, Any]:

@@ -8,9 +8,9 @@ from pxr import Sdf, Usd
 
 from echousd.graph import SceneGraph
 from echousd.stage import values
-from echousd.stage.files import opened
+from echousd.stage.files import opened, save_layer
 from echousd.stage.read import find_rooms, room_graph, the_room
-from echousd.stage.write import author, prim_path
+from echousd.stage.write import author, graph_layer, prim_path
 
 
 def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> SceneGraph:
@@ -33,14 +33,17 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
         return room_graph(the_room(stage, room, rooms))
 
 
-def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage, root: str = "/Room") -> None:
-    """Author `graph` at the prim path `root` of a layer, or of a stage's edit target (a variant's, too).
+def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.PathLike[str], root: str = "/Room") -> None:
+    """Author `graph` at the prim path `root` of a layer, of a stage's edit target (a variant's, too) or of a new file.
 
-    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`).
-    Raises StageError for a root that is no absolute prim path, nothing authored.
+    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`); a
+    file at a path is replaced. Raises StageError for a root that is no absolute prim path and for a path that cannot be
+    written, nothing authored.
     """
     path = prim_path(root)
-    if _holds_graph(target, path):
+    if isinstance(target, str | os.PathLike):
+        save_layer(graph_layer(graph, root=root), target)
+    elif _holds_graph(target, path):
         from echousd.stage.update import update_graph
 
         update_graph(target, graph, room=root)

@@ -47,7 +47,7 @@ class ImportedLook:
     skipped: tuple[str, ...]
 
 
-def import_look(
+def import_job(
     room: str | Path,
     job: str | Path,
     *,

@@ -76,7 +76,7 @@ def stated() -> SceneGraph:
 
 def test_authored_generated_placed_checked_drawn_and_written(music, tmp_path):
     graph = stated()
-    graph.to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(graph, tmp_path / "graph.usda")
     graph = load_graph(tmp_path / "graph.usda")
     assert graph.room.type == "music_room"
     assert graph.relation("stool", "in_line_with", "harp")

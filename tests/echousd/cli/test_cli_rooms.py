@@ -5,11 +5,13 @@ from PIL import Image
 from pxr import Usd
 from small_room import StandIn, small_graph
 
+import echousd
+
 
 @pytest.fixture
 def graph(tmp_path):
     path = tmp_path / "graph.usda"
-    small_graph().to_stage(path)
+    echousd.write_graph(small_graph(), path)
     return path
 
 

@@ -12,6 +12,7 @@ from PIL import Image
 from pxr import Usd, UsdGeom
 from small_room import StandIn, small_graph
 
+import echousd
 from echousd.cli import main, output, quiet
 
 BOXES = ("--shapes", "boxes", "--drafts", 1)
@@ -27,7 +28,7 @@ def model(monkeypatch):
 @pytest.fixture
 def graph(tmp_path):
     path = tmp_path / "graph.usda"
-    small_graph().to_stage(path)
+    echousd.write_graph(small_graph(), path)
     return path
 
 
@@ -76,7 +77,7 @@ def test_json_of_faults_ends_with_code_1(tmp_path, echousd_command):
     small = small_graph()
     for name in ("bed", "wardrobe"):  # in one another, where somebody put them
         small = small.update_node(name, position=(0.0, 0.0, 0.0), locked=True)
-    small.replaced(relations=()).to_stage(graph)
+    echousd.write_graph(small.replaced(relations=()), graph)
     for words in (("--json",), ("--json", "--quiet")):
         done = echousd_command("generate", graph, "-o", tmp_path / "room", *BOXES, *words)
         told = read(done.out)

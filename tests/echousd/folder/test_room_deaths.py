@@ -27,7 +27,7 @@ from echousd.folder.manifest import find_manifest
 from echousd.make.save import save_room
 from echousd.pending import STAGING
 from echousd.stage.files import open_stage
-from echousd.texturing import attach, export_job, import_look
+from echousd.texturing import attach, export_job, import_job
 
 OLD, NEW = ["bed", "lamp"], ["bed", "desk"]
 
@@ -146,7 +146,7 @@ def test_import_of_a_look(tmp_path, monkeypatch):
     def act():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            import_look(folder / root.name, tmp_path / "job", name="oil", preview=False)
+            import_job(folder / root.name, tmp_path / "job", name="oil", preview=False)
 
     def begin():
         shutil.copytree(root.parent, folder)

@@ -86,7 +86,7 @@ def test_what_cannot_be_adopted_is_said(loft, tmp_path):
     with pytest.raises(ValueError, match="add: found 'wardrobe', allowed: name:category"):
         adopted(loft, add=["wardrobe"])
     text = tmp_path / "graph.usda"
-    adopted(loft, add=[]).to_stage(text)
+    echousd.write_graph(adopted(loft, add=[]), text)
     with pytest.raises(ValueError, match=r"graph.usda: has a scene graph already; echousd generate and echousd update"):
         adopted(text)
 

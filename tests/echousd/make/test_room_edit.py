@@ -194,7 +194,7 @@ def test_what_an_edit_touches():
 
 
 def test_only_rooms_of_ours_can_be_edited(tmp_path):
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     with pytest.raises(ValueError, match=r"graph.usda: not a room made by `echousd generate`"):
         read_room(tmp_path / "graph.usda")
 

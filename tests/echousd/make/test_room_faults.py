@@ -55,7 +55,7 @@ def test_exit_code_of_a_room_with_faults(tmp_path, echousd_command, monkeypatch)
     from echomodel.echo import EchoModel
 
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: StandIn()))
-    together().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(together(), tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--shapes", "boxes")
     assert done.code == 1
     assert "collide  bed and wardrobe by 1.10 m" in done.out

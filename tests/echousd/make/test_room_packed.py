@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import torch
 
+import echousd
 from echomodel.loading import load_model
 from echomodel.randomness import SceneGenerators, normal
-from echousd.graph import SceneGraph
 from echousd.graph.floors import with_plan
 from echousd.make.layouts import Draws, sample_boxes
 from echousd.make.packed import first_drafts, packs
@@ -47,7 +47,7 @@ def test_packs_keep_the_order_and_the_budget():
 
 
 def test_many_layouts_are_those_of_single_runs():
-    graphs = [SceneGraph.from_stage(SAMPLES / f"{name}.usda") for name in ("bedroom", "study")]
+    graphs = [echousd.read_graph(SAMPLES / f"{name}.usda") for name in ("bedroom", "study")]
     model = load_model(None)
 
     many = first_drafts(model, graphs, [4, 5], steps=4)

@@ -86,8 +86,10 @@ def test_lamps_in_a_row_do_not_join_two_told_styles():
 def test_the_models_floor_is_the_stages_about_its_middle(tmp_path):
     corners = ((1.0, 1.0), (5.0, 1.0), (5.0, 4.0), (3.0, 4.0), (3.0, 3.0), (1.0, 3.0))
     nodes = (Node("stool", "stool"),)
-    SceneGraph(room=RoomSpec("bedroom", floor_polygon=corners), nodes=nodes).to_stage(tmp_path / "room.usda")
-    floor = graph_batch(SceneGraph.from_stage(tmp_path / "room.usda")).floor
+    echousd.write_graph(
+        SceneGraph(room=RoomSpec("bedroom", floor_polygon=corners), nodes=nodes), tmp_path / "room.usda"
+    )
+    floor = graph_batch(echousd.read_graph(tmp_path / "room.usda")).floor
     np.testing.assert_allclose(floor[0], np.array(corners) - [3.0, 2.5], atol=1e-6)
     sized = graph_batch(SceneGraph(room=RoomSpec("bedroom", size=(4.0, 3.0)), nodes=nodes)).floor
     assert sized.tolist() == [[[-2, -1.5], [2, -1.5], [2, 1.5], [-2, 1.5]]]
@@ -140,7 +142,7 @@ def test_verdicts_are_those_of_the_rules():
 
 
 def test_graph_may_be_a_file_and_progress_is_told(tmp_path):
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     told = []
     room = echousd.generate(
         tmp_path / "graph.usda", model=StandIn(), shapes="boxes", progress=lambda *state: told.append(state), **BARE
@@ -193,7 +195,7 @@ def test_what_is_locked_stays_where_the_last_generation_put_it(tmp_path: Path) -
     for field in ("size", "position", "yaw"):
         assert torch.allclose(getattr(again.boxes, field)[1], getattr(first.boxes, field)[1], atol=2e-3)
     stage = tmp_path / "room" / "room.usda"
-    text = SceneGraph.from_stage(str(stage)).lock("wardrobe")
+    text = echousd.read_graph(str(stage)).lock("wardrobe")
     assert with_locked_places(text, stage)[0].node("wardrobe").position is not None
     homeless = echousd.generate(locked, seed=9, shapes="boxes", **BARE)
     assert "wardrobe is locked but stands nowhere yet: it gets a place like all others" in homeless.notes

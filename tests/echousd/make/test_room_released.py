@@ -13,6 +13,7 @@ from pxr import Usd, UsdGeom
 from safetensors.torch import save_file
 from small_room import ball_tsdf, small_graph
 
+import echousd
 from echomodel.loading import load_model
 from echomodel.roomboxes import RoomBoxes, write_rooms
 from echomodel.text import ClipTextEncoder
@@ -50,7 +51,7 @@ def weights(tmp_path, monkeypatch) -> Path:
 
 
 def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     folder = tmp_path / "out" / "bedroom"
     words = ("--weights", weights, "--seed", 3, "--steps", 2, "--faces", 400)
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", folder, *words)
@@ -85,7 +86,7 @@ def test_scored_like_any_other_model(weights, tmp_path, echousd_command):
 
 def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):
     graph, out = tmp_path / "graph.usda", tmp_path / "room"
-    small_graph().to_stage(graph)
+    echousd.write_graph(small_graph(), graph)
     with pytest.raises(ValueError, match="holds a model of the preset 'released', asked for: 'compact'"):
         load_model(weights, "compact")
     with pytest.raises(ValueError, match=r"convert a published checkpoint .echousd convert. and name"):
@@ -111,7 +112,7 @@ def test_categories_without_a_class_are_named(tmp_path, echousd_command):
     classes = ["_scene_", "bed", "floor", "wardrobes"]
     file = tmp_path / "model.safetensors"
     convert(tmp_path / "model.pth", file, classes=classes, statistics=statistics_from_bounds(BOUNDS))
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     words = ("--weights", file, "--shapes", "boxes")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *words)
     assert done.code == 2
@@ -133,7 +134,7 @@ def test_categories_without_a_class_are_named(tmp_path, echousd_command):
 def test_weights_that_are_missing_or_damaged_are_named(tmp_path, echousd_command, name, text):
     (tmp_path / "folder").mkdir()
     (tmp_path / "damaged.safetensors").write_bytes(bytes([200, 1, 0, 0, 0, 0, 0, 0]) + b'{"format":')
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--weights", tmp_path / name)
     assert done.code == 2
     said = done.err.strip().splitlines()[-1]

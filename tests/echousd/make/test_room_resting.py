@@ -104,7 +104,7 @@ def test_the_command_writes_poses_at_rest_and_names_what_falls(tmp_path, echousd
     from echomodel.echo import EchoModel
 
     monkeypatch.setattr(EchoModel, "load", classmethod(lambda cls, path=None, **options: High()))
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     name = small_graph().names[0]
     options = ("--shapes", "boxes", "--no-place", "--no-walls", "--dress", "none", "--settle")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", *options)
@@ -120,7 +120,7 @@ def test_the_command_needs_the_extra_before_it_works(tmp_path, echousd_command, 
     import sys
 
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "room", "--settle")
     assert done.code == 2
     assert "MuJoCo is not installed; pip install 'echousd[sim]'" in done.err

@@ -112,7 +112,7 @@ def test_what_has_no_polygons_is_named():
 
 
 def test_check_measures_solids_in_the_place_of_meshes(tmp_path):
-    small_graph().to_stage(tmp_path / "graph.usda")
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
     stage = Usd.Stage.Open(str(tmp_path / "graph.usda"))
     ball = UsdGeom.Sphere.Define(stage, "/Room/Objects/wardrobe/Ball")
     ball.CreateRadiusAttr(0.5)

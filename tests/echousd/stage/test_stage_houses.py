@@ -169,7 +169,7 @@ def test_an_obstacle_is_a_fixed_box_under_its_own_word(tmp_path):
         assert list(prim.GetAttribute("semantics:labels:category").Get()) == [label]
         assert list(prim.GetAttribute("semantics:labels:ade20k").Get()) == [ade20k]
     assert room.boxes.position[graph.names.index("harp")].tolist() == [-1.0, 1.0, 0.0]  # it may hang there
-    assert SceneGraph.from_stage(root).node("harp") == graph.node("harp")
+    assert echousd.read_graph(root).node("harp") == graph.node("harp")
     report = check(root)
     assert [wrong for layout in report.layouts for wrong in layout.placement] == []
     assert [fault for fault in report.errors if fault.rule == "echo:OneLabel"] == []

@@ -20,7 +20,7 @@ from echousd.make.edit import edit
 from echousd.make.reading import read_room
 from echousd.stage.files import open_stage
 from echousd.stage.graphs import read_graph
-from echousd.texturing import atlas, export_job, import_look
+from echousd.texturing import atlas, export_job, import_job
 from echousd.texturing.atlas import Unwrapped
 from echousd.texturing.glb import glb_bytes
 from echousd.texturing.job import job_mesh
@@ -72,7 +72,7 @@ def test_a_persons_files_where_a_look_would_lie_are_left(room):
     """Not only the look's own layer; and the root layer's remarks, which USD does not write again, stay beside it."""
     probe = room.parent.parent / "probe"
     shutil.copytree(room.parent, probe)
-    import_look(probe / room.name, job_of(room), name="oil", preview=False)
+    import_job(probe / room.name, job_of(room), name="oil", preview=False)
     theirs = [path.relative_to(probe) for path in (probe / "looks/oil").rglob("*") if path.is_file()]
     assert len(theirs) > 1
     for path in theirs:
@@ -80,13 +80,13 @@ def test_a_persons_files_where_a_look_would_lie_are_left(room):
         own.parent.mkdir(parents=True, exist_ok=True)
         own.write_bytes(b"mine")
         with pytest.raises(ValueError, match=f"{path.name}: exists; choose another --name or use --force"):
-            import_look(room, job_of(room), name="oil", preview=False)
+            import_job(room, job_of(room), name="oil", preview=False)
         assert own.read_bytes() == b"mine"
         own.unlink()
     mine = room.read_text().rstrip()[:-1] + "    # a remark\n}\n"
     room.write_text(mine)
     with pytest.warns(UserWarning, match="bedroom.usda: not as echousd wrote it; kept as bedroom.edited.usda"):
-        import_look(room, job_of(room), name="oil", preview=False)
+        import_job(room, job_of(room), name="oil", preview=False)
     assert (room.parent / "bedroom.edited.usda").read_text() == mine
 
 
@@ -94,7 +94,7 @@ def test_an_edit_of_a_room_whose_root_was_edited_is_taken_back_after_an_import(r
     room.write_text(room.read_text().rstrip()[:-1] + '    def Cube "Toy"\n    {\n    }\n}\n')
     fewer = small_graph().remove_node("pendant")
     edit(room, fewer, model=StandIn(), shapes="boxes", place=False).save(room.parent, preview=False)
-    import_look(room, job_of(room), name="oil", skip=("pendant",), preview=False)
+    import_job(room, job_of(room), name="oil", skip=("pendant",), preview=False)
     after = room.read_bytes()
     undo(room)
     assert "pendant" in read_graph(room).names
@@ -103,7 +103,7 @@ def test_an_edit_of_a_room_whose_root_was_edited_is_taken_back_after_an_import(r
 
 
 def test_generating_again_keeps_the_look_and_the_file(room):
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     files = {path: path.read_bytes() for path in (room.parent / "looks").rglob("*") if path.is_file()}
     before = room.read_bytes()
     assert generated(room, small_graph()) == []
@@ -118,16 +118,16 @@ def test_a_file_that_is_called_looks_is_named(room):
     (room.parent / "looks").write_text("mine")
     before = room.read_bytes()
     with pytest.raises(ValueError, match=r"bedroom/looks: is a file, where a folder of the room belongs; nothing was"):
-        import_look(room, job_of(room), name="oil", preview=False)
+        import_job(room, job_of(room), name="oil", preview=False)
     assert (room.parent / "looks").read_text() == "mine"
     assert room.read_bytes() == before
     assert not (room.parent / ".echousd").exists() or not list((room.parent / ".echousd").glob("journal*"))
     (room.parent / "looks").unlink()
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
 
 
 def test_what_changed_is_shown_as_made_and_told(room):
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     layer = (room.parent / "looks/oil.usda").read_bytes()
     graph = small_graph().remove_node("pendant")
     told = generated(room, graph)
@@ -142,7 +142,7 @@ def test_what_changed_is_shown_as_made_and_told(room):
 
 
 def test_edits_mute_what_they_change(room):
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     saved = read_room(room)
     graph = saved.graph.relabel_node("pendant", "wardrobe")
     with pytest.warns(UserWarning, match="pendant changed or gone since painted"):
@@ -151,17 +151,17 @@ def test_edits_mute_what_they_change(room):
     assert material(room, "wardrobe") == "oil_wardrobe"
     assert not check(room).errors
     with pytest.raises(ValueError, match="pendant has other meshes; export again, or leave out with --skip"):
-        import_look(room, job_of(room), name="oil", force=True, preview=False)
-    look = import_look(room, job_of(room), name="oil", force=True, skip=("pendant",), preview=False)
+        import_job(room, job_of(room), name="oil", force=True, preview=False)
+    look = import_job(room, job_of(room), name="oil", force=True, skip=("pendant",), preview=False)
     assert look.skipped == ("pendant",)
     fresh = export_job(room, job_of(room).with_name("again"), "generic", resolution=SIZE)
     paint(job_of(room).with_name("again"))
-    import_look(room, job_of(room).with_name("again"), name="oil", force=True, preview=False)
+    import_job(room, job_of(room).with_name("again"), name="oil", force=True, preview=False)
     assert np.quantile(errors_in_texels(room, fresh), 0.99) < 0.75
 
 
 def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     before = {path: path.read_bytes() for path in room.parent.rglob("*") if path.is_file()}
     graph = read_room(room).graph.relabel_node("pendant", "wardrobe")
     made = edit(room, graph, model=StandIn(), shapes="boxes", place=False)
@@ -184,7 +184,7 @@ def test_an_edit_that_goes_elsewhere_takes_the_look_along(room, tmp_path):
 def test_an_edited_root_keeps_its_words_and_gets_the_look(room):
     text = room.read_text().replace('doc = "A room made by EchoUSD.', 'doc = "Mine. A room made by EchoUSD.')
     room.write_text(text)
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     assert "Mine. A room" in room.read_text()
     generated(room, small_graph())
     assert "Mine. A room" in room.read_text()
@@ -196,7 +196,7 @@ def refused(room, text, **options):
     top = room.parent
     before = {path: path.read_bytes() for path in top.rglob("*") if path.is_file()}
     with pytest.raises(ValueError, match=text):
-        import_look(room, job_of(room), preview=False, **options)
+        import_job(room, job_of(room), preview=False, **options)
     assert {path: path.read_bytes() for path in top.rglob("*") if path.is_file()} == before
 
 
@@ -249,7 +249,7 @@ def test_names_of_looks(room):
     for name in ("made", "3d", "a b", "../x", "x" * 99):
         refused(room, "name is .*, allowed: letters, digits and _", name=name)
     refused(room, "--skip names chair, allowed: ", skip=("chair",))
-    import_look(room, job_of(room), name="oil", preview=False)
+    import_job(room, job_of(room), name="oil", preview=False)
     refused(room, "oil.usda: exists; choose another --name or use --force", name="oil")
 
 
@@ -273,7 +273,7 @@ def test_one_object_alone(room):
     for path in (job_of(room) / "results").glob("*.png"):
         if path.stem != "bed":
             path.unlink()
-    look = import_look(room, job_of(room), name="bed_only", preview=False)
+    look = import_job(room, job_of(room), name="bed_only", preview=False)
     assert look.painted == ("bed",)
     assert "wardrobe" in look.unpainted
     assert material(room, "bed") == "bed_only_bed"

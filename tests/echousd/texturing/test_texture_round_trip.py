@@ -18,7 +18,7 @@ from echousd.layers.paintings import primvar
 from echousd.options import RoomOptions
 from echousd.stage.files import open_stage
 from echousd.texturing import export as texturing_export
-from echousd.texturing import export_job, import_look, scenetex
+from echousd.texturing import export_job, import_job, scenetex
 from echousd.texturing.atlas import Unwrapped, texel_faces
 from echousd.texturing.glb import glb_bytes
 from echousd.texturing.job import job_mesh
@@ -53,7 +53,7 @@ def test_every_point_gets_its_colour_back(room, tool, dressing, tmp_path, small_
     assert not job.left_out
     assert {thing.kind for thing in job.objects} == {"stuff", "things"}
     paint(tmp_path / "job")
-    look = import_look(root, tmp_path / "job", name="rainbow", preview=False)
+    look = import_job(root, tmp_path / "job", name="rainbow", preview=False)
     assert set(look.painted) == {thing.name for thing in job.objects}
     wrong = errors_in_texels(root, job)
     assert len(wrong) > 400 * len(job.objects) / 2
@@ -115,7 +115,7 @@ def test_scenetex_may_lay_out_anew(small, tmp_path, small_pictures):
         whole = painted((turned.corners * 1023 + 0.5) / 1024, in_room(mesh, thing), 1024, whole)
     filled(np.full((1024, 1024, 3), 0.1)).save(run / "texture_100.png")
     filled(whole).save(run / "texture_29900.png")
-    import_look(root, tmp_path / "job", preview=False)
+    import_job(root, tmp_path / "job", preview=False)
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
 
 
@@ -151,7 +151,7 @@ def test_glb_comes_back_in_any_order(small, tool, tmp_path, monkeypatch):
     for thing in job.objects:
         content = exported_again(job_mesh(tmp_path / "job", thing), thing, 512, rng)
         (folder / f"{thing.name}.glb").write_bytes(content)
-    look = import_look(root, tmp_path / "job", preview=False)
+    look = import_job(root, tmp_path / "job", preview=False)
     assert len(look.painted) == len(job.objects)
     wrong = errors_in_texels(root, job)
     assert np.quantile(wrong, 0.99) < 0.75
@@ -175,8 +175,8 @@ def test_variants_switch_and_exports_carry_the_look(small, tmp_path):
     before = bound(open_stage(root), "/Room/Objects/wardrobe/geo/wardrobe_mesh")
     job = export_job(root, tmp_path / "job", "generic", resolution=256)
     paint(tmp_path / "job")
-    import_look(root, tmp_path / "job", name="first", preview=False)
-    import_look(root, tmp_path / "job", name="second", preview=False)
+    import_job(root, tmp_path / "job", name="first", preview=False)
+    import_job(root, tmp_path / "job", name="second", preview=False)
     stage = open_stage(root)
     variants = stage.GetPrimAtPath("/Room").GetVariantSet("looks")
     assert sorted(variants.GetVariantNames()) == ["first", "made", "second"]
@@ -210,7 +210,7 @@ def test_shared_instances_get_a_picture_each(small, tmp_path):
         stage.GetRootLayer().Save()
     job = export_job(root, tmp_path / "job", "generic", resolution=512)
     paint(tmp_path / "job")
-    import_look(root, tmp_path / "job", preview=False)
+    import_job(root, tmp_path / "job", preview=False)
     stage = open_stage(root)
     assert not any(stage.GetPrimAtPath(path).IsInstanceable() for path in twins)
     assert len({bound(stage, f"{path}/geo/nightstand_mesh") for path in twins}) == 2
@@ -234,6 +234,6 @@ def test_rooms_with_z_up_are_painted_alike(tmp_path):
     root = data.save(tmp_path / "bedroom", preview=False)
     job = export_job(root, tmp_path / "job", "generic", resolution=256)
     paint(tmp_path / "job")
-    import_look(root, tmp_path / "job", preview=False)
+    import_job(root, tmp_path / "job", preview=False)
     assert np.quantile(errors_in_texels(root, job), 0.99) < 0.75
     assert not check(root).errors
