@@ -1,9 +1,14 @@
-"""Guidance: at every step boxes are nudged towards relations and placements, onto the floor, out of doorways."""
+"""Guidance: at every step boxes are nudged towards relations and placements, onto the floor, out of doorways, apart.
+
+Margins of the objective that losses use as well: `echomodel.objective.physics.apart` (collisions, metres) here and in
+`training`, all others by `TERMS` in `training/living_loss.py`.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +17,8 @@ from torch import Tensor
 
 from echomodel.boxes import Boxes, BoxScale
 from echomodel.floors import footprint, signed_distance
+from echomodel.objective import physics
+from echomodel.objective.plan import Plan
 from echomodel.openingrows import kept_free
 from echomodel.rules import fronts, margins, measured
 from echomodel.rules.placements import Spread, Stated, Walls, margin_of
@@ -33,6 +40,7 @@ def relation_guided(
     openings: Tensor | None = None,
     category: Tensor | None = None,
     placements: Tensor | None = None,
+    scene: Tensor | None = None,
 ) -> Predict:
     """Follow `predict` by gradient steps on the missed margins of relations and placements, in the normalised space.
 
@@ -52,11 +60,12 @@ def relation_guided(
             None = no node of any.
         category: (N,) int64, whose fronts `symmetrical_to` and the placements ask for; None = none has one.
         placements: (P, 4) int64 (`GraphBatch.placements`), which need `category`; None = none.
+        scene: (N,) int64, the room of each node: nodes of one room are kept apart; needs `category`; None = none are.
     """
     known = torch.tensor(sorted(measured(rules)), device=triplets.device)
     wanted = triplets[torch.isin(triplets[:, 1], known)]
     stated = [] if placements is None or category is None else _stated(placements, category, floor)
-    if not len(wanted) and floor is None and openings is None and not stated:
+    if not len(wanted) and floor is None and openings is None and not stated and scene is None:
         return predict
     words = vocabulary()
     headed = None
@@ -70,6 +79,9 @@ def relation_guided(
         weight = ((1 - level) * (level > 0))[:, None]
         if not bool(weight.any()):  # in nothing but noise no step has a length
             return clean
+        strangers = None
+        if scene is not None and category is not None:
+            strangers = _strangers(Boxes.decode(clean.detach(), scale), category, scene, triplets)
         for _ in range(rounds):
             with torch.enable_grad():
                 free = clean.detach().requires_grad_()
@@ -85,6 +97,12 @@ def relation_guided(
                     rigid = Boxes(boxes.size.detach(), boxes.position, boxes.yaw)  # none is asked to shrink
                     blocked = (SLACK - kept_free(rigid, openings)).clamp_min(0)
                     pull = pull + torch.log1p(blocked / SLACK).sum()
+                if strangers is not None:  # a room's pieces run into each other where it is nearly drawn
+                    plan = replace(strangers, size=boxes.size.detach(), position=boxes.position, yaw=boxes.yaw)
+                    vars(plan).update(couples=strangers.couples)
+                    seen = physics.apart(plan)
+                    near = (1 - level[seen.who]).square()
+                    pull = pull + (torch.log1p((SLACK - seen.margin).clamp_min(0) / SLACK) * near).sum()
                 for group in stated:
                     pull = pull + torch.log1p((SLACK - group(boxes)).clamp_min(0) / SLACK).sum()
                 (slope,) = torch.autograd.grad(pull * SLACK, free)
@@ -93,6 +111,15 @@ def relation_guided(
         return clean
 
     return guided
+
+
+def _strangers(boxes: Boxes, category: Tensor, scene: Tensor, triplets: Tensor) -> Plan:
+    """The plan of boxes as they were drawn last, which says what belongs together and may overlap."""
+    rows, rooms = vocabulary().categories, int(scene.max()) + 1 if len(scene) else 0
+    return Plan(
+        tuple(rows[number] for number in category.tolist()), boxes.size, boxes.position, boxes.yaw, scene.cpu(),
+        torch.full((rooms, 4, 2), torch.nan), ((),) * rooms, triplets.cpu(), torch.zeros(len(scene), dtype=torch.bool),
+    )  # fmt: skip
 
 
 def _stated(placements: Tensor, category: Tensor, floor: Tensor | None) -> list[Callable[[Boxes], Tensor]]:

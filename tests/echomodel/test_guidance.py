@@ -166,3 +166,26 @@ def test_beds_that_mirror_each_other_are_turned_alike() -> None:
     )
     guided = Boxes.decode(pull(boxes.encode(STATISTICS.scale()), torch.full((2,), 0.1)), STATISTICS.scale())
     assert verdicts(guided, triplets, fronts=headed).tolist() == [1]
+
+
+def test_pieces_that_run_into_each_other_are_parted_but_for_a_chair_at_its_table() -> None:
+    words = vocabulary()
+    category = torch.tensor([words.category_id(word) for word in ("wardrobe", "desk", "office_chair", "wardrobe")])
+    boxes = Boxes(
+        torch.tensor([[1.0, 2.0, 0.6], [1.2, 0.75, 0.6], [0.5, 0.9, 0.5], [1.0, 2.0, 0.6]]),
+        torch.tensor([[0.0, 0.0, 0.0], [0.6, 0.0, 0.2], [0.6, 0.0, 0.6], [0.1, 0.0, 0.1]]),
+        torch.zeros(4),
+    )
+    x, none = boxes.encode(STATISTICS.scale()), torch.zeros(0, 3, dtype=torch.int64)
+    pull = relation_guided(
+        lambda x, level: x, none, STATISTICS.scale(), rules="strict", strength=0.05, rounds=100, category=category,
+        scene=torch.tensor([0, 0, 0, 1]),
+    )  # fmt: skip
+    guided = Boxes.decode(pull(x, torch.full((4,), 0.1)), STATISTICS.scale())
+    away = (guided.position - boxes.position)[:, [0, 2]].norm(dim=1)
+    assert away[3] < 1e-5  # alone in its room
+    gap = (guided.position[0] - guided.position[1])[[0, 2]].abs() - torch.tensor([1.1, 0.6])
+    assert gap.max() > -0.02
+    chair = (guided.position[2] - guided.position[1])[2]
+    assert 0.3 < chair < 0.55  # still under the desk
+    torch.testing.assert_close(guided.size, boxes.size)

@@ -44,7 +44,7 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
         conditional = relation_guided(
             conditional, graph.triplets, scale,
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
-            openings=_in_the_way(graph), category=graph.category, placements=graph.placements,
+            openings=_in_the_way(graph), category=graph.category, placements=graph.placements, scene=graph.scene,
         )  # fmt: skip
     noise = how.start(graph.num_nodes, 8, graph.category.device)
     vectors = replace(how, known=given).denoised(conditional, noise, config)
