@@ -1,4 +1,4 @@
-"""What a graph says of the places of single objects, as constraints of placing and as the cost of a pose."""
+"""What a graph says of the places of single objects, as constraints of placing."""
 
 from __future__ import annotations
 
@@ -55,36 +55,6 @@ def placement_rows(
         (slope,) = torch.autograd.grad(margin.sum(), at)
         value[row], gradient[row, :, :3] = float(margin.detach()), slope.numpy()
     return value, gradient
-
-
-def placement_margins_at(
-    one: Stated,
-    i: int,
-    poses: tuple[np.ndarray, np.ndarray],
-    walls: Walls,
-    categories: Sequence[str],
-    size: np.ndarray,
-    position: np.ndarray,
-    yaw: np.ndarray,
-) -> np.ndarray:
-    """(K,) float: the margin of one placement with box i at each of K poses and all others where they are.
-
-    Arguments:
-        poses: position (K, 3) and yaw (K,) of box i. The others as `placement_rows`.
-    """
-    import torch
-
-    from echomodel.rules.placements import margin_of
-
-    count = len(poses[1])
-    every = [
-        _spread(np.repeat(size[i : i + 1], count, 0), *poses)
-        if k == i
-        else _spread(size[k : k + 1], position[k : k + 1], yaw[k : k + 1])
-        for k in range(len(size))
-    ]
-    with torch.no_grad():
-        return np.broadcast_to(margin_of(one, every, walls, categories).numpy(), (count,))
 
 
 def _spread(size: object, position: object, yaw: object) -> Spread:

@@ -28,7 +28,7 @@ from echousd.place.placements import stated_placements
 from echousd.place.problem import Posed, pose, stacked
 from echousd.place.relations import relation_margins
 from echousd.place.report import Conflict, collisions, conflicts, outside, sentence
-from echousd.place.search import Arranged, Search
+from echousd.place.search import ANEW, Arranged, Search
 from echousd.place.setting import setting_of
 from echousd.place.solver import PlaceConfig, solve, violation
 
@@ -251,16 +251,18 @@ def place_boxes(
 
         at = suited(at, at.size)
 
-        def searched(of: Posed) -> Arranged:
-            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon)).run()
+        def searched(of: Posed, anew: int = ANEW) -> Arranged:
+            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon)).run(anew)
 
-        chosen = searched(at)
-        if chosen.cost > BAD and fullness(at) > FULL:
-            less = suited(at, smaller_sizes(at.problem.categories, at.size, free))
-            if not np.array_equal(less.size, at.size):
-                other = searched(less)
-                if other.cost < chosen.cost - WORTH:
-                    at, chosen = less, other
+        less = suited(at, smaller_sizes(at.problem.categories, at.size, free)) if fullness(at) > FULL else at
+        shrinks = not np.array_equal(less.size, at.size)
+        chosen = searched(at, 0 if shrinks else ANEW)
+        if chosen.cost > BAD and shrinks:
+            other = searched(less)
+            if other.cost > BAD:
+                chosen = searched(at)
+            if other.cost < chosen.cost - WORTH:
+                at, chosen = less, other
         hung = hung_lamps(at.problem.categories, at.size, chosen.position, chosen.yaw, free)
         at = posed(hung, chosen.position, chosen.yaw, kept)
     found = solve(at, config)

@@ -477,8 +477,8 @@ class Search:
                 break
         return state, total, wrong
 
-    def run(self) -> Arranged:
-        """The best state that the budget finds."""
+    def run(self, anew: int = ANEW) -> Arranged:
+        """The best state that the budget finds, pieces taken out and put in again so many times."""
         setting = self.setting
         n = len(setting.size)
         habits = [0.02 + 0.3 * out_of_habit(setting, i) for i in range(n)]
@@ -490,13 +490,13 @@ class Search:
         seated = at & (setting.anchor >= 0) & (mates > 1) & ~np.isin(np.arange(n), wrong)  # together with their table
         state = self.swept(state, [i for i in range(n) if not seated[i]])
         state, total, wrong = self.mended(state, *self.faults(state))
-        for number in range(ANEW):
+        for number in range(anew):
             if not wrong or self.judged >= self.budget:
                 break
             out = list(range(n)) if number else self.involved(wrong)
-            if number:  # the worst first, and elsewhere
-                self.urgent = wrong
-                self.regrets = {i: (*state.position[i, [0, 2]], float(state.yaw[i])) for i in wrong[:1]}
+            if number:  # the worst first, and elsewhere; next time another one
+                self.urgent = wrong[number - 1 :] + wrong[: number - 1]
+                self.regrets = {i: (*state.position[i, [0, 2]], float(state.yaw[i])) for i in self.urgent[:1]}
             built = self.rebuilt(state, out)
             self.urgent, self.regrets = [], {}
             after = self.swept(built, out)
