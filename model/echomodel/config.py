@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from types import UnionType
 from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from echomodel.vocabulary import vocabulary
@@ -183,11 +184,6 @@ def to_json(config: Any) -> str:
     return json.dumps(asdict(config), sort_keys=True)
 
 
-def to_dict(config: Any) -> dict[str, Any]:
-    """A configuration as nested plain values."""
-    return asdict(config)
-
-
 def check_numbers(raw: dict[str, Any], tensors: int, where: str = "") -> None:
     """Raises ValueError for numbers of a file's configuration that would cost more than its tensors: layers, steps.
 
@@ -259,6 +255,8 @@ def _typed(hint: Any, value: Any, path: str) -> Any:
     if is_dataclass(hint):
         return from_dict(hint, value, path)  # type: ignore[arg-type]
     origin, choices = get_origin(hint), get_args(hint)
+    if origin is UnionType:  # with None
+        return None if value is None else _typed(choices[0], value, path)
     if origin is Literal:
         if value not in choices:
             raise ValueError(f"{path} is {value!r}, allowed: {', '.join(map(str, choices))}")

@@ -98,30 +98,7 @@ def sample(
     """
     if sampler not in SAMPLERS:
         raise ValueError(f"sampler is {sampler!r}, allowed: {', '.join(SAMPLERS)}")
-    levels = sampling_levels(steps)
-    return _march(SAMPLERS[sampler](objective, generator), predict, x, levels, known, known_mask, progress)
-
-
-def guided(conditional: Predict, unconditional: Predict, scale: float) -> Predict:
-    """Classifier-free guidance (Ho and Salimans 2022): unconditional + scale (conditional - unconditional)."""
-
-    def predict(x: Tensor, level: Tensor) -> Tensor:
-        base = unconditional(x, level)
-        return base + scale * (conditional(x, level) - base)
-
-    return predict
-
-
-def _march(
-    step: Step,
-    predict: Predict,
-    x: Tensor,
-    levels: Tensor,
-    known: Tensor | None,
-    known_mask: Tensor | None,
-    progress: StepListener | None,
-) -> Tensor:
-    times = levels.tolist()
+    step, times = SAMPLERS[sampler](objective, generator), sampling_levels(steps).tolist()
     free = torch.ones(len(x), dtype=x.dtype, device=x.device)
     fixed = None
     if known_mask is not None and known is not None:
@@ -134,6 +111,16 @@ def _march(
         if progress is not None:
             progress(number + 1, len(times) - 1)
     return x
+
+
+def guided(conditional: Predict, unconditional: Predict, scale: float) -> Predict:
+    """Classifier-free guidance (Ho and Salimans 2022): unconditional + scale (conditional - unconditional)."""
+
+    def predict(x: Tensor, level: Tensor) -> Tensor:
+        base = unconditional(x, level)
+        return base + scale * (conditional(x, level) - base)
+
+    return predict
 
 
 def _strengths(level: float, objective: Objective) -> tuple[float, float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
+
+from echomodel.config import from_dict
 
 
 @dataclass(frozen=True)
@@ -140,20 +142,8 @@ class ReleasedConfig:
 
     @classmethod
     def from_json(cls, raw: Mapping[str, Any]) -> ReleasedConfig:
-        """The inverse of `to_json`; raises ValueError naming an unknown field."""
-        parts = {"encoder": EncoderConfig, "layout": UNetConfig, "shape": UNetConfig, "vqvae": VQConfig}
-        values: dict[str, Any] = {}
-        for key, value in raw.items():
-            values[key] = _build(parts[key], value, key) if key in parts and value is not None else value
-        return _build(cls, values, "released model")
-
-
-def _build(kind: type, raw: Mapping[str, Any], where: str) -> Any:
-    known = {f.name for f in fields(kind)}
-    unknown = sorted(set(raw) - known)
-    if unknown:
-        raise ValueError(f"config of {where}: unknown field {unknown[0]!r}, allowed: {', '.join(sorted(known))}")
-    return kind(**{k: tuple(v) if isinstance(v, list) and not is_dataclass(v) else v for k, v in raw.items()})
+        """The inverse of `to_json`; raises ValueError naming an unknown or mistyped field."""
+        return from_dict(cls, dict(raw))
 
 
 def released(classes: int = 14) -> ReleasedConfig:

@@ -62,14 +62,7 @@ class FurnitureDenoiser(nn.Module):
             nn.init.zeros_(layer.bias)
 
     def context(self, graph: GraphBatch, size: Tensor, pairs: Pairs, latent: Tensor) -> FurnitureContext:
-        """Everything that does not depend on the step.
-
-        Arguments:
-            graph: N nodes.
-            size: (N, 3) float32, extents of the boxes in metres.
-            pairs: the merged relations of the graph.
-            latent: (N, latent width), output of the graph manipulator.
-        """
+        """Everything that does not depend on the step; arguments as for `ShapeDenoiser.context`."""
         nodes = self.category(graph.category) + self.size(size.clamp_min(0.01).log()) + self.latent(latent)
         return FurnitureContext(nodes + self.room_type(graph.room_type)[graph.scene], pairs)
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from echomodel.compact.furniture import FurnitureDenoiser
 from echomodel.compact.layout import LayoutDenoiser
 from echomodel.compact.learned import places
 from echomodel.compact.shape import ShapeDenoiser
-from echomodel.config import CompactConfig, check_numbers, from_dict, to_dict, to_json
+from echomodel.config import CompactConfig, check_numbers, from_dict, to_json
 from echomodel.files import whole_file
 
 WORDS = ("categories", "predicates", "room_types")
@@ -173,7 +173,7 @@ def load_weights(
         # only a file with the layout branch knows the boxes
         own = next((h for h in metadata.values() if "layout" in json.loads(h["parts"])), metadata[first])
         statistics = BoxStatistics.from_json(json.loads(own["statistics"]))
-        check_numbers(to_dict(config), len(tensors))
+        check_numbers(asdict(config), len(tensors))
         with torch.device("meta"), _Undrawn():  # sizes that a bent configuration asks for cost nothing there
             _check_fit(CompactModel(config, statistics, parts).state_dict(), tensors, where)
         model = CompactModel(config, statistics, parts)

@@ -26,19 +26,7 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         wall = 0.09 + 0.05 * style.softness
         arms = foot + (h - foot) * (0.6 + 0.3 * style.arm_height)
         power = 2.2 + 3 * style.corner
-        parts.append(
-            bent(
-                (0, foot, d * 0.42),
-                (w / 2, d * 0.92),
-                wall,
-                h - foot,
-                arms - foot,
-                power=power,
-                ease=2.5,
-                material="fabric",
-                role="back",
-            )
-        )
+        parts.append(bent((0, foot, d * 0.42), (w / 2, d * 0.92), wall, h - foot, arms - foot, power=power, ease=2.5))
         low = turned(
             (0, foot, 0),
             (w / 2 - wall * 0.7, d * 0.45),
@@ -147,17 +135,7 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     foot = seat * 0.5
     arms = foot + (h - foot) * (0.3 + 0.25 * style.arm_height)
     body: list[Solid] = [
-        bent(
-            (0, foot, d * 0.32),
-            (w / 2, d * 0.8),
-            wall,
-            h - foot,
-            arms - foot,
-            power=2.6 + style.corner,
-            ease=2.6,
-            material="fabric",
-            role="back",
-        ),
+        bent((0, foot, d * 0.32), (w / 2, d * 0.8), wall, h - foot, arms - foot, power=2.6 + style.corner, ease=2.6),
         turned(
             (0, foot, d * 0.02),
             (w * 0.42, d * 0.42),

@@ -36,8 +36,6 @@ def dining_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             arms - seat + wall,
             power=2.4 + style.corner,
             ease=2.5,
-            material="fabric",
-            role="back",
         )
         return [*parts, shell]
     return parts + back_rest(style, style.back, w * 0.9, seat, h, -d * 0.38, 0.06, rake)
@@ -112,16 +110,7 @@ def dressing_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back in ("shell", "cushion", "oval"):
         return [
             *parts,
-            bent(
-                (0, seat - thick * 0.5, d * 0.05),
-                (w / 2, d * 0.55),
-                0.05,
-                h - seat,
-                (h - seat) * 0.6,
-                ease=2.0,
-                material="fabric",
-                role="back",
-            ),
+            bent((0, seat - thick * 0.5, d * 0.05), (w / 2, d * 0.55), 0.05, h - seat, (h - seat) * 0.6, ease=2.0),
         ]
     return parts + back_rest(style, style.back, w * 0.85, seat, h, -d * 0.4, 0.05, style.rake * 0.5)
 
@@ -161,15 +150,7 @@ def bar_stool(size: Size, style: Style, choices: Choices) -> list[Solid]:
     if style.back in ("shell", "cushion", "oval"):
         return [
             *parts,
-            bent(
-                (0, seat - thick * 0.5, 0),
-                (w * 0.48, d * 0.46),
-                0.035,
-                h - seat,
-                (h - seat) * 0.4,
-                material="fabric",
-                role="back",
-            ),
+            bent((0, seat - thick * 0.5, 0), (w * 0.48, d * 0.46), 0.035, h - seat, (h - seat) * 0.4),
         ]
     return parts + back_rest(style, style.back, wide, seat, h, -d * 0.36, 0.04, style.rake * 0.5)
 
@@ -197,8 +178,6 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
                 0.05,
                 h - seat + 0.05,
                 0.12 + 0.1 * style.arm_height,
-                material="fabric",
-                role="back",
             )
         )
         return parts

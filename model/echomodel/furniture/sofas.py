@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from echomodel.furniture.armchairs import upholstered_arms
+from echomodel.furniture.backs import leaning
 from echomodel.furniture.carpentry import Size, base, box, cushion, of_role
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.lathe import Lathe
@@ -93,16 +94,9 @@ def _couch(size: Size, style: Style, seats: int, *, chaise: int = 0, chaise_dept
     low, high = (-w / 2 + arm * 0.5, foot, z0 + 0.02), (w / 2 - arm * 0.5, seat - pad, z1 - 0.015)
     parts.append(box(low, high, "fabric", 0.015, "base"))
     tall = h - (0.06 if seats > 1 and style.contrast < 0.6 else 0.0)
-    lean = rotation(x=-0.5 * style.rake)
-    backrest = box(
-        (-w / 2 + arm * 0.4, foot + 0.02, z0),
-        (w / 2 - arm * 0.4, tall, z0 + frame),
-        "fabric",
-        0.02 + 0.05 * style.softness,
-        "back",
-    )
-    pivot = np.array([0, seat, z0 + frame / 2])
-    parts.append(replace(backrest, centre=lean @ (backrest.centre - pivot) + pivot, turn=lean))
+    low, high = (-w / 2 + arm * 0.4, foot + 0.02, z0), (w / 2 - arm * 0.4, tall, z0 + frame)
+    soft = 0.02 + 0.05 * style.softness
+    parts.append(leaning(low, high, 0.5 * style.rake, seat, z0 + frame / 2, material="fabric", radius=soft))
     if style.arms == "slim":
         inner = arm = 0.05
         for s in (-1, 1):
@@ -182,8 +176,6 @@ def _curved(size: Size, style: Style) -> list[Solid]:
             (h - foot) * (0.55 + 0.3 * style.arm_height),
             power=2.6 + 2 * style.corner,
             ease=3,
-            material="fabric",
-            role="back",
         )
     )
     parts.append(
@@ -240,10 +232,8 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
     low, high = (-w / 2 + 0.015, foot, -d / 2 + 0.03), (w / 2 - 0.015, seat - pad, d / 2 - 0.015)
     parts.append(box(low, high, "fabric", 0.02, "base"))
     parts.append(cushion((-w / 2, seat - pad, -d / 2 + 0.1), (w / 2, seat, d / 2), style))
-    rake = 0.15 + style.rake
-    back = box((-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), "fabric", 0.05, "back")
-    turn, pivot = rotation(x=-rake), np.array([0, seat - pad, -d / 2 + 0.08])
-    parts.append(replace(back, centre=turn @ (back.centre - pivot) + pivot, turn=turn))
+    low, high, pivot = (-w / 2, seat - pad, -d / 2), (w / 2, h, -d / 2 + 0.15), (seat - pad, -d / 2 + 0.08)
+    parts.append(leaning(low, high, 0.15 + style.rake, *pivot, material="fabric", radius=0.05))
     if choices.chance("extra", 0.6):
         s = -1 if choices.chance("side", 0.5) else 1
         x0, x1 = sorted((s * w / 2, s * (w / 2 - 0.13)))

@@ -418,5 +418,6 @@ def tube(points: Sequence[Vector] | Array, radius: float, material: str = "wood"
 
 
 def bent(centre: Vector, half: tuple[float, float], thickness: float, back: float, front: float, **form: Any) -> Shell:
-    """A wall round the back of `centre` (3,), see `Shell`."""
+    """A wall round the back of `centre` (3,), see `Shell`: the upholstered back of a seat, unless said otherwise."""
+    form = {"material": "fabric", "role": "back", **form}
     return Shell(np.array(centre, float), half=half, thickness=thickness, back=back, front=front, **form)

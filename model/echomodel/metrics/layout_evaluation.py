@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -486,23 +487,16 @@ class RelationScores:
 
 
 def relation_scores(
-    boxes: BoxesLike,
-    triplets: Tensor,
-    *,
-    rules: str = "strict",
-    scene: Tensor | None = None,
-    center: Tensor | None = None,
-    fronts: Tensor | None = None,
-    subset: Tensor | None = None,
+    boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", subset: Tensor | None = None, **about: Any
 ) -> RelationScores:
     """Count the kept relations of any number of scenes.
 
     Arguments:
-        boxes, triplets, rules, scene, center, fronts: as for `echomodel.rules.verdicts`; boxes from any source. Without
+        boxes, triplets, rules, about: as for `echomodel.rules.verdicts`; boxes from any source. Without
             `fronts` `symmetrical_to` goes by places alone, as the published table does.
         subset: (E,) bool, the triplets to count; default all.
     """
-    verdict = verdicts(boxes, triplets, rules=rules, scene=scene, center=center, fronts=fronts)
+    verdict = verdicts(boxes, triplets, rules=rules, **about)
     counted = verdict >= 0
     if subset is not None:
         counted &= subset

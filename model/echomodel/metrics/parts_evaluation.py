@@ -19,7 +19,7 @@ from echomodel.furniture.solids import Solid
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
 from echomodel.metrics.shape_evaluation import FIRST_ROOM
-from echomodel.metrics.shapes import set_scores, surface_points
+from echomodel.metrics.shapes import reference_points, set_scores, surface_points
 from echomodel.objective.sizes import size_range
 from echomodel.progress import StageListener
 from echomodel.rooms.generator import generate_rooms
@@ -99,7 +99,8 @@ def evaluate_parts(
     result: dict = {"model": model.hash, **asdict(settings), "pieces": counts, "sets": set_scores(ours, clouds(fresh))}
     if shapes is not None:
         result["shapes_set"] = str(shapes.directory)
-        result["shapes_sets"] = set_scores(ours, _references(shapes, ours, rng))
+        against = reference_points(shapes, ours, rng, lambda grid: _cloud(mesh_from_tsdf(grid)))
+        result["shapes_sets"] = set_scores(ours, against)
     if settings.rooms:
         result["rooms_pieces"], meshes[ROOMS] = room_pieces(model, settings, generator)
     made = partial(sampled, model, generator=generator, steps=settings.steps)
@@ -200,14 +201,3 @@ def clouds(meshes: dict[str, list[trimesh.Trimesh]]) -> dict[str, np.ndarray]:
 def _cloud(mesh: trimesh.Trimesh) -> np.ndarray:
     unit = trimesh.Trimesh((mesh.vertices - mesh.bounds[0]) / mesh.extents - 0.5, mesh.faces, process=False)
     return surface_points(unit, POINTS)
-
-
-def _references(shapes: ShapeSet, ours: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Shapes of a set, as many per class as were generated where it has them."""
-    found: dict[str, np.ndarray] = {}
-    for name, made in ours.items():
-        members = np.flatnonzero(shapes.category == shapes.categories.index(name))
-        chosen = rng.permutation(members)[: len(made)]
-        if len(chosen):
-            found[name] = np.stack([_cloud(mesh_from_tsdf(shapes[int(i)])) for i in chosen])
-    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,18 +29,16 @@ def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
         styles = room.styles or (-1,) * len(room)
         models = room.models or ("",) * len(room)
         out.append(
-            RoomBoxes(
-                id=room.id,
+            replace(
+                room,
                 room_type=vocabulary().room_type(room.room_type).name,
-                floor_polygon=room.floor_polygon,
-                height=room.height,
                 categories=tuple(row.name for row in rows if row is not None),
                 size=room.size[keep],
                 position=room.position[keep],
                 yaw=room.yaw[keep],
                 models=tuple(models[k] for k in keep),
                 styles=tuple(styles[k] for k in keep),
-                openings=room.openings,
+                relations=None,
             )
         )
     return out

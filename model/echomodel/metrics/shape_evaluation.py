@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ from echomodel.furniture import sample_size
 from echomodel.graph import GraphBatch
 from echomodel.metrics.shapes import (
     reconstruction_scores,
+    reference_points,
     set_scores,
     style_likeness,
     surface_points,
@@ -144,25 +144,12 @@ def _generation(
             meshes[name].append(mesh)
         told("generate", number + 1, len(rooms))
     every = [mesh for found in meshes.values() for mesh in found]
+    against = reference_points(shapes, points, rng, lambda grid: surface_points(mesh_from_tsdf(grid), POINTS))
     scores = {
         "objects": len(every) + empty,
         "empty": empty,
         "watertight": watertight_share(every) if every else 0.0,
-        "sets": set_scores({k: np.stack(v) for k, v in points.items()}, _references(shapes, points, rng)),
+        "sets": set_scores({k: np.stack(v) for k, v in points.items()}, against),
         "style": style_likeness(np.stack(cloud), groups) if cloud else {},
     }
     return scores, dict(meshes)
-
-
-def _references(
-    shapes: ShapeSet, points: dict[str, list[np.ndarray]], rng: np.random.Generator
-) -> dict[str, np.ndarray]:
-    """As many shapes of the set per class as were generated."""
-    found: dict[str, np.ndarray] = {}
-    for name, made in points.items():
-        members = np.flatnonzero(shapes.category == shapes.categories.index(name))
-        chosen = rng.permutation(members)[: len(made)]
-        clouds: Sequence[np.ndarray] = [surface_points(mesh_from_tsdf(shapes[int(i)]), POINTS) for i in chosen]
-        if clouds:
-            found[name] = np.stack(clouds)
-    return found

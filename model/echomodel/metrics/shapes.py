@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import trimesh
@@ -15,6 +16,9 @@ from scipy.spatial import cKDTree
 
 from echomodel.progress import StepListener
 from echomodel.tsdf import mesh_from_tsdf
+
+if TYPE_CHECKING:
+    from echomodel.data.shapeset import ShapeSet
 
 THRESHOLD = 1 / 64
 SAMPLES = 8_000  # points whose distance is scored
@@ -150,6 +154,19 @@ def set_scores(
     if scores:
         scores["mean"] = _means(list(scores.values()))
     return scores
+
+
+def reference_points(
+    shapes: ShapeSet, made: Mapping[str, Sequence], rng: np.random.Generator, points: Callable[[np.ndarray], np.ndarray]
+) -> dict[str, np.ndarray]:
+    """`points` of the grids of a set, class -> (n, p, 3): as many shapes as were made, where the set has them."""
+    found: dict[str, np.ndarray] = {}
+    for name, own in made.items():
+        members = np.flatnonzero(shapes.category == shapes.categories.index(name))
+        chosen = rng.permutation(members)[: len(own)]
+        if len(chosen):
+            found[name] = np.stack([points(shapes[int(i)]) for i in chosen])
+    return found
 
 
 def watertight_share(meshes: Sequence[trimesh.Trimesh]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -69,20 +70,12 @@ def fronts(categories: Iterable[str]) -> Tensor:
     return torch.tensor([_has_front(word) for word in categories], dtype=torch.bool)
 
 
-def verdicts(
-    boxes: BoxesLike,
-    triplets: Tensor,
-    *,
-    rules: str = "strict",
-    scene: Tensor | None = None,
-    center: Tensor | None = None,
-    fronts: Tensor | None = None,
-) -> Tensor:
+def verdicts(boxes: BoxesLike, triplets: Tensor, *, rules: str = "strict", **about: Any) -> Tensor:
     """Hard verdict of every relation: (E,) int8, 1 kept, 0 broken, -1 not measured. Arguments as for `margins`."""
     chosen = rule_set(rules)
     triplets = torch.as_tensor(triplets)
     with torch.no_grad():
-        margin = _margins(_Tensors(boxes, torch.float64), triplets, chosen, scene, center, fronts)
+        margin = _margins(_Tensors(boxes, torch.float64), triplets, chosen, **about)
     predicate = triplets[:, 1]
     kept = torch.where(_among(predicate, chosen.open), margin > 0, margin >= 0)
     unmeasured = torch.full_like(kept, -1, dtype=torch.int8)
@@ -93,9 +86,9 @@ def _margins(
     boxes: _Tensors,
     triplets: Tensor,
     rules: RuleSet,
-    scene: Tensor | None,
-    center: Tensor | None,
-    fronts: Tensor | None,
+    scene: Tensor | None = None,
+    center: Tensor | None = None,
+    fronts: Tensor | None = None,
     rigid: bool = False,
 ) -> Tensor:
     triplets = torch.as_tensor(triplets, device=boxes.size.device)

@@ -17,6 +17,7 @@ from echomodel.rules.geometry import TINY, PairGeometry
 from echomodel.vocabulary import vocabulary
 
 Margin = Callable[[PairGeometry], Tensor]
+Divisor = Callable[[Tensor, Tensor], Tensor]
 
 APART = 0.05  # metres between two centres for left, right, front and behind
 OVERLAP = 0.3  # largest intersection over the smaller volume for the same four
@@ -96,27 +97,26 @@ def _beside(axis: int, sign: float, needed: float) -> Margin:
     return margin
 
 
-def _relative(pair_values: Callable[[PairGeometry], tuple[Tensor, Tensor]], sign: float, needed: float) -> Margin:
-    """(s - o) / s as published: the ratio to the subject, so that `bigger` and `smaller` are not quite inverse."""
-
-    def margin(pair: PairGeometry) -> Tensor:
-        s, o = pair_values(pair)
-        safe = torch.where(s.abs() < TINY, torch.full_like(s, TINY), s)
-        return sign * (s - o) / safe - needed
-
-    return margin
-
-
-def _relative_to_larger(
-    pair_values: Callable[[PairGeometry], tuple[Tensor, Tensor]], sign: float, needed: float
+def _relative(
+    values: Callable[[PairGeometry], tuple[Tensor, Tensor]], sign: float, needed: float, to: Divisor
 ) -> Margin:
-    """(s - o) / max(s, o): bounded, and `bigger` is exactly the inverse of `smaller`."""
+    """(s - o) over what `to` makes of both."""
 
     def margin(pair: PairGeometry) -> Tensor:
-        s, o = pair_values(pair)
-        return sign * (s - o) / torch.maximum(s, o).clamp_min(1e-6) - needed
+        s, o = values(pair)
+        return sign * (s - o) / to(s, o) - needed
 
     return margin
+
+
+def _subject(s: Tensor, o: Tensor) -> Tensor:
+    """As published: the ratio to the subject, so that `bigger` and `smaller` are not quite inverse."""
+    return torch.where(s.abs() < TINY, torch.full_like(s, TINY), s)
+
+
+def _larger(s: Tensor, o: Tensor) -> Tensor:
+    """Bounded, and `bigger` is exactly the inverse of `smaller`."""
+    return torch.maximum(s, o).clamp_min(1e-6)
 
 
 def _volumes(pair: PairGeometry) -> tuple[Tensor, Tensor]:
@@ -168,8 +168,28 @@ def _symmetrical(pair: PairGeometry) -> Tensor:
     return torch.minimum(near, alike).amax(-1)
 
 
-def _named(margins: Mapping[str, Margin], *, open_: Collection[str] = ()) -> dict[str, Rule]:
-    """Rules that label what they measure."""
+def _rules(
+    ahead: float, to: Divisor, heights: Mapping[str, Margin], symmetrical: Margin, open_: Collection[str] = ()
+) -> dict[str, Rule]:
+    """Rules that label what they measure.
+
+    Arguments:
+        ahead: metres for front and behind. to: what differences of sizes are divided by. heights, symmetrical: what
+            the sets do not share. open_: predicates whose bound itself does not count.
+    """
+    margins = {
+        "left": _beside(2, -1.0, APART),
+        "right": _beside(2, 1.0, APART),
+        "front": _beside(0, 1.0, ahead),
+        "behind": _beside(0, -1.0, ahead),
+        "close_by": _close,
+        **heights,
+        "bigger_than": _relative(_volumes, 1.0, VOLUME, to),
+        "smaller_than": _relative(_volumes, -1.0, VOLUME, to),
+        "taller_than": _relative(_tops, 1.0, HEIGHT, to),
+        "shorter_than": _relative(_tops, -1.0, HEIGHT, to),
+        "symmetrical_to": symmetrical,
+    }
     return {
         name: Rule(margin, margin, open=name in open_, same_category=name == "symmetrical_to")
         for name, margin in margins.items()
@@ -193,46 +213,14 @@ MEANS = {
     "30 degrees where both have a front",
 }  # in the set `strict`
 
-STRICT = RuleSet(
-    "strict",
-    oriented=True,
-    rules=_named(
-        {
-            "left": _beside(2, -1.0, APART),
-            "right": _beside(2, 1.0, APART),
-            "front": _beside(0, 1.0, APART),
-            "behind": _beside(0, -1.0, APART),
-            "close_by": _close,
-            "above": _above,
-            "standing_on": _standing_on,
-            "bigger_than": _relative_to_larger(_volumes, 1.0, VOLUME),
-            "smaller_than": _relative_to_larger(_volumes, -1.0, VOLUME),
-            "taller_than": _relative_to_larger(_tops, 1.0, HEIGHT),
-            "shorter_than": _relative_to_larger(_tops, -1.0, HEIGHT),
-            "symmetrical_to": _symmetrical,
-        }
-    ),
-)
+STRICT = RuleSet("strict", True, _rules(APART, _larger, {"above": _above, "standing_on": _standing_on}, _symmetrical))
 STRICT.rules.update({name: replace(rule, means=MEANS[name]) for name, rule in STRICT.rules.items()})
 
 SGFRONT = RuleSet(
     "sgfront",
-    oriented=False,
-    rules=_named(
-        {
-            "left": _beside(2, -1.0, APART),
-            "right": _beside(2, 1.0, APART),
-            "front": _beside(0, 1.0, -APART),
-            "behind": _beside(0, -1.0, -APART),
-            "close_by": _close,
-            "standing_on": _sgfront_standing_on,
-            "bigger_than": _relative(_volumes, 1.0, VOLUME),
-            "smaller_than": _relative(_volumes, -1.0, VOLUME),
-            "taller_than": _relative(_tops, 1.0, HEIGHT),
-            "shorter_than": _relative(_tops, -1.0, HEIGHT),
-            "symmetrical_to": _sgfront_symmetrical,
-        },
-        open_=("standing_on", "symmetrical_to"),
+    False,
+    _rules(
+        -APART, _subject, {"standing_on": _sgfront_standing_on}, _sgfront_symmetrical, ("standing_on", "symmetrical_to")
     ),
 )
 # Labels need a real distance where the check tolerates a wrong one; only the floor carries `standing on`, because the

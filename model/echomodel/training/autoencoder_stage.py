@@ -11,6 +11,7 @@ from torch import Tensor
 from echomodel.compact.model import CompactModel
 from echomodel.compact.shape import ShapeDenoiser
 from echomodel.data.shapeset import ShapeSet
+from echomodel.metrics.shapes import surface_scores
 from echomodel.randomness import normal
 from echomodel.training.shape_stage import draw_grids, read
 from echomodel.training.start import Start
@@ -86,46 +87,23 @@ class AutoencoderStage:
         """Mean absolute error, intersection over union and one-voxel F-score on held-out shapes."""
         picked = self.held[np.linspace(0, len(self.held) - 1, min(count, len(self.held))).astype(int)]
         errors: list[Tensor] = []
-        unions: list[float] = []
-        scores: list[float] = []
+        scores: list[dict[str, float]] = []
         through: list[float] = []
         for start in range(0, len(picked), 8):
             grids = read(self.shapes, picked[start : start + 8]).to(model.device)
             rebuilt = model.autoencoder(grids)
             errors.append((grids - rebuilt).abs().mean())
-            unions.extend(overlap(grids, rebuilt).tolist())
-            scores.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
+            scores += _scores(rebuilt, grids)
             if self.components is not None:
                 rebuilt = model.autoencoder.decode(self.projected(model.autoencoder.encode(grids)))
-                through.extend(surface_score(a, b) for a, b in zip(grids, rebuilt, strict=True))
-        l1 = float(torch.stack(errors).mean())
-        found = {"held/l1": l1, "held/iou": float(np.mean(unions)), "held/fscore": float(np.mean(scores))}
+                through += [row["f_score"] for row in _scores(rebuilt, grids)]
+        found = {"held/l1": float(torch.stack(errors).mean())}
+        for name, score in (("held/iou", "iou"), ("held/fscore", "f_score")):
+            found[name] = float(np.mean([row[score] for row in scores]))
         return found | {"held/fscore_projected": float(np.mean(through))} if through else found
 
 
-def overlap(a: Tensor, b: Tensor) -> Tensor:
-    """Intersection over union of the insides of grids: (N, 64, 64, 64) twice -> (N,)."""
-    inside, other = (a < 0).flatten(1), (b < 0).flatten(1)
-    return (inside & other).sum(1) / (inside | other).sum(1).clamp_min(1)
-
-
-def surface_score(a: Tensor, b: Tensor) -> float:
-    """F-score of two surfaces at one voxel (1/64 of the grid), points being marching cubes' vertices, 0 to 1."""
-    from scipy.spatial import cKDTree
-
-    points = [surface_points(grid) for grid in (a, b)]
-    if not len(points[0]) or not len(points[1]):
-        return 0.0
-    precision = float((cKDTree(points[0]).query(points[1])[0] <= 1.0).mean())
-    recall = float((cKDTree(points[1]).query(points[0])[0] <= 1.0).mean())
-    return 2 * precision * recall / max(precision + recall, 1e-9)
-
-
-def surface_points(grid: Tensor) -> np.ndarray:
-    """Vertices of the zero level in voxels (k, 3), none where there is no surface."""
-    from skimage.measure import marching_cubes
-
-    values = grid.cpu().numpy()
-    if not values.min() < 0 < values.max():
-        return np.zeros((0, 3))
-    return marching_cubes(values, 0.0)[0]
+def _scores(rebuilt: Tensor, grids: Tensor) -> list[dict[str, float]]:
+    """`surface_scores` of each reconstruction."""
+    pairs = zip(rebuilt.cpu().numpy(), grids.cpu().numpy(), strict=True)
+    return [surface_scores(ours, real) for ours, real in pairs]

@@ -14,11 +14,8 @@ from echomodel.furniture.choices import OPEN
 from echomodel.furniture.description import draw_styles
 from echomodel.furniture.style import sample_size
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels
-from echomodel.randomness import normal
-from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import PackedRooms, draw_batch
-from echomodel.training.shape_stage import ShapeBatch, draw_suites, first_of_group, shifted
+from echomodel.training.shape_stage import ShapeBatch, draw_suites, noised
 from echomodel.training.start import Start
 from echomodel.vocabulary import vocabulary
 
@@ -37,14 +34,8 @@ def parts_loss(
     Arguments:
         batch: scenes; `shape` numbers equal pieces. clean: (N, D) float32 descriptions. size: (N, 3) float32, metres.
     """
-    settings, scenes = model.config.furniture, batch.graph.num_scenes
-    known = draw_known(batch.graph.scene, scenes, generator)
-    level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
-    noise = normal(clean.shape, generator, clean.device)
-    # equal furniture starts from equal noise when sampled, so most of the scenes train that way
-    shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[batch.graph.scene, None]
-    noise = torch.where(shared, noise[first_of_group(batch)], noise)
-    noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, settings.objective))
+    settings = model.config.furniture
+    known, level, _, noisy = noised(batch, clean, settings.objective, generator)
     with torch.no_grad():
         latent = model.latent(batch.graph.category, batch.pairs)
     context = model.furniture.context(batch.graph, size, batch.pairs, latent)

@@ -13,9 +13,10 @@ from torch import Tensor
 from echomodel.compact.autoencoder import Autoencoder
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import Pairs, pairs_of
+from echomodel.config import Objective
 from echomodel.data.shapeset import ShapeSet
 from echomodel.graph import GraphBatch
-from echomodel.objectives import add_noise, draw_levels, expand, output_from, target
+from echomodel.objectives import add_noise, draw_levels, output_from, target
 from echomodel.randomness import normal
 from echomodel.training.layout_stage import draw_known
 from echomodel.training.rooms import LayoutBatch, PackedRooms, draw_batch
@@ -61,15 +62,8 @@ def shape_loss(
         size: (N, 3) float32, metres.
         graph_latent: (N, latent width) shared with the layout branch, None = encode the graph here.
     """
-    settings, scenes = model.config.shape, batch.graph.num_scenes
-    objective = settings.objective
-    known = draw_known(batch.graph.scene, scenes, generator)
-    level = shifted(draw_levels(scenes, generator, clean.device))[batch.graph.scene] * ~known
-    noise = normal(clean.shape, generator, clean.device)
-    # equal furniture starts from equal noise when sampled, so most of the scenes train that way
-    shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)
-    noise = torch.where(expand(shared[batch.graph.scene], noise), noise[first_of_group(batch)], noise)
-    noisy = torch.where(expand(known, clean), clean, add_noise(clean, noise, level, objective))
+    settings, objective = model.config.shape, model.config.shape.objective
+    known, level, noise, noisy = noised(batch, clean, objective, generator)
     latent = model.latent(batch.graph.category, batch.pairs) if graph_latent is None else graph_latent
     context = model.shape.context(batch.graph, size, batch.pairs, latent)
     output = model.shape(noisy, level, context).float()
@@ -82,6 +76,20 @@ def shape_loss(
     error = (output - wanted).square().flatten(1).mean(1)
     loss = (error * free).sum() / free.sum().clamp_min(1)
     return loss, {"shape": loss}
+
+
+def noised(
+    batch: ShapeBatch, clean: Tensor, objective: Objective, generator: torch.Generator
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Which objects are known (N,) bool, the level of each (N,), noise and noisy codes (N, K) of the clean ones."""
+    scene, scenes = batch.graph.scene, batch.graph.num_scenes
+    known = draw_known(scene, scenes, generator)
+    level = shifted(draw_levels(scenes, generator, clean.device))[scene] * ~known
+    noise = normal(clean.shape, generator, clean.device)
+    # equal furniture starts from equal noise when sampled, so most of the scenes train that way
+    shared = (torch.rand(scenes, generator=generator) < 0.75).to(clean.device)[scene, None]
+    noise = torch.where(shared, noise[first_of_group(batch)], noise)
+    return known, level, noise, torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
 
 
 def shifted(level: Tensor) -> Tensor:
