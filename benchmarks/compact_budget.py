@@ -12,7 +12,7 @@ from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.compact.branches import PARTS
 from echomodel.compact.model import CompactModel
 from echomodel.compact.pairs import pairs_of
-from echomodel.config import PRESETS
+from echomodel.config import CompactConfig
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 
@@ -40,7 +40,7 @@ def flops(call) -> float:
 
 def budget() -> dict[str, float]:
     """What each part of the compact preset costs; the figures do not depend on the weights."""
-    config, nodes = PRESETS["compact"], 12
+    config, nodes = CompactConfig(), 12
     statistics = BoxStatistics((-1.0,) * 3, (1.0,) * 3, (-1.0,) * 3, (1.0,) * 3, log_size=True)
     model = CompactModel(config, statistics, PARTS).eval()  # those that ship
     graph = dense_graph(nodes)

@@ -42,7 +42,7 @@ def drawn(rooms: list[RoomBoxes], triplets: list[np.ndarray], cache: Path) -> li
     """Size, position and yaw of a draft of every room, from the cache or drawn by the network."""
     if not cache.exists():
         graphs = told_graphs(rooms, LayoutEvaluation(told=1.0), np.random.default_rng(0))
-        sample = model_layouts(None, 0, "strict", None, {"guidance": 1.0, "relation_guidance": None})
+        sample = model_layouts(None, 0, "strict", None)
         out = []
         for graph in graphs:
             none = torch.zeros(graph.num_nodes, dtype=torch.bool)

@@ -42,7 +42,6 @@ def layout(
         bool, typer.Option("--contradictions", help="Keep what contradicts a changed relation, as published.")
     ] = False,
     steps: Annotated[int | None, typer.Option(help="Sampling steps; default: the model's.", min=1)] = None,
-    guidance: Annotated[float, typer.Option(help="Scale of guidance towards the relations, 1 = off.")] = 1.0,
     relation_guidance: Annotated[
         float | None, typer.Option(help="Pull of the rules' margins while sampling, 0 = off; default: the model's.")
     ] = None,
@@ -81,8 +80,7 @@ def layout(
         sampler = true_layouts(found)
     else:
         weights = None if model is None else Path(model)
-        extra = {"guidance": guidance, "relation_guidance": relation_guidance}
-        sampler = model_layouts(weights, seed, rules, steps, extra)
+        sampler = model_layouts(weights, seed, rules, steps, relation_guidance)
     with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("sampling", total=None)
         result = evaluate_layout(

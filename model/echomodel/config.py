@@ -176,9 +176,6 @@ class CompactConfig:
     furniture: FurnitureConfig = field(default_factory=FurnitureConfig)
 
 
-PRESETS = {"compact": CompactConfig()}
-
-
 def to_json(config: Any) -> str:
     """A configuration as one line of JSON."""
     return json.dumps(asdict(config), sort_keys=True)

@@ -27,7 +27,7 @@ from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps
 from echomodel.progress import part_of
 from echomodel.protocols import GraphEdit, touched_nodes
-from echomodel.samplers import Predict, guided
+from echomodel.samplers import Predict
 from echomodel.vocabulary import vocabulary
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
@@ -187,27 +187,18 @@ class EchoModel:
         by, equal = self._how(graph, how), equal_furniture(graph)
         start = by.start(graph.num_nodes, self.description_width, self.device)
         graph = with_whole_styles(graph, joined(graph, by.styles))
-        bare = graph.with_triplets(graph.triplets[:0])
         return sample_descriptions(
             self.model, graph, boxes.size, self.graph_latent(graph, by.edit), equal,
             self.config.furniture.temperature * start[equal] if by.noise is None else start, by,
-            bare_latent=None if by.guidance == 1.0 else self.graph_latent(bare),
         )  # fmt: skip
 
     def _shape_predictor(
         self, graph: GraphBatch, size: Tensor, equal: Tensor, by: CompactSampling, count: int
     ) -> Predict:
         """The denoiser of `count` draws behind one another, each of all objects of the graph."""
-
-        def of(one: GraphBatch, latent: Tensor) -> Predict:
-            many = GraphBatch.pack([one] * count)
-            pairs = pairs_of(many, self.config.predicates)
-            return shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
-
-        predict = of(graph, self.graph_latent(graph, by.edit))
-        if by.guidance != 1.0:
-            bare = graph.with_triplets(graph.triplets[:0])
-            predict = guided(predict, of(bare, self.graph_latent(bare)), by.guidance)
+        many, latent = GraphBatch.pack([graph] * count), self.graph_latent(graph, by.edit)
+        pairs = pairs_of(many, self.config.predicates)
+        predict = shape_predictor(self.model, many, size.repeat(count, 1), pairs, latent.repeat(count, 1))
         first = torch.arange(count, device=equal.device).repeat_interleave(len(equal)) * len(equal)
         return agreeing(predict, equal.repeat(count) + first)
 

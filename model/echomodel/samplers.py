@@ -113,16 +113,6 @@ def sample(
     return x
 
 
-def guided(conditional: Predict, unconditional: Predict, scale: float) -> Predict:
-    """Classifier-free guidance (Ho and Salimans 2022): unconditional + scale (conditional - unconditional)."""
-
-    def predict(x: Tensor, level: Tensor) -> Tensor:
-        base = unconditional(x, level)
-        return base + scale * (conditional(x, level) - base)
-
-    return predict
-
-
 def _strengths(level: float, objective: Objective) -> tuple[float, float]:
     alpha, sigma = alpha_sigma(torch.tensor(level, dtype=torch.float64), objective)
     return float(alpha), float(sigma)

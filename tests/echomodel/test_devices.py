@@ -86,7 +86,7 @@ def sampled(model: CompactModel, rooms, device) -> list[torch.Tensor]:
     known = torch.arange(graph.num_nodes) == 1
     edit = GraphEdit(graph.triplets[1:], torch.arange(graph.num_nodes) == 2)
     edit = GraphEdit(edit.before[(edit.before[:, [0, 2]] != 2).all(1)], edit.added)
-    told = {"edit": edit, "guidance": 1.5}
+    told = {"edit": edit}
     boxes = echo.sample_layout(
         graph, generator=torch.Generator().manual_seed(1), known=Boxes.from_room(rooms[0]), known_mask=known, **told
     )

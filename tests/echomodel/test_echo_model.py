@@ -133,10 +133,9 @@ def test_equal_furniture_gets_one_shape_that_a_known_piece_dictates(model: EchoM
     ids=["one node", "no edges", "200 nodes", "two scenes"],
 )
 def test_unusual_graphs_work(model: EchoModel, graph: GraphBatch) -> None:
-    for guidance in (1.0, 2.0):
-        found = model.sample_layout(graph, generator=seeded(), guidance=guidance)
-        found.check()
-        assert len(found) == graph.num_nodes
+    found = model.sample_layout(graph, generator=seeded())
+    found.check()
+    assert len(found) == graph.num_nodes
 
 
 def test_bad_input_is_named(model: EchoModel) -> None:
@@ -196,29 +195,6 @@ def test_packed_weights_and_half_decoding_change_little(model: EchoModel) -> Non
     assert rough.dtype == torch.float32
 
 
-@pytest.mark.parametrize("part", ["layout", "shapes"])
-def test_guidance_extrapolates_from_the_graph_without_relations(model: EchoModel, part: str) -> None:
-    noise = torch.randn(3, 8, generator=seeded())
-
-    def run(graph: GraphBatch, guidance: float) -> torch.Tensor:
-        options = {"generator": seeded(), "noise": noise, "steps": 1, "guidance": guidance}
-        if part == "layout":
-            return model.sample_layout(graph, relation_guidance=0.0, **options).position
-        codes: list[torch.Tensor] = []
-        original, model._decoded = model._decoded, lambda x: codes.append(x) or original(x)  # type: ignore[func-returns-value,method-assign]
-        try:
-            model.sample_shapes(graph, boxes(), **options)
-        finally:
-            del model._decoded  # type: ignore[method-assign]
-        return codes[0]
-
-    graph = bedroom().with_triplets(bedroom().triplets[:2])  # no equal furniture, whose codes are averaged
-    told, bare = run(graph, 1.0), run(graph.with_triplets(graph.triplets[:0]), 1.0)
-    assert not torch.allclose(told, bare)
-    torch.testing.assert_close(run(graph, 3.0), bare + 3.0 * (told - bare), rtol=1e-3, atol=1e-4)
-    torch.testing.assert_close(run(graph, 0.0), bare, rtol=1e-4, atol=1e-5)
-
-
 def test_a_batch_gives_what_single_runs_give(model: EchoModel) -> None:
     graphs = [
         bedroom(),
@@ -226,16 +202,16 @@ def test_a_batch_gives_what_single_runs_give(model: EchoModel) -> None:
         GraphBatch.single([3, 4, 5], [[0, 5, 1], [2, 12, 1]], floor=(3.0, 5.0)),
     ]
     packed, noise = GraphBatch.pack(graphs), torch.randn(7, 8, generator=seeded())
-    together = model.sample_layout(packed, generator=seeded(), noise=noise, steps=5, guidance=1.5)
-    shapes = model.sample_shapes(packed, boxes(7), generator=seeded(), noise=noise, guidance=1.5)
+    together = model.sample_layout(packed, generator=seeded(), noise=noise, steps=5)
+    shapes = model.sample_shapes(packed, boxes(7), generator=seeded(), noise=noise)
     start = 0
     for graph in graphs:
         part = slice(start, start + graph.num_nodes)
         own = noise[part]
-        alone = model.sample_layout(graph, generator=seeded(), noise=own, steps=5, guidance=1.5)
+        alone = model.sample_layout(graph, generator=seeded(), noise=own, steps=5)
         for name in ("size", "position", "yaw"):
             torch.testing.assert_close(getattr(alone, name), getattr(together, name)[part], rtol=1e-3, atol=1e-4)
-        grids = model.sample_shapes(graph, boxes(len(own)), generator=seeded(), noise=own, guidance=1.5)
+        grids = model.sample_shapes(graph, boxes(len(own)), generator=seeded(), noise=own)
         torch.testing.assert_close(grids, shapes[part], rtol=1e-3, atol=1e-4)
         start += graph.num_nodes
 

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from echomodel.config import Objective, Sampler
 from echomodel.objectives import add_noise, alpha_sigma, clean_from, expand, output_from, target
-from echomodel.samplers import SAMPLERS, Predict, guided, sample
+from echomodel.samplers import SAMPLERS, Predict, sample
 
 MEAN, SPREAD = 0.7, 0.4
 SWEEP = [(s, o) for s in SAMPLERS for o in ("noise", "velocity", "flow")]
@@ -81,11 +81,6 @@ def test_second_order_needs_fewer_steps() -> None:
     exact = sample("ddim", predict, start(200), 2000, "noise")
     errors = {s: (sample(s, predict, start(200), 40, "noise") - exact).abs().mean().item() for s in ("ddim", "dpm2m")}
     assert errors["dpm2m"] < 0.5 * errors["ddim"]
-
-
-def test_guidance_extrapolates() -> None:
-    predict = guided(lambda x, level: x + 2, lambda x, level: x + 1, 3.0)
-    torch.testing.assert_close(predict(torch.zeros(2, 1), torch.ones(2)), torch.full((2, 1), 4.0))
 
 
 def test_bad_arguments_are_named() -> None:

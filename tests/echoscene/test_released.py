@@ -83,7 +83,7 @@ def test_presets_are_consistent() -> None:
         with torch.device("meta"):
             model = ReleasedModel(config)
     assert sum(p.numel() for p in model.layout_net.parameters()) > 150e6
-    with pytest.raises(ValueError, match=r"config of encoder: unknown field 'colour', allowed: classes"):
+    with pytest.raises(ValueError, match=r"unknown field 'encoder\.colour', allowed: classes"):
         ReleasedConfig.from_json({"encoder": {"colour": 1}})
 
 

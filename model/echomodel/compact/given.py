@@ -33,7 +33,6 @@ class CompactSampling(Sampling):
 
     Arguments:
         sampler: None = the branch's. rules: the rule set that the relations are meant in, `strict` or `sgfront`.
-        guidance: scale of classifier-free guidance towards the relations, 1 = off.
         relation_guidance: strength of the pull of the rules' margins on denoised boxes at every step, 0 = off, None =
             the branch's.
         noise: (N, K) starting noise in place of the generator's, taken as it is (no temperature, no candidates).
@@ -45,7 +44,6 @@ class CompactSampling(Sampling):
 
     sampler: Sampler | None = None
     rules: str = "strict"
-    guidance: float = 1.0
     relation_guidance: float | None = None
     noise: Tensor | None = None
     candidates: int | None = None

@@ -16,7 +16,6 @@ from echomodel.compact.predictors import layout_predictor
 from echomodel.graph import GraphBatch
 from echomodel.guidance import relation_guided
 from echomodel.protocols import GraphEdit
-from echomodel.samplers import Predict, guided
 from echomodel.vocabulary import vocabulary
 
 Latent = Callable[[GraphBatch, GraphEdit | None], Tensor]
@@ -35,19 +34,20 @@ def sample_boxes(model: CompactModel, latent: Latent, graph: GraphBatch, how: Co
     config = model.config.layout
     scale = model.scale(graph.category)
     given = None if how.known is None else how.known.encode(scale)
-    conditional = _predictor(model, graph, latent(graph, how.edit), how.rules)
-    if how.guidance != 1.0:
-        bare = graph.with_triplets(graph.triplets[:0])
-        conditional = guided(conditional, _predictor(model, bare, latent(bare, None), how.rules), how.guidance)
+    if how.rules not in model.config.rules:
+        raise ValueError(f"rules is {how.rules!r}, allowed: {', '.join(model.config.rules)}")
+    rules = torch.full_like(graph.room_type, model.config.rules.index(how.rules))
+    pairs = pairs_of(graph, model.config.predicates)
+    predict = layout_predictor(model, graph, pairs, latent(graph, how.edit), rules)
     strength = config.guidance if how.relation_guidance is None else how.relation_guidance
     if strength:
-        conditional = relation_guided(
-            conditional, graph.triplets, scale,
+        predict = relation_guided(
+            predict, graph.triplets, scale,
             rules=how.rules, strength=strength, rounds=config.guidance_rounds, floor=graph.floor[graph.scene],
             openings=_in_the_way(graph), category=graph.category, placements=graph.placements, scene=graph.scene,
         )  # fmt: skip
     noise = how.start(graph.num_nodes, 8, graph.category.device)
-    vectors = replace(how, known=given).denoised(conditional, noise, config)
+    vectors = replace(how, known=given).denoised(predict, noise, config)
     boxes = Boxes.decode(vectors, scale)
     boxes = Boxes(boxes.size.clamp(0.01, 20.0), boxes.position, boxes.yaw)
     if how.known is None or how.known_mask is None:
@@ -62,11 +62,3 @@ def _in_the_way(graph: GraphBatch) -> Tensor | None:
     floor = [kind.support == "floor" for kind in vocabulary().categories]
     stands = torch.tensor(floor, device=graph.category.device)[graph.category]
     return torch.where(stands[:, None, None], graph.openings[graph.scene], torch.nan)
-
-
-def _predictor(model: CompactModel, graph: GraphBatch, latent: Tensor, rules: str) -> Predict:
-    config = model.config
-    if rules not in config.rules:
-        raise ValueError(f"rules is {rules!r}, allowed: {', '.join(config.rules)}")
-    chosen = torch.full_like(graph.room_type, config.rules.index(rules))
-    return layout_predictor(model, graph, pairs_of(graph, config.predicates), latent, chosen)

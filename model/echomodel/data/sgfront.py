@@ -32,14 +32,13 @@ class Scan:
 
     Arguments:
         name: name of the scan, `MasterBedroom-33296`.
-        instances: n instance numbers. fine: n fine class names. model_ids: n 3D-FUTURE ids, "" where there is none.
+        fine: n fine class names. model_ids: n 3D-FUTURE ids, "" where there is none.
         size: (n, 3) float, extents, metres. position: (n, 3) float, bottom centres relative to `centre`, metres.
         yaw: (n,) float, radians. centre: (3,) float, the scan's `scene_center`.
         triples: (e, 3) int64 [subject, predicate 1..15, object], local indices, in the file's order.
     """
 
     name: str
-    instances: tuple[int, ...]
     fine: tuple[str, ...]
     model_ids: tuple[str, ...]
     size: np.ndarray
@@ -196,7 +195,6 @@ class SGFront:
         values = np.array(params, float)
         return Scan(
             name=name,
-            instances=tuple(int(key) for key in objects),
             fine=tuple(objects.values()),
             model_ids=tuple(models),
             size=values[:, :3],

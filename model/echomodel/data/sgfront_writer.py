@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from echomodel.data.sgfront import FLOOR, IN, SPLITS, small_mapping
-from echomodel.files import whole_file
+from echomodel.files import write_text
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
@@ -51,15 +51,15 @@ def write_sgfront(
         scans.append(_graph(name, entry, edges))
         boxes[name], params = _boxes(entry, shift)
         rows.append(params - np.concatenate([np.zeros(3), shift, [0.0]]))
-    _write(folder / f"relationships_{room}_{split}.json", json.dumps({"scans": scans}))
-    _write(folder / f"obj_boxes_{room}_{split}.json", json.dumps(boxes))
+    write_text(folder / f"relationships_{room}_{split}.json", json.dumps({"scans": scans}))
+    write_text(folder / f"obj_boxes_{room}_{split}.json", json.dumps(boxes))
     mapping = small_mapping()
-    _write(folder / f"classes_{room}.txt", "".join(f"{name}\n" for name in sorted(mapping)))
-    _write(folder / "mapping.json", json.dumps(mapping, indent=1))
+    write_text(folder / f"classes_{room}.txt", "".join(f"{name}\n" for name in sorted(mapping)))
+    write_text(folder / "mapping.json", json.dumps(mapping, indent=1))
     spelled = vocabulary().sgfront_predicates
-    _write(folder / "relationships.txt", "".join(f"{word}\n" for number, word in spelled.items() if number != IN))
+    write_text(folder / "relationships.txt", "".join(f"{word}\n" for number, word in spelled.items() if number != IN))
     if split == "trainval":
-        _write(folder / f"centered_bounds_{room}_trainval.txt", _bounds(np.concatenate(rows)))
+        write_text(folder / f"centered_bounds_{room}_trainval.txt", _bounds(np.concatenate(rows)))
 
 
 def _graph(name: str, room: RoomBoxes, edges: np.ndarray) -> dict:
@@ -106,8 +106,3 @@ def _bounds(rows: np.ndarray) -> str:
     high = np.where(high - low < 1e-3, low + 1e-3, high)
     parts = (low[:3], high[:3], low[3:6], high[3:6], [low[6]], [high[6]])
     return " ".join(f"{value:.6f}" for part in parts for value in part) + "\n"
-
-
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as beside:
-        beside.write_text(text, "utf-8")

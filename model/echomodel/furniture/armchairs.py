@@ -51,15 +51,9 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         inner = w - (2 * arm + 0.02 if frame else 0)
         legs = chair_legs(style, w * 0.96, d * 0.9, seat - 0.12, 0.04 * style.bulk, tie=False)
         pad = cushion((-inner / 2, seat - 0.15, -d * 0.42), (inner / 2, seat, d / 2), style)
-        back = leaning(
-            (-inner / 2, seat - 0.1, -d * 0.42 - 0.06),
-            (inner / 2, h * 0.99, -d * 0.42 + 0.06),
-            style.rake,
-            seat,
-            -d * 0.42,
-            material="fabric",
-            radius=0.05,
-        )
+        z = -d * 0.42
+        one, other = (-inner / 2, seat - 0.1, z - 0.06), (inner / 2, h * 0.99, z + 0.06)
+        back = leaning(one, other, style.rake, seat, z, material="fabric", radius=0.05)
         frame_under = box((-w * 0.47, seat - 0.17, -d * 0.43), (w * 0.47, seat - 0.13, d * 0.45), "wood", 0.006, "rail")
         return [*legs, frame_under, pad, back, *(slim_arms(w, d, seat, h, style, arm) if frame else [])]
     arm = w * (0.13 + 0.06 * style.softness)
@@ -67,15 +61,9 @@ def armchair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     one, other = (-w / 2 + 0.02, foot, -d / 2 + 0.02), (w / 2 - 0.02, seat - 0.12, d / 2 - 0.02)
     parts.append(box(one, other, "fabric", 0.02, "base"))
     parts += upholstered_arms(w, foot, y_arm, d, arm, style)
-    back = leaning(
-        (-w / 2 + arm * 0.5, foot + 0.05, -d / 2),
-        (w / 2 - arm * 0.5, h, -d / 2 + 0.16),
-        style.rake * 0.6,
-        seat,
-        -d / 2 + 0.08,
-        material="fabric",
-        radius=0.03 + 0.04 * style.softness,
-    )
+    one, other = (-w / 2 + arm * 0.5, foot + 0.05, -d / 2), (w / 2 - arm * 0.5, h, -d / 2 + 0.16)
+    soft = 0.03 + 0.04 * style.softness
+    back = leaning(one, other, style.rake * 0.6, seat, -d / 2 + 0.08, material="fabric", radius=soft)
     pad = cushion((-w / 2 + arm, seat - 0.15, -d / 2 + 0.14), (w / 2 - arm, seat, d / 2), style)
     return [*parts, back, pad]
 
@@ -114,15 +102,9 @@ def lounge_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
         tilt, rake = 0.12, 0.2 + style.rake
         parts: list[Solid] = chair_legs(style, w * 0.96, d * 0.86, seat * 0.8, 0.04 * style.bulk, tie=False)
         pad = cushion((-w * 0.43, seat - 0.12, -d * 0.36), (w * 0.43, seat, d * 0.5), style, turn=rotation(x=-tilt))
-        back = leaning(
-            (-w * 0.43, seat - 0.06, -d * 0.3 - 0.05),
-            (w * 0.43, seat + (h - seat) / np.cos(rake), -d * 0.3 + 0.05),
-            rake,
-            seat,
-            -d * 0.3,
-            material="fabric",
-            radius=0.045,
-        )
+        z = -d * 0.3
+        one, other = (-w * 0.43, seat - 0.06, z - 0.05), (w * 0.43, seat + (h - seat) / np.cos(rake), z + 0.05)
+        back = leaning(one, other, rake, seat, z, material="fabric", radius=0.045)
         x, y, t = w * 0.48, seat * 0.8, 0.04 * style.bulk
         rails: list[Solid] = [
             box((s * x - t * (s > 0), y - t, -d * 0.43), (s * x + t * (s < 0), y, d * 0.43), role="rail")

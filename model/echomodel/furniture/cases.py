@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core
@@ -84,29 +86,36 @@ def fronted(size: Size, style: Style, foot: float, rows: int, columns: int, kind
     return parts + front((x0, y0), (x1, y1), z, rows, columns, kind, style, depth_of(size[2], z))
 
 
-def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width: float) -> list[Solid]:
-    """Columns side by side, each doors, drawers or open cells; symmetrical more often than not."""
-    _w, _h, d = size
-    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
-    count = int(np.clip(round((x1 - x0) / column_width), 1, 6))
-    odds = [0.5, 0.3, 0.2] if style.fronts != "open" else [0.35, 0.25, 0.4]
-    kinds = [str(k) for k in choices.stream("pattern").choice(["door", "drawer", "open"], size=count, p=odds)]
-    if choices.chance("symmetry", 0.7):
-        kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
-    xs = np.linspace(x0, x1, count + 1)
-    t = BOARD
+def pattern(choices: Choices, count: int, odds: dict[str, float], symmetry: float) -> list[str]:
+    """What fills each of `count` columns, the words of `odds`; the same from both sides with this probability."""
+    kinds = choices.stream("pattern").choice(list(odds), size=count, p=list(odds.values()))
+    alike = choices.chance("symmetry", symmetry)
+    return [str(kinds[min(i, count - 1 - i) if alike else i]) for i in range(count)]
+
+
+def columns(rect: tuple, d: float, kinds: list[str], style: Style, levels: Iterable[float], rows: int) -> list[Solid]:
+    """Columns side by side in an open case `d` deep: with shelves at `levels`, of rows of drawers, or behind a door."""
+    x0, y0, x1, y1, z = rect
+    xs, t = np.linspace(x0, x1, len(kinds) + 1), BOARD
+    parts: list[Solid] = []
     for i, kind in enumerate(kinds):
         low, high = (float(xs[i]), y0), (float(xs[i + 1]), y1)
         if i:
             parts.append(box((xs[i] - t / 2, y0, -d / 2), (xs[i] + t / 2, y1, z), role="side"))
         if kind == "open":
-            cells = int(np.clip(round((y1 - y0) / 0.32), 1, 8))
-            parts += [
-                box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z), role="shelf")
-                for y in np.linspace(y0, y1, cells + 1)[1:-1]
-            ]
+            parts += [box((low[0], y - t / 2, -d / 2), (high[0], y + t / 2, z), role="shelf") for y in levels]
             continue
-        rows = 1 if kind == "door" else int(np.clip(round((y1 - y0) / 0.22), 1, 8))
-        parts.append(core((low[0], low[1], -d / 2), (high[0], high[1], z)))
-        parts += front(low, high, z, rows, 1, kind, style, depth_of(d, z))
+        parts.append(core((*low, -d / 2), (*high, z)))
+        parts += front(low, high, z, rows if kind == "drawer" else 1, 1, kind, style, depth_of(d, z))
     return parts
+
+
+def mixed(size: Size, style: Style, choices: Choices, foot: float, column_width: float) -> list[Solid]:
+    """Columns side by side, each doors, drawers or open cells; symmetrical more often than not."""
+    parts, rect = carcass(size, style, foot, solid=False)
+    x0, y0, x1, y1, _ = rect
+    count = int(np.clip(round((x1 - x0) / column_width), 1, 6))
+    door, drawer, free = [0.5, 0.3, 0.2] if style.fronts != "open" else [0.35, 0.25, 0.4]
+    kinds = pattern(choices, count, {"door": door, "drawer": drawer, "open": free}, 0.7)
+    cells, rows = (int(np.clip(round((y1 - y0) / each), 1, 8)) for each in (0.32, 0.22))
+    return parts + columns(rect, size[2], kinds, style, np.linspace(y0, y1, cells + 1)[1:-1], rows)

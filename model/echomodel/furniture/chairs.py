@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from echomodel.furniture.backs import back_rest, chair_legs, leaning, seat_of, slim_arms
 from echomodel.furniture.carpentry import Size, base, box, of_role, top
 from echomodel.furniture.choices import Choices
-from echomodel.furniture.solids import Solid, ball, bent, rotation, tube, turned
+from echomodel.furniture.solids import Block, Solid, ball, bent, rotation, tube, turned
 from echomodel.furniture.stools import stool
 from echomodel.furniture.style import Style
 
@@ -170,6 +171,11 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
     parts.append(seat_of(replace(style, softness=max(style.softness, 0.5)), sw, sd, seat, 0.08, d * 0.04))
     rake = 0.1 + style.rake * 0.5
     y0 = seat + 0.08 * style.contrast
+
+    def lean(x: float, low: float, high: float, rear: float, before: float, **look: Any) -> Block:
+        z = -d * 0.4  # of the plane that the back leans from
+        return leaning((-x, low, z + rear), (x, high, z + before), rake, seat, z, **look)
+
     if style.back == "shell":
         parts.append(
             bent(
@@ -189,36 +195,11 @@ def office_chair(size: Size, style: Style, choices: Choices) -> list[Solid]:
             ball(centre, (sw * 0.47, tall / 2, 0.04), "fabric", "back", power=2.6 + 2 * style.contrast, turn=turn)
         )
     elif style.tufting > 0.6:
-        slats = np.linspace(y0, h, 5)
-        parts += [
-            leaning(
-                (-sw * 0.44, a + 0.01, -d * 0.4 - 0.02),
-                (sw * 0.44, b, -d * 0.4 + 0.02),
-                rake,
-                seat,
-                -d * 0.4,
-                material="fabric",
-                radius=0.018,
-            )
-            for a, b in pairwise(slats)
-        ]
-        parts.append(
-            leaning(
-                (-0.03, y0, -d * 0.4 - 0.04), (0.03, h * 0.98, -d * 0.4 - 0.015), rake, seat, -d * 0.4, material="metal"
-            )
-        )
+        for a, b in pairwise(np.linspace(y0, h, 5)):
+            parts.append(lean(sw * 0.44, a + 0.01, b, -0.02, 0.02, material="fabric", radius=0.018))
+        parts.append(lean(0.03, y0, h * 0.98, -0.04, -0.015, material="metal"))
     else:
-        parts.append(
-            leaning(
-                (-sw * 0.46, y0, -d * 0.4 - 0.03),
-                (sw * 0.46, y0 + (h - y0) / np.cos(rake), -d * 0.4 + 0.03),
-                rake,
-                seat,
-                -d * 0.4,
-                material="fabric",
-                radius=0.028,
-            )
-        )
+        parts.append(lean(sw * 0.46, y0, y0 + (h - y0) / np.cos(rake), -0.03, 0.03, material="fabric", radius=0.028))
     rise = y0 + 0.15 - seat  # the bracket ends in the middle of the back, which leans away from it
     rest = [0, y0 + 0.15, -d * 0.4 - rise * np.tan(rake) - 0.012]
     parts.append(tube([[0, seat - 0.05, -d * 0.1], [0, seat - 0.05, -d * 0.43], rest], 0.016, "metal", "stem"))

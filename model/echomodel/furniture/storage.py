@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from echomodel.furniture.carpentry import Size, base, box, core
-from echomodel.furniture.cases import BOARD, carcass, depth_of, foot_height, fronted, mixed, shelves
+from echomodel.furniture.cases import BOARD, carcass, columns, depth_of, foot_height, fronted, mixed, pattern, shelves
 from echomodel.furniture.choices import Choices
 from echomodel.furniture.fronts import case, front, sliding
 from echomodel.furniture.solids import Solid, rotation, turned
@@ -164,25 +164,8 @@ def tv_stand(size: Size, style: Style, choices: Choices) -> list[Solid]:
         parts = mixed(low, style, choices, foot_height(style, 0.45, 0.3), 0.5)
         panel = box((-w / 2, 0.45, -d / 2), (w / 2, h, -d / 2 + 0.03), "accent", 0.0, "back")
         return [*parts, panel, box((-w * 0.4, h * 0.82, -d / 2), (w * 0.4, h * 0.82 + 0.025, 0), role="shelf")]
-    foot = foot_height(style, h, 0.45)
-    parts, (x0, y0, x1, y1, z) = carcass(size, style, foot, solid=False)
+    parts, rect = carcass(size, style, foot_height(style, h, 0.45), solid=False)
     count = int(np.clip(round(w / choices.between("columns", 0.42, 0.62)), 2, 6))
-    kinds = [
-        str(k) for k in choices.stream("pattern").choice(["drawer", "open", "door"], size=count, p=[0.45, 0.35, 0.2])
-    ]
-    if choices.chance("symmetry", 0.75):
-        kinds = [kinds[min(i, count - 1 - i)] for i in range(count)]
-    xs = np.linspace(x0, x1, count + 1)
-    for i, kind in enumerate(kinds):
-        low_corner, high_corner = (float(xs[i]), y0), (float(xs[i + 1]), y1)
-        if i:
-            parts.append(box((xs[i] - 0.01, y0, -d / 2), (xs[i] + 0.01, y1, z), role="side"))
-        if kind == "open":
-            if y1 - y0 > 0.25:
-                middle = (y0 + y1) / 2
-                parts.append(box((xs[i], middle - 0.01, -d / 2), (xs[i + 1], middle + 0.01, z), role="shelf"))
-            continue
-        rows = 2 if kind == "drawer" and y1 - y0 > 0.28 else 1
-        parts.append(core((*low_corner, -d / 2), (*high_corner, z)))
-        parts += front(low_corner, high_corner, z, rows, 1, kind, style, depth_of(d, z))
-    return parts
+    kinds, (_, y0, _, y1, _) = pattern(choices, count, {"drawer": 0.45, "open": 0.35, "door": 0.2}, 0.75), rect
+    middle = [(y0 + y1) / 2] if y1 - y0 > 0.25 else []
+    return parts + columns(rect, d, kinds, style, middle, 1 + (y1 - y0 > 0.28))

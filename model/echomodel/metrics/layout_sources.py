@@ -18,15 +18,15 @@ from echomodel.roomboxes import RoomBoxes
 
 
 def model_layouts(
-    weights: str | Path | None, seed: int, rules: str, steps: int | None, asked: dict[str, float | None]
+    weights: str | Path | None, seed: int, rules: str, steps: int | None, relation_guidance: float | None = None
 ) -> LayoutSource:
-    """Samples with the model; `asked` holds what only compact weights understand."""
+    """Samples with the model; only compact weights understand `relation_guidance`."""
     model = load_model(weights)
     extra: dict[str, Any] = {}
     if isinstance(model, EchoModel):
-        extra = {"rules": rules, **asked}
-    elif asked != {"guidance": 1.0, "relation_guidance": None}:
-        raise ValueError(f"--guidance and --relation-guidance are for compact weights, found: {model.preset}")
+        extra = {"rules": rules, "relation_guidance": relation_guidance}
+    elif relation_guidance is not None:
+        raise ValueError(f"--relation-guidance is for compact weights, found: {model.preset}")
     generator = torch.Generator().manual_seed(seed)
 
     def sample(edited: EditedGraph) -> Boxes:

@@ -7,7 +7,7 @@ and the F-score's threshold is 1/64.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -157,7 +157,7 @@ def set_scores(
 
 
 def reference_points(
-    shapes: ShapeSet, made: Mapping[str, Sequence], rng: np.random.Generator, points: Callable[[np.ndarray], np.ndarray]
+    shapes: ShapeSet, made: Mapping[str, Sized], rng: np.random.Generator, points: Callable[[np.ndarray], np.ndarray]
 ) -> dict[str, np.ndarray]:
     """`points` of the grids of a set, class -> (n, p, 3): as many shapes as were made, where the set has them."""
     found: dict[str, np.ndarray] = {}

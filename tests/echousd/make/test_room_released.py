@@ -80,8 +80,8 @@ def test_scored_like_any_other_model(weights, tmp_path, echousd_command):
     assert 0 <= scores["total"] <= 1
     done = echousd_command(*asked, "--steps", 11)
     assert (done.code, "layout steps is 11, allowed: 1..10" in done.err) == (2, True), done.err
-    done = echousd_command(*asked, "--guidance", 2)
-    assert (done.code, "are for compact weights, found: released" in done.err) == (2, True), done.err
+    done = echousd_command(*asked, "--relation-guidance", 0.2)
+    assert (done.code, "is for compact weights, found: released" in done.err) == (2, True), done.err
 
 
 def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):
