@@ -290,16 +290,16 @@ def mirror_of(w: float, low: float, high: float, d: float, style: Style, choices
     if kind == "round":
         return [box((-0.06, low, z - 0.02), (0.06, low + tall * 0.15, z + 0.02)), *_disc(w, high, tall, z)]
     half = w * choices.between("spread", 0.28, 0.42)
-    foot = box((-0.7 * half, low, z - 0.03), (0.7 * half, low + 0.02, z + 0.03))
+    low -= 0.005  # let into the top: a foot on it would be stood on, as its collider is the top's
     if kind == "panel":
-        return [foot, *_framed(0.0, low + 0.01, high, half, z, 0.0, style)]
+        return _framed(0.0, low, high, half, z, 0.0, style)
     wing = min(0.22, w / 2 - half * 0.6)
     half *= 0.6
     wings = []
     for s in (-1, 1):
         x = s * (half + wing * 0.47)
-        wings += _framed(x, low + 0.02, high - 0.03, wing / 2, z + wing * 0.16, -s * WING, style)
-    return [foot, *_framed(0.0, low + 0.01, high, half, z, 0.0, style), *wings]
+        wings += _framed(x, low, high - 0.03, wing / 2, z + wing * 0.16, -s * WING, style)
+    return [*_framed(0.0, low, high, half, z, 0.0, style), *wings]
 
 
 def _disc(w: float, high: float, tall: float, z: float) -> list[Solid]:

@@ -144,3 +144,16 @@ def test_the_benchmark_weighs_what_a_room_writes(tmp_path):
     weighed = module.on_disk(room.geometry["one"], "dresser")
     files = room.save(tmp_path / "room", preview=False).parent.glob(f"assets/{name}/*")
     assert weighed == pytest.approx(sum(path.stat().st_size for path in files), rel=0.05)
+
+
+def test_nothing_collides_above_the_free_half_of_a_dressing_table():
+    """What stands at the rear of a top does not raise the hull of all of it: small things would stand in that."""
+    size = np.array([1.1, 1.3, 0.45])
+    places = np.array([(x, 3.0, z) for x in (-0.3, 0.0, 0.3) for z in (0.02, 0.12)])
+    for seed in range(8):
+        made = piece("dressing_table", size, seed)
+        met = []
+        for meshes in ([made.mesh], [collider.mesh for collider in made.colliders]):
+            points = [mesh.ray.intersects_location(places, np.full((6, 3), [0, -1.0, 0]))[0] for mesh in meshes]
+            met.append(max(found[:, 1].max() for found in points if len(found)))
+        assert met[1] - met[0] < 0.002, seed
