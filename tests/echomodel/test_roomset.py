@@ -9,7 +9,7 @@ import pytest
 from echomodel.data import roomset
 from echomodel.data.build import build_data
 from echomodel.data.roomset import RoomSet, build_rooms, pack_rooms
-from echomodel.rooms.generator import generate_rooms, untidied
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
 
 
@@ -125,31 +125,6 @@ def test_the_smoke_recipe_makes_rooms_that_refer_to_its_shapes(tmp_path):
     assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.bin")}
     with pytest.raises(ValueError, match="was begun with seed 7"):
         build_data(tmp_path, "smoke", 8)
-
-
-def test_untidy_rooms_are_labelled_as_they_stand(tmp_path):
-    tidy, shaken = build_rooms(tmp_path / "a", 40, 3, 5), build_rooms(tmp_path / "b", 40, 3, 5, untidy=0.5)
-    changed = [not np.array_equal(tidy.room(k).position, shaken.room(k).position) for k in range(40)]
-    assert 10 < sum(changed) < 30
-    assert not np.any(np.array(changed) & shaken.held_out)
-    for number in np.flatnonzero(changed):
-        room = shaken.room(int(number))
-        assert room.categories == tidy.room(int(number)).categories
-        assert np.array_equal(shaken.relations(number), label_relations(room, rules="strict"))
-    with pytest.raises(ValueError, match=r"was begun with untidy 0\.5"):
-        build_rooms(tmp_path / "b", 40, 3, 5)
-
-
-def test_untidy_models_keep_equal_sizes():
-    room = next(r for r in generate_rooms(40, 3) if r.categories.count("dining_chair") > 3)
-    found = [untidied(room, np.random.default_rng(k)) for k in range(20)]
-    chairs = np.flatnonzero(np.array(room.models) == room.models[room.categories.index("dining_chair")])
-    for other in found:
-        assert np.allclose(other.size[chairs] / room.size[chairs], (other.size / room.size)[chairs[0]])
-        assert np.array_equal(np.sort(other.position[:, 1]), np.sort(room.position[:, 1]))
-        assert np.array_equal(other.yaw, room.yaw)
-    assert np.std([other.size[0, 0] for other in found]) > 0.01
-    assert any(np.abs(other.position - room.position).max() > 1.0 for other in found)
 
 
 def test_a_set_of_16_relations_is_still_read(tmp_path, monkeypatch):

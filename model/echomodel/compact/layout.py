@@ -68,7 +68,7 @@ class LayoutDenoiser(nn.Module):
         self.rules = nn.Embedding(len(config.rules), width)
         self.floor = nn.Sequential(nn.Linear(6 + GRID**2, width), nn.SiLU(), nn.Linear(width, width))
         self.opening = nn.Sequential(nn.Linear(PLAN, width), nn.SiLU(), nn.Linear(width, width))
-        self.tidy = nn.Embedding(2, width)
+        self.tidy = nn.Embedding(2, width)  # the weights that ship knew shaken rooms; the second row is for others
         self.latent = nn.Linear(config.latent.width, width)
         self.box = nn.Linear(BOX * (1 + 2 * layout.frequencies), width)
         self.known = nn.Parameter(torch.randn(width) * 0.02)
@@ -93,10 +93,7 @@ class LayoutDenoiser(nn.Module):
             nn.init.zeros_(layer.weight)
             nn.init.zeros_(layer.bias)
 
-    def context(
-        self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale,
-        tidy: Tensor | None = None,
-    ) -> LayoutContext:  # fmt: skip
+    def context(self, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor, scale: BoxScale) -> LayoutContext:
         """Everything that does not depend on the step.
 
         Arguments:
@@ -105,11 +102,10 @@ class LayoutDenoiser(nn.Module):
             latent: (N, latent width), output of the graph manipulator.
             rules: (S,) int64, which of the config's rule sets the relations are meant in.
             scale: what the boxes' numbers stand for, node by node.
-            tidy: (S,) int64, 1 for rooms as one would show them, 0 for rooms in disorder; None = all tidy.
         """
         room = self.room_type(graph.room_type) + self.rules(rules) + self.floor(plan_features(graph.floor))
         openings, there = room_features(graph.openings)
-        room = room + self.tidy(torch.ones_like(rules) if tidy is None else tidy)
+        room = room + self.tidy.weight[1]
         room = room + (self.opening(openings) * there[..., None]).sum(1)
         nodes = self.category(graph.category) + self.latent(latent) + room[graph.scene]
         sides = None if self.room is None else sides_of(graph.floor, graph.openings)[graph.scene]

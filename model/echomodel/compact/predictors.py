@@ -17,7 +17,7 @@ from echomodel.vocabulary import vocabulary
 
 
 def layout_predictor(model: CompactModel, graph: GraphBatch, pairs: Pairs, latent: Tensor, rules: Tensor) -> Predict:
-    """Clean boxes (N, 8) of tidy rooms in noisy ones; arguments as for `LayoutDenoiser.context`."""
+    """Clean boxes (N, 8) in noisy ones; arguments as for `LayoutDenoiser.context`."""
     context = model.layout.context(graph, pairs, latent, rules, model.scale(graph.category))
 
     def predict(x: Tensor, level: Tensor) -> Tensor:

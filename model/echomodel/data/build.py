@@ -15,13 +15,12 @@ from echomodel.rooms.generator import STYLES
 
 @dataclass(frozen=True)
 class DataRecipe:
-    """What a data set holds: `rooms` labelled rooms, shares of them `untidy` and `halls`; all categories in `styles`
+    """What a data set holds: `rooms` labelled rooms, a share of them `halls`; all categories in `styles`
     styles."""
 
     name: str
     rooms: int
     styles: int
-    untidy: float = 0.2
     halls: float = 0.0
 
 
@@ -56,9 +55,7 @@ def build_data(
     def report(part: str) -> StepListener | None:
         return None if progress is None else lambda done, total: progress(part, done, total)
 
-    rooms = build_rooms(
-        folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), untidy=chosen.untidy, halls=chosen.halls
-    )
+    rooms = build_rooms(folder / "rooms", chosen.rooms, seed, chosen.styles, report("rooms"), halls=chosen.halls)
     shapes = build_shapes(folder / "shapes", chosen.styles, seed, report("shapes"))
     note = {"recipe": chosen.name, "seed": seed, "rooms": len(rooms), "shapes": len(shapes), "styles": chosen.styles}
     write_json(folder / "data.json", note)

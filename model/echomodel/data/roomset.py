@@ -22,7 +22,7 @@ from echomodel.files import read_json, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes, read_rooms
-from echomodel.rooms.generator import generate_rooms, untidied
+from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
@@ -31,7 +31,7 @@ MAGIC_OF_16 = b"ECHOROM2"  # earlier sets: 16 bits per pair and rule set
 RULES = ("strict", "sgfront")
 ROOM = np.dtype(
     [("objects", "<u4"), ("corners", "<u4"), ("openings", "<u4"), ("pairs", "<u4"), ("type", "u1"), ("held_out", "u1"),
-     ("untidy", "u1"), ("height", "<f4")]
+     ("shaken", "u1"), ("height", "<f4")]  # rooms of earlier sets were shaken on purpose
 )  # fmt: skip
 OBJECT = np.dtype(
     [("category", "u1"), ("style", "<i2"), ("size", "<f4", 3), ("position", "<f4", 3), ("yaw", "<f4")]
@@ -57,7 +57,6 @@ def build_rooms(
     styles: int,
     progress: StepListener | None = None,
     *,
-    untidy: float = 0.0,
     halls: float = 0.0,
 ) -> RoomSet:
     """Generate and label a set of rooms, shard by shard; the same bytes for the same seed, whenever interrupted.
@@ -66,7 +65,6 @@ def build_rooms(
         directory: folder of the set; shards that are complete there are kept.
         count: number of rooms, at least 1. seed: seed of the world. styles: number of style groups of the shape set.
         progress: called with (rooms done, rooms in all).
-        untidy: share of the rooms to train on that are shaken (see `echomodel.rooms.untidied`), 0 to 1.
         halls: share of large rooms of several zones, 0 to 1.
 
     Raises:
@@ -78,7 +76,7 @@ def build_rooms(
     folder.mkdir(parents=True, exist_ok=True)
     words = [category.name for category in vocabulary().categories]
     plan = {"kind": "generated rooms", "seed": seed, "rooms": count, "styles": styles, "categories": words}
-    plan["untidy"], plan["room_types"] = untidy, [room_type.name for room_type in vocabulary().room_types]
+    plan["room_types"] = [room_type.name for room_type in vocabulary().room_types]
     if halls:
         plan["halls"] = halls
     claim(folder, plan)
@@ -87,28 +85,23 @@ def build_rooms(
         last = min(first + ROOMS_PER_SHARD, count)
         if not path.exists():
             rooms: list[RoomBoxes] = []
-            shaken: list[bool] = []
             for start in range(first, last, 100):
                 drawn = generate_rooms(min(100, last - start), seed, styles=styles, start=start, halls=halls)
-                shaken += [_is_untidied(seed, start + k, untidy) for k in range(len(drawn))]
-                rooms += [_untidied(r, seed, start + k) if shaken[-len(drawn) + k] else r for k, r in enumerate(drawn)]
+                rooms += drawn
                 if progress:
                     progress(start + min(100, last - start), count)
-            write_shard(path, rooms, first, shaken)
+            write_shard(path, rooms, first)
         elif progress:
             progress(last, count)
     write_json(folder / "rooms.json", plan)
     return RoomSet(folder)
 
 
-def write_shard(
-    path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first: int = 0, untidy: Sequence[bool] = ()
-) -> None:
+def write_shard(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], first: int = 0) -> None:
     """Label rooms (by all rule sets) and write them as one shard, complete or not at all; `first` is the number of the
-    first room in its set, `untidy` says which were shaken (none where it is empty). Raises `UnknownWord` for a category
-    or room type that the vocabulary does not hold."""
+    first room in its set. Raises `UnknownWord` for a category or room type that the vocabulary does not hold."""
     path, rooms = Path(path), [_rounded(room) for room in rooms]
-    joined = _tables_of(rooms, [_held_out(first + k) for k in range(len(rooms))], untidy) | {"pairs": _pairs(rooms)}
+    joined = _tables_of(rooms, [_held_out(first + k) for k in range(len(rooms))]) | {"pairs": _pairs(rooms)}
     with whole_file(path) as beside, beside.open("wb") as file:
         file.write(MAGIC + np.array([len(joined[name]) for name, _ in TABLES], "<u8").tobytes())
         for name, _ in TABLES:
@@ -127,7 +120,7 @@ def pack_rooms(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], held_ou
     note = {"kind": "rooms", "seed": 0, **info, "rooms": len(rooms), **names}
     columns: dict[str, np.ndarray] = {"note": np.frombuffer(json.dumps(note).encode(), np.uint8)}
     for name, table in _tables_of(rooms, held_out).items():
-        for field in table.dtype.names or ("",):
+        for field in _packed_fields(table.dtype):
             column = table[field] if field else table
             if column.dtype.kind == "f":
                 column = np.round(column * STEPS.get(field, MILLIMETRES))
@@ -139,6 +132,11 @@ def pack_rooms(path: str | os.PathLike[str], rooms: Sequence[RoomBoxes], held_ou
         np.savez_compressed(file, **columns)  # type: ignore[arg-type]
 
 
+def _packed_fields(dtype: np.dtype) -> list[str]:
+    """The columns of a packed table; "" for a table of plain numbers."""
+    return [field for field in dtype.names or ("",) if field != "shaken"]
+
+
 def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
     """What a packed set says of itself, and its tables without labels; raises ValueError for other files."""
     tables: dict[str, np.ndarray] = {}
@@ -146,7 +144,7 @@ def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
         with np.load(path, allow_pickle=False) as held:
             note = json.loads(held["note"].tobytes())
             for name, dtype in TABLES[:-1]:
-                parts = {field: held[f"{name}.{field}"] for field in dtype.names or ("",)}
+                parts = {field: held[f"{name}.{field}"] for field in _packed_fields(dtype)}
                 tables[name] = table = np.zeros(len(next(iter(parts.values()))), dtype)
                 for field, column in parts.items():
                     into = table[field] if field else table
@@ -157,16 +155,14 @@ def _unpacked(path: Path) -> tuple[dict, dict[str, np.ndarray]]:
         raise ValueError(f"{path}: not a packed set of rooms ({error})") from None
 
 
-def _tables_of(
-    rooms: Sequence[RoomBoxes], held_out: Sequence[bool], untidy: Sequence[bool] = ()
-) -> dict[str, np.ndarray]:
+def _tables_of(rooms: Sequence[RoomBoxes], held_out: Sequence[bool]) -> dict[str, np.ndarray]:
     """The tables of some rooms but for their pairs."""
     words = vocabulary()
     tables: dict[str, list[np.ndarray]] = {name: [] for name, _ in TABLES[:-1]}
     for k, room in enumerate(rooms):
         n = len(room)
         entry = (n, len(room.floor_polygon), len(room.openings), n * n, words.room_type_id(room.room_type),
-                 held_out[k], bool(untidy and untidy[k]), room.height)  # fmt: skip
+                 held_out[k], 0, room.height)  # fmt: skip
         objects = np.zeros(n, OBJECT)
         objects["category"] = [words.category_id(category) for category in room.categories]
         objects["style"] = room.styles or -1
@@ -200,7 +196,7 @@ class RoomSet:
     Arguments:
         directory: folder with `rooms.json` and its shards, or a packed set, which is held in memory.
 
-    Attributes: `held_out`, `untidy` (n,) bool, `counts` (n,) objects per room, `info`, what `rooms.json` says. Raises
+    Attributes: `held_out`, `shaken` (n,) bool, `counts` (n,) objects per room, `info`, what `rooms.json` says. Raises
     ValueError for a folder without a finished set or with a damaged shard.
     """
 
@@ -236,7 +232,7 @@ class RoomSet:
             for name in ("objects", "corners", "openings", "pairs")
         }
         self.held_out = self._table["held_out"].astype(bool)
-        self.untidy = self._table["untidy"].astype(bool)
+        self.shaken = self._table["shaken"].astype(bool)
         self.counts = self._table["objects"].astype(np.int64)
         for tables in packed:
             tables["pairs"][:] = _pairs([self.room(k) for k in range(len(self))])
@@ -277,15 +273,6 @@ class RoomSet:
 
 def _held_out(number: int) -> bool:
     return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
-
-
-def _is_untidied(seed: int, number: int, share: float) -> bool:
-    """With probability `share`; held-out rooms stay tidy."""
-    return not _held_out(number) and np.random.Generator(np.random.PCG64([seed, number, 1])).random() < share
-
-
-def _untidied(room: RoomBoxes, seed: int, number: int) -> RoomBoxes:
-    return untidied(room, np.random.Generator(np.random.PCG64([seed, number, 2])))
 
 
 def _entry(opening: Opening) -> tuple:

@@ -74,7 +74,7 @@ def layout_loss(
     level = draw_levels(batch.graph.num_scenes, generator, clean.device)[batch.graph.scene] * ~known
     noise = normal(clean.shape, generator, clean.device)
     noisy = torch.where(known[:, None], clean, add_noise(clean, noise, level, objective))
-    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale, batch.tidy)
+    context = model.layout.context(batch.graph, batch.pairs, latent, batch.rules, scale)
     outputs = model.layout.drafts(noisy, level, context)
     free, wanted = (~known).float(), target(clean, noise, level, objective)
     errors = [((guess - wanted).square().mean(1) * free).sum() / free.sum().clamp_min(1) for guess in outputs]

@@ -28,7 +28,7 @@ FIRM = 10.0  # a miss counts as log(1 + FIRM * metres)
 
 
 def living_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
-    """Mean over the free boxes of tidy rooms of how far they miss the living rules, weighted by (1 - level)^2.
+    """Mean over the free boxes of how far they miss the living rules, weighted by (1 - level)^2.
 
     Arguments:
         boxes: N predicted boxes; places and headings alone are pulled at. level: (N,). known: (N,) bool.
@@ -37,7 +37,7 @@ def living_loss(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) 
     with torch.no_grad():
         truth = replace(plan, size=batch.boxes.size, position=batch.boxes.position, yaw=batch.boxes.yaw)
         vars(plan)["anchor"] = truth.anchor  # whom each attends is not the network's to choose
-    weight = (1 - level).square() * ~known * (batch.tidy[batch.graph.scene] > 0)
+    weight = (1 - level).square() * ~known
     return living_miss(plan, batch.graph.openings[batch.graph.scene], stands_low(batch.boxes), weight)
 
 
@@ -98,7 +98,7 @@ def living_miss(plan: Plan, openings: Tensor, low: Tensor, weight: Tensor) -> Te
 
 def heading_distance(batch: LayoutBatch, boxes: Boxes, level: Tensor, known: Tensor) -> Tensor:
     """Mean angle to the nearest quarter turn from the true heading, radians, weighted by (1 - level)^2."""
-    weight = (1 - level).square() * ~known * (batch.tidy[batch.graph.scene] > 0)
+    weight = (1 - level).square() * ~known
     turn = 4 * (boxes.yaw - batch.boxes.yaw)
     off = (torch.atan2(turn.sin(), turn.cos()) / 4).abs()
     return (off * weight).sum() / weight.sum().clamp_min(1)

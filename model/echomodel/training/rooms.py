@@ -35,7 +35,7 @@ class PackedRooms:
         style: (N,) int64, style group, -1 = unknown.
         count: (R,) int64 nodes per room.
         room_type: (R,) int64. floor: (R, K, 2), openings: (R, O, ROW) float32, as in `GraphBatch`.
-        rules: (R,) int64, rule set of the labels. tidy: (R,) int64, 0 for rooms that were shaken.
+        rules: (R,) int64, rule set of the labels.
         bits: (P,) int32 over the ordered pairs of each room, bit p set where predicate p holds from first to second.
         allowed: (P,) float32, metres that the two may run into each other, inf where one stands on the other.
     """
@@ -50,7 +50,6 @@ class PackedRooms:
     floor: Tensor
     openings: Tensor
     rules: Tensor
-    tidy: Tensor
     bits: Tensor
     allowed: Tensor
 
@@ -58,9 +57,8 @@ class PackedRooms:
         return len(self.count)
 
     @classmethod
-    def build(cls, rooms: Sequence[RoomBoxes], rules: int, untidy: np.ndarray | None = None) -> PackedRooms:
-        """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled, `untidy` (R,)
-        bool which were shaken."""
+    def build(cls, rooms: Sequence[RoomBoxes], rules: int) -> PackedRooms:
+        """Pack rooms whose `relations` are filled in; `rules` says by which rule set they were labelled."""
         graphs = [GraphBatch.from_room(room) for room in rooms]
         boxes = Boxes.cat([Boxes.from_room(room) for room in rooms])
         return cls(
@@ -74,7 +72,6 @@ class PackedRooms:
             floor=padded([g.floor for g in graphs]),
             openings=padded_rows([g.openings for g in graphs]),
             rules=torch.full((len(rooms),), rules),
-            tidy=torch.ones(len(rooms), dtype=torch.int64) if untidy is None else torch.from_numpy(~untidy).long(),
             bits=torch.cat([_bits(g) for g in graphs]),
             allowed=torch.cat([_allowed(room) for room in rooms]),
         )
@@ -83,9 +80,9 @@ class PackedRooms:
     def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> PackedRooms:
         """One part of a room set, every room once per rule set; the last twentieth where nothing is held out."""
         mask = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
-        numbers = (mask == held).nonzero()[0]
+        numbers = ((mask == held) & ~rooms.shaken).nonzero()[0]
         parts = [
-            cls.build([rooms.room(int(n), rules=name) for n in some], number, rooms.untidy[some])
+            cls.build([rooms.room(int(n), rules=name) for n in some], number)
             for number, name in enumerate(rules)
             for some in np.split(numbers, range(500, len(numbers), 500))
         ]
@@ -105,7 +102,7 @@ class LayoutBatch:
 
     Arguments:
         predicates: (P, 16) bool, what the graph says of each pair before inverses are filled in.
-        rules, tidy: (S,) int64. style: (N,) int64. allowed: (P,) float32, as in `PackedRooms`.
+        rules: (S,) int64. style: (N,) int64. allowed: (P,) float32, as in `PackedRooms`.
         before: relations of the pseudo graph before the edit (EchoScene 3.2, inverse strategy).
         added, touched: (N,) bool, nodes missing from the pseudo graph, and all nodes that the edit meets.
     """
@@ -115,7 +112,6 @@ class LayoutBatch:
     pairs: Pairs
     predicates: Tensor
     rules: Tensor
-    tidy: Tensor
     style: Tensor
     before: Pairs
     added: Tensor
@@ -171,7 +167,7 @@ def make_batch(
         room_type=rooms.room_type[picked], floor=floor, openings=openings,
     )  # fmt: skip
     before, added, touched = _pseudo_edit(pairs, predicates, counts, pair_scene, generator)
-    kinds = {"rules": rooms.rules[picked], "tidy": rooms.tidy[picked], "style": rooms.style[nodes]}
+    kinds = {"rules": rooms.rules[picked], "style": rooms.style[nodes]}
     allowed = rooms.allowed[places]
     return LayoutBatch(
         graph, boxes, pairs, predicates, before=before, added=added, touched=touched, allowed=allowed, **kinds

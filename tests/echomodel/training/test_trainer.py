@@ -68,8 +68,6 @@ def test_living_loss_pulls_what_a_person_would_point_at(packed: PackedRooms) -> 
     assert torch.isfinite(yaw.grad).all()
     assert position.grad.abs().max() > 0
     assert living_loss(batch, shaken, level, ~known_boxes) == 0  # what is given is nobody's fault
-    untidy = replace(batch, tidy=torch.zeros_like(batch.tidy))
-    assert living_loss(untidy, shaken, level, known_boxes) == 0
 
 
 def test_floors_are_mirrored_with_their_rooms() -> None:
