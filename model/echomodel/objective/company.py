@@ -15,6 +15,7 @@ EVEN = 0.16  # metres between a table's middle and the middle of its chairs, one
 PLACE = 0.62  # metres at a table that one who sits there takes: two on a bench
 ODD = 0.6  # share of the table's half side that an odd chair may shift that middle, over the number of chairs
 STAGGERED = 0.12  # metres between a chair's middle and that of the one opposite, where both sides have as many
+LEVEL = 0.12  # metres by which chairs are pushed under their table unlike each other
 AROUND = 0.7  # metres: chairs further from their table are not at it
 CIRCLE = math.radians(100.0)  # a sofa is turned so far at most from the middle of its group
 BEFORE = 0.8  # metres before the larger sofa, where the middle of the group is
@@ -127,6 +128,22 @@ def chairs_opposite(plan: Plan) -> Found:
     least, _ = worst(seats.j[one], margin, seats.i[one], len(plan), FAR)
     who = (least < FAR).nonzero()[:, 0]
     return found(who, least[who], measure=STAGGERED - least[who])
+
+
+def chairs_level(plan: Plan) -> Found:
+    """The chairs of a table are pushed under it alike: neighbours, and those opposite each other."""
+    seats = seats_at(plan)
+    if seats is None:
+        return nobody(plan.size)
+    half_width, half_depth = plan.reach(seats.i, seats.j)
+    out = seats.across.abs() - torch.where(seats.ahead, half_depth, half_width)
+    one, other = (torch.cat(rows) for rows in zip(seats.facing(), seats.beside(), strict=True))
+    chairs = plan.stands("at")[seats.i]
+    keep = chairs[one] & chairs[other]
+    one, other = one[keep], other[keep]
+    least, _ = worst(seats.j[one], LEVEL - (out[one] - out[other]).abs(), seats.i[one], len(plan), FAR)
+    who = (least < FAR).nonzero()[:, 0]
+    return found(who, least[who], measure=LEVEL - least[who])
 
 
 def sofas_in_circle(plan: Plan) -> Found:

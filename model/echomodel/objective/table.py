@@ -144,6 +144,8 @@ LIVING = (
     Term("chairs_opposite", company.chairs_opposite,
          ("the chairs at opposite sides of {a} are staggered by {x:.2f} m",),
          REAL + "95 % of such tables within 0.12 m"),
+    Term("chairs_level", company.chairs_level, ("one chair of {a} is pushed under it by {x:.2f} m more than another",),
+         REAL + "95 % of chairs opposite each other, 92 % of neighbours"),
     Term("sofas_in_circle", company.sofas_in_circle, ("{a} turns its back on the group of {b} ({x:.0f} degrees)",),
          "the same as for armchairs", unit="rad"),
     Term("at_its_side", company.at_its_side, ("{a} stands before {b}, not beside it",),

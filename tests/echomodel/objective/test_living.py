@@ -124,6 +124,11 @@ FAULTS = [
     ),
     (SET.moved("chair_1_1", at=(0.62, 0.7)), ("table", "chairs_opposite"), "sides of table are staggered by 0.2"),
     (SET.moved("lamp", at=(-1.8, 0.1)), ("lamp", "not_alone"), "lamp stands alone in the room"),
+    (
+        SET.moved("chair_1_1", at=(0.4, 0.8)),
+        ("table", "chairs_level"),
+        "one chair of table is pushed under it by 0.20 m",
+    ),
     (SMALL.moved("plant", at=(-1.3, 0.0)), ("plant", "not_alone"), "plant stands alone in the room, 0.55 m from"),
     (SMALL.moved("plant", at=(0.0, 1.18)), ("plant", "not_alone"), "plant stands alone in the room, 0.20 m from"),
     (SMALL.moved("side", at=(-1.7, -1.1)), ("side", "not_alone"), "side stands alone in the room, 0.37 m from"),
