@@ -90,6 +90,7 @@ TOPS: dict[str, tuple[tuple[tuple[str, ...], Places, bool], ...]] = {
     ),
 }
 WARE = ("plates", "bowl", "glass", "cup", "bottles")  # in kitchens
+LINEN = ("folded_throw", "basket", "bottles", "folded_throw")  # in baths and laundries
 BARE = ("coat_rack", "toy_box", "hall")  # tops whose shelves and seats hold no books
 SHELVED = ("book_stack", "vase", "small_plant", "bowl", "photo", "candles", "basket", "clock")
 
@@ -174,7 +175,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
     x0, z0, x1, z1 = surface.bounds
     wide, deep = x1 - x0, z1 - z0
     side = 1.0 if rng.random() < 0.5 else -1.0
-    ware = bool(host.row.task)
+    ware = WARE if host.row.task else LINEN if setting.use == "wet" else ()
     if rng.random() < (0.95 if setting.full else 0.75) and not ware:
         length = wide * rng.uniform(0.35, 0.65)
         for share in (1.0, 0.6, 0.35):
@@ -190,7 +191,7 @@ def _shelf(setting: Setting, host: Standing, surface: Surface) -> None:
                 if setting.full:
                     shelved_books(setting, row, rng)
                 break
-    wanted = [str(kind) for kind in rng.permutation(WARE if ware else SHELVED)]
+    wanted = [str(kind) for kind in rng.permutation(ware or SHELVED)]
     for number in range(2 if setting.full else 1):
         if rng.random() < 0.75:
             places = [(x * side, 0.2) for x in (0.75, 0.4, 0.95, 0.1, -0.2, -0.6)]
