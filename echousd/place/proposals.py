@@ -43,7 +43,7 @@ def proposals(setting: Setting, position: np.ndarray, yaw: np.ndarray, there: np
     elif kind.support == "wall":
         rows += along_walls(setting, i, 0.0)
     else:
-        at_wall = kind.wall or (kind.role == "board" and kind.access > 0)
+        at_wall = _leans(setting, i)
         walls = along_walls(setting, i, loose)
         rows += walls
         if kind.role in ("decor", "light", "storage"):
@@ -92,9 +92,16 @@ def out_of_habit(setting: Setting, i: int) -> float:
         near = min(math.hypot(row[0] - here[0], row[1] - here[1]) for row in rows if row[3] < LOOSE)
         return LOOSE * (near > (HUNG if kind.support == "ceiling" else AT))
     inside = float(depth_inside(setting.floor, here[None])[0])
-    at_wall = kind.wall or (kind.role == "board" and kind.access > 0)
+    at_wall = _leans(setting, i)
     small = kind.role in ("decor", "light") and setting.standing(i)
     return LOOSE * (inside > float(setting.size[i, 2]) / 2 + GAP if at_wall else small and inside > EDGE)
+
+
+def _leans(setting: Setting, i: int) -> bool:
+    """Whether a box belongs with its back to a wall, by its kind or because the graph has it there."""
+    told = any(one.subject == i and one.placement == "against_wall" for one in setting.problem.stated)
+    kind = setting.kinds[i]
+    return told or kind.wall or (kind.role == "board" and kind.access > 0)
 
 
 def slots_at(setting: Setting, i: int, anchor: int) -> list[tuple[float, float, float, float]]:

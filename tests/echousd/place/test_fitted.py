@@ -51,3 +51,15 @@ def test_what_stands_already_stays_and_is_built_around():
     rules = {fault.rule for fault in living_faults(graph, found.boxes)}
     assert "apart" not in rules
     assert found.collisions == ()
+
+
+def test_a_bench_told_to_be_at_a_wall_has_its_back_there():
+    room = {"type": "hallway", "size": [3.6, 1.9]}
+    bench = {"category": "bench", "place": "against_wall"}
+    graph = SceneGraph.from_yaml(json.dumps({"room": room, "objects": {"bench": bench}}))
+    for x, z, yaw in ((0.3, -0.4, 1.6), (-1.2, 0.4, -1.5), (0.0, 0.0, 1.5)):
+        drawn = Boxes(torch.tensor([[1.1, 0.45, 0.35]]), torch.tensor([[x, 0.0, z]]), torch.tensor([yaw]))
+        found = place(graph, drawn).boxes
+        front = np.array([np.sin(found.yaw[0]), np.cos(found.yaw[0])])
+        back = np.asarray(found.position[0, [0, 2]]) - front * float(found.size[0, 2]) / 2
+        assert np.abs(np.abs(back) - (1.8, 0.95)).min() < 0.3
