@@ -125,7 +125,7 @@ class Builder:
         if doors and any(x0 < d[2] and x1 > d[0] and z0 < d[3] and z1 > d[1] for d in self.floor.doors):
             return False
         for w, top in self.floor.windows:
-            if item.size[1] > top and x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1]:
+            if item.y + item.size[1] > top and x0 < w[2] and x1 > w[0] and z0 < w[3] and z1 > w[1]:
                 return False
         if any(overlaps(item, other, play) for other in self.items if other not in ignore):
             return False

@@ -95,7 +95,9 @@ def bathroom(room: Builder) -> None:
                 wide, high, deep = room.size("mirror_cabinet")
                 x, z = made.local(0.0, (deep - made.size[2]) / 2)
                 mounted = vocabulary().category("mirror_cabinet").mounted
-                room.add(Item("mirror_cabinet", (min(wide, made.size[0]), high, deep), x, mounted, z, made.yaw), style)
+                mirror = Item("mirror_cabinet", (min(wide, made.size[0]), high, deep), x, mounted, z, made.yaw)
+                if room.free(mirror):  # else the basin is under a window
+                    room.add(mirror, style)
     for category in WALL_HUNG:
         for _ in range(room.take(category)):
             size, low = room.size(category), vocabulary().category(category).mounted

@@ -202,14 +202,21 @@ def furnish(room: Builder, name: str) -> None:
 
 def _home(first: Callable[[Builder], None], room: Builder) -> None:
     first(room)
+    _radiators(room)
     _rest(room)
     ceiling_lamps(room, [])
+
+
+def _radiators(room: Builder) -> None:
+    for _ in range(room.take("radiator")):
+        room.against_wall("radiator", corner=0.1, gap=0.02)
 
 
 def _childrens_room(room: Builder) -> None:
     beds = [bed for category in BEDS for _ in range(room.take(category)) if (bed := bed_group(room, category))]
     childrens_room(room)
     _wardrobe(room, beds[0] if beds else None)
+    _radiators(room)
     _desks(room)
     _rest(room)
     ceiling_lamps(room, list(beds))

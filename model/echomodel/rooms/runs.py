@@ -20,7 +20,7 @@ from echomodel.rooms.floor import Wall, walls_of
 from echomodel.sizes import usual_range
 from echomodel.vocabulary import Category
 
-TALL = 1.3  # metres: what is higher has no worktop
+WORKTOP, TALL = 0.9, 1.3  # metres: what is higher has no worktop
 BEHIND = 0.005  # metres between the backs and their wall
 CASING = 0.06  # metres that units keep from what blocks a wall
 OVER_SILL = 0.3  # metres that a unit may reach over a window's sill: a tap
@@ -106,7 +106,7 @@ class Site:
 
     def shapes(self, deep: float) -> Iterator[tuple[Leg, ...]]:
         """One wall, two around a corner or opposite each other, three around two corners."""
-        free = [self.free(k, deep, 0.0, 0.9) for k in range(len(self.walls))]
+        free = [self.free(k, deep, 0.0, WORKTOP) for k in range(len(self.walls))]
         for k, parts in enumerate(free):
             yield from ((Leg(k, lo, hi),) for lo, hi in parts)
         for one in range(len(self.walls)):
@@ -284,19 +284,19 @@ class _Planner:
             total += 0.25 * left + 1.0 * (0.01 < left < SLIVER)
             for number, (i, (lo, hi)) in enumerate(zip(part, spans, strict=True)):
                 inner = "meets" in (leg.ends[0] * (number == 0), leg.ends[1] * (number == len(part) - 1))
+                high = self.site.blocked(leg.wall, float(self.size[i, 2]), WORKTOP, float(self.size[i, 1]))
+                if any(lo < b and hi > a for a, b in high):  # a tap, too
+                    return None
                 if self.size[i, 1] > TALL:
-                    tall = self.site.blocked(leg.wall, float(self.size[i, 2]), TALL, float(self.size[i, 1]))
-                    if any(lo < b and hi > a for a, b in tall):
-                        return None
                     total += 2.0 * inner + 1.0 * (count > 1 and i not in (order[0], order[-1]))
                 elif self.task(i) == "cook":
                     sides = [self._top(part, spans, number, side) for side in (-1, 1)]
                     total += 1.5 * (max(sides) < LANDING) + 0.7 * (min(sides) < LANDING / 2) + 1.5 * inner
                     total += 1.0 * (min(lo, length - hi) < LANDING - 1e-6)
-                    glass = self.site.blocked(leg.wall, self.deep, 0.9, 9.0, glass=True)
+                    glass = self.site.blocked(leg.wall, self.deep, WORKTOP, 9.0, glass=True)
                     total += 2.0 * any(lo < b and hi > a for a, b in glass)
                 elif self.task(i) == "wash":
-                    glass = self.site.blocked(leg.wall, self.deep, 0.9, 9.0, glass=True)
+                    glass = self.site.blocked(leg.wall, self.deep, WORKTOP, 9.0, glass=True)
                     total -= 0.4 * any(a < (lo + hi) / 2 < b for a, b in glass)
                 elif self.task(i) == "rinse":
                     total += 0.6 * inner
