@@ -116,8 +116,9 @@ def _read(record: AssetRecord, entry: Entry, found: Measured, full: bool, encode
 
 def _faced(record: AssetRecord, entry: Entry, found: Measured) -> AssetRecord:
     """The record with its front at +Z: as the catalogue says, else by shape where that is clear, else as it lies."""
-    if entry.front_known or not record.category:
-        return replace(record, front_confidence=1.0 if entry.front_known else 0.0)
+    known = entry.turn is not None  # a catalogue that knows how a model stands knows its front
+    if known or not record.category:
+        return replace(record, front_confidence=1.0 if known else 0.0)
     quarters, evidence = front_by_shape(found.turned(np.array(record.turn).reshape(3, 3)), record.category)
     if quarters and evidence >= SURE:
         return replace(record.turned(quarters), front_confidence=round(min(0.5 + evidence, 0.95), 3))

@@ -93,8 +93,6 @@ def edit(
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
-    pins: list[SceneGraph] = []
-    notes: tuple[str, ...] = ()
     own = Retrieved()
     if fresh or moving:
         with timer.stage("load"), one_thread():
@@ -108,10 +106,11 @@ def edit(
             own = given_pieces(graph, shapes, wishes, fresh)
         change = graph_edit(saved.graph, graph)
 
-    def laid_out(sizes: Mapping[str, Vector]) -> list[Boxes]:
-        nonlocal notes
+    def laid_out(sizes: Mapping[str, Vector]) -> tuple[list[Boxes], list[SceneGraph], tuple[str, ...]]:
+        """The boxes of all layouts, the graphs that they are of, and what is to be told of the first."""
         layouts: list[Boxes] = []
-        pins.clear()
+        pins: list[SceneGraph] = []
+        notes: tuple[str, ...] = ()
         for number, before in enumerate(saved.layouts):
             pinned = with_given_sizes(_pinned(graph, saved.graph, before, fresh, moving), sizes)
             if layouts:  # one furniture in all layouts
@@ -126,13 +125,14 @@ def edit(
             )  # fmt: skip
             layouts.append(found)
             notes = (*model_used.unlearned(graph_batch(pinned)), *told) if number == 0 else notes
-        return layouts
+        return layouts, pins, notes
 
-    layouts, models = laid_out(own.sizes), own
+    (layouts, pins, notes), models = laid_out(own.sizes), own
     if fresh and shapes is not None:
         palette = asked.palette or palette_of_room(manifest["seed"])
         models = retrieved(graph, layouts[0], styles, shapes, wishes, asked.seed, own, among=fresh, palette=palette)
-        layouts = laid_out(models.sizes) if models.sizes != own.sizes else layouts
+        if models.sizes != own.sizes:
+            layouts, pins, notes = laid_out(models.sizes)
         notes = (*models.notes, *notes)
     geometry = {name: saved.geometry[name] for name in graph.names if name not in fresh}
     names = {name: saved.assets[name] for name in geometry}

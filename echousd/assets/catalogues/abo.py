@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.catalogues.entry import Catalogue, Entry, Told
 from echousd.assets.catalogues.tables import json_lines, rows_of, words
 from echousd.assets.model_file import ModelFile
 
@@ -16,35 +16,26 @@ TABLE = "3dmodels.csv"
 SAID = ("style", "material", "color", "brand", "pattern")
 
 
-class Abo:
-    """The catalogue of ABO; its models are in metres, +Y up, with their front at +Z."""
-
-    title = "Amazon Berkeley Objects"
-
-    def holds(self, folder: Path) -> bool:
-        """A folder with the table of models somewhere below it."""
-        return folder.is_dir() and _table(folder) is not None
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """Models of the table whose files are there."""
-        table = _table(folder)
-        assert table is not None
-        listed: dict[str, Mapping[str, Any]] = {}
-        for file in sorted(folder.rglob("listings_*.json*")):
-            try:
-                for item in json_lines(file):
-                    listed.setdefault(str(item.get("3dmodel_id", "")), item)
-            except ValueError as error:
-                tell(str(error))
-        found = []
-        models = table.parent.parent / "original"
-        for row in rows_of(table):
-            said, key = Path(row.get("path", "")), row.get("3dmodel_id", "")
-            if key and said.name and not said.is_absolute() and ".." not in said.parts and (models / said).is_file():
-                found.append(_entry(key, models / said, folder, listed.get(key, {})))
-        if not found:
-            tell(f"{table}: none of its models is below {models}")
-        return found
+def entries(folder: Path, tell: Told) -> list[Entry]:
+    """Models of the table whose files are there."""
+    table = _table(folder)
+    assert table is not None
+    listed: dict[str, Mapping[str, Any]] = {}
+    for file in sorted(folder.rglob("listings_*.json*")):
+        try:
+            for item in json_lines(file):
+                listed.setdefault(str(item.get("3dmodel_id", "")), item)
+        except ValueError as error:
+            tell(str(error))
+    found = []
+    models = table.parent.parent / "original"
+    for row in rows_of(table):
+        said, key = Path(row.get("path", "")), row.get("3dmodel_id", "")
+        if key and said.name and not said.is_absolute() and ".." not in said.parts and (models / said).is_file():
+            found.append(_entry(key, models / said, folder, listed.get(key, {})))
+    if not found:
+        tell(f"{table}: none of its models is below {models}")
+    return found
 
 
 def _entry(key: str, path: Path, folder: Path, item: Mapping[str, Any]) -> Entry:
@@ -55,7 +46,6 @@ def _entry(key: str, path: Path, folder: Path, item: Mapping[str, Any]) -> Entry
         words(item.get("item_name")) or key,
         words=tuple(filter(None, (words(item.get("product_type")).replace("_", " ").lower(),))),
         turn=np.eye(3),
-        front_known=True,
         licence="CC-BY-4.0",
         author="Amazon.com (Amazon Berkeley Objects)",
         tags=tags,
@@ -63,7 +53,8 @@ def _entry(key: str, path: Path, folder: Path, item: Mapping[str, Any]) -> Entry
 
 
 def _table(folder: Path) -> Path | None:
+    """The table of models somewhere below a folder."""
     return next((p for p in sorted(folder.rglob(f"{TABLE}*")) if p.name in (TABLE, f"{TABLE}.gz")), None)
 
 
-CATALOGUE = Abo()
+CATALOGUE = Catalogue("Amazon Berkeley Objects", _table, entries)

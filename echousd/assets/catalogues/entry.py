@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -25,8 +24,7 @@ class Entry:
             is none.
         dims: width, height, depth in metres after `turn`, None where only the mesh knows.
         metres: per unit, None where the file or its size says.
-        turn: (3, 3) the model's axes to the object frame, None where nobody says. front_known: whether `turn` tells the
-            front and not only what is up.
+        turn: (3, 3) the model's axes to the object frame, None where nobody says.
         placement: as in `AssetRecord`, "" where the category says it.
     """
 
@@ -40,22 +38,21 @@ class Entry:
     dims: np.ndarray | None = None
     metres: float | None = None
     turn: np.ndarray | None = None
-    front_known: bool = False
     licence: str = ""
     author: str = ""
     placement: str = ""
     tags: tuple[str, ...] = ()
 
 
-class Catalogue(Protocol):
-    """A kind of library; a catalogue is a module of this package with one instance named `CATALOGUE`."""
+@dataclass(frozen=True)
+class Catalogue:
+    """A kind of library; a catalogue is a module of this package with one instance named `CATALOGUE`.
+
+    Arguments:
+        title: its name. holds: of a path, whether it is a library of this kind.
+        entries: of such a path, its models; what cannot be read is told, not raised.
+    """
 
     title: str
-
-    def holds(self, folder: Path) -> bool:
-        """Whether a path is a library of this kind."""
-        ...
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """Its models; what cannot be read is told, not raised."""
-        ...
+    holds: Callable[[Path], object]
+    entries: Callable[[Path, Told], list[Entry]]

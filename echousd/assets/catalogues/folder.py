@@ -6,7 +6,7 @@ import re
 from collections.abc import Set
 from pathlib import Path
 
-from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.catalogues.entry import Catalogue, Entry, Told
 from echousd.assets.licences import licence_beside
 from echousd.assets.model_file import MODELS, ModelFile
 from echousd.stage.apart import fatal
@@ -17,35 +17,27 @@ SHOWN = re.compile(r"([_\-. ](visual|render|mesh|geo|model|base|high|lod_?0))?",
 GENERIC = ("model", "mesh", "scene", "asset", "object", "geo", "geometry", "raw_model", "normalized_model", "untitled")
 
 
-class PlainFolder:
-    """The catalogue of every folder that is no other."""
+def entries(folder: Path, tell: Told) -> list[Entry]:
+    """One entry for each model file; parts that a USD model consists of are left to it."""
+    if folder.is_file():
+        return [_entry(folder, folder.parent)]
+    files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
+    files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
+    parts = parts_of_others(files)
+    beside: dict[Path, set[str]] = {}
+    for file in files:
+        beside.setdefault(file.parent, set()).add(file.stem)
+    files = [file for file in files if not stands_in(file.stem, beside[file.parent])]
+    return [_entry(file, folder) for file in files if file not in parts]
 
-    title = "a folder of models"
 
-    def holds(self, folder: Path) -> bool:
-        """Every folder and model file is one."""
-        return folder.is_dir() or folder.suffix.lower() in MODELS
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """One entry for each model file; parts that a USD model consists of are left to it."""
-        if folder.is_file():
-            return [self._entry(folder, folder.parent)]
-        files = sorted(p for p in folder.rglob("*") if p.suffix.lower() in MODELS and p.is_file())
-        files = [file for file in files if not any(part.startswith(".") for part in file.relative_to(folder).parts)]
-        parts = parts_of_others(files)
-        beside: dict[Path, set[str]] = {}
-        for file in files:
-            beside.setdefault(file.parent, set()).add(file.stem)
-        files = [file for file in files if not stands_in(file.stem, beside[file.parent])]
-        return [self._entry(file, folder) for file in files if file not in parts]
-
-    def _entry(self, file: Path, top: Path) -> Entry:
-        key = file.relative_to(top).as_posix()
-        stem = file.stem if file.stem.lower() not in GENERIC else file.parent.name
-        name = re.sub(r"[_\-.]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem)).strip()
-        licence, author = licence_beside(file.parent, top)
-        group = file.parent.name if file.parent != top else ""
-        return Entry(key, ModelFile(file, top), name, group=group, licence=licence, author=author)
+def _entry(file: Path, top: Path) -> Entry:
+    key = file.relative_to(top).as_posix()
+    stem = file.stem if file.stem.lower() not in GENERIC else file.parent.name
+    name = re.sub(r"[_\-.]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem)).strip()
+    licence, author = licence_beside(file.parent, top)
+    group = file.parent.name if file.parent != top else ""
+    return Entry(key, ModelFile(file, top), name, group=group, licence=licence, author=author)
 
 
 def stands_in(stem: str, others: Set[str]) -> bool:
@@ -77,4 +69,8 @@ def parts_of_others(files: list[Path]) -> set[Path]:
     return found
 
 
-CATALOGUE = PlainFolder()
+def _is_folder(folder: Path) -> bool:
+    return folder.is_dir() or folder.suffix.lower() in MODELS
+
+
+CATALOGUE = Catalogue("a folder of models", _is_folder, entries)

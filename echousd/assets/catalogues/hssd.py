@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.catalogues.entry import Catalogue, Entry, Told
 from echousd.assets.catalogues.tables import rows_of
 from echousd.assets.model_file import ModelFile
 
@@ -14,25 +14,16 @@ HEAD = 4096  # characters of a table that may name its columns
 NAMES = ("main_category", "wnsynsetkey", "main_wnsynsetkey", "category", "super_category")
 
 
-class Hssd:
-    """Folders with a table of the columns `id`, `up` and `front`, and `objects/*/<id>.glb`."""
-
-    title = "HSSD"
-
-    def holds(self, folder: Path) -> bool:
-        """A folder with such a table in it or in `semantics` or `metadata`."""
-        return folder.is_dir() and _table(folder) is not None
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """Models of the table whose files are there; parts of decomposed models are left out."""
-        table = _table(folder)
-        assert table is not None
-        files = {p.stem: p for p in sorted(folder.rglob("*.glb")) if "decomposed" not in p.parts}
-        rows = rows_of(table)
-        found = [_entry(row, files[row["id"]], folder) for row in rows if row.get("id") in files]
-        if len(found) < len(rows):
-            tell(f"{table}: {len(rows) - len(found)} of {len(rows)} objects have no model below {folder}")
-        return found
+def entries(folder: Path, tell: Told) -> list[Entry]:
+    """Models of the table whose files are there; parts of decomposed models are left out."""
+    table = _table(folder)
+    assert table is not None
+    files = {p.stem: p for p in sorted(folder.rglob("*.glb")) if "decomposed" not in p.parts}
+    rows = rows_of(table)
+    found = [_entry(row, files[row["id"]], folder) for row in rows if row.get("id") in files]
+    if len(found) < len(rows):
+        tell(f"{table}: {len(rows) - len(found)} of {len(rows)} objects have no model below {folder}")
+    return found
 
 
 def _entry(row: dict[str, str], path: Path, folder: Path) -> Entry:
@@ -43,7 +34,6 @@ def _entry(row: dict[str, str], path: Path, folder: Path) -> Entry:
         row.get("name") or row["id"],
         words=tuple(filter(None, (row.get(name, "") for name in NAMES))),
         turn=turn,
-        front_known=turn is not None,
         licence="CC-BY-NC-4.0",
         author="HSSD (Habitat Synthetic Scenes Dataset)",
         tags=tuple(filter(None, (row.get("style", ""), row.get("material", "")))),
@@ -69,6 +59,7 @@ def _turn(up: str, front: str) -> np.ndarray | None:
 
 
 def _table(folder: Path) -> Path | None:
+    """A table with the columns `id`, `up` and `front` in a folder or in its `semantics` or `metadata`."""
     for place in (folder, folder / "semantics", folder / "metadata"):
         for path in sorted(place.glob("*.csv")) if place.is_dir() else ():
             if not path.is_file():
@@ -80,4 +71,4 @@ def _table(folder: Path) -> Path | None:
     return None
 
 
-CATALOGUE = Hssd()
+CATALOGUE = Catalogue("HSSD", _table, entries)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.catalogues.entry import Catalogue, Entry, Told
 from echousd.assets.catalogues.tables import json_of, words
 from echousd.assets.model_file import MODELS, ModelFile
 
@@ -16,28 +16,19 @@ TABLES = ("annotations.json", "annotations.json.gz")
 RESTS = (("onCeiling", "ceiling"), ("onWall", "wall"), ("onFloor", "floor"), ("onObject", "surface"))
 
 
-class Objaverse:
-    """Folders with `annotations.json(.gz)` (uid -> what is known) and a model `<uid>.glb` for each."""
-
-    title = "Objaverse with objathor's annotations"
-
-    def holds(self, folder: Path) -> bool:
-        """A folder with the annotations."""
-        return folder.is_dir() and _table(folder) is not None
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """Annotated objects whose models are there; pickled ones are never opened."""
-        table = _table(folder)
-        assert table is not None
-        told = json_of(table)
-        if not isinstance(told, dict):
-            raise ValueError(f"{table}: found a {type(told).__name__}, allowed: uid -> annotation")
-        files = {p.stem: p for p in sorted(folder.rglob("*")) if p.suffix.lower() in MODELS}
-        found = [_entry(uid, files[uid], folder, said) for uid, said in told.items() if uid in files and _is(said)]
-        missing = len(told) - len(found)
-        if missing:
-            tell(f"{table}: {missing} of {len(told)} objects have no model below {folder}")
-        return found
+def entries(folder: Path, tell: Told) -> list[Entry]:
+    """Annotated objects whose models are there; pickled ones are never opened."""
+    table = _table(folder)
+    assert table is not None
+    told = json_of(table)
+    if not isinstance(told, dict):
+        raise ValueError(f"{table}: found a {type(told).__name__}, allowed: uid -> annotation")
+    files = {p.stem: p for p in sorted(folder.rglob("*")) if p.suffix.lower() in MODELS}
+    found = [_entry(uid, files[uid], folder, said) for uid, said in told.items() if uid in files and _is(said)]
+    missing = len(told) - len(found)
+    if missing:
+        tell(f"{table}: {missing} of {len(told)} objects have no model below {folder}")
+    return found
 
 
 def _entry(uid: str, path: Path, folder: Path, said: Mapping[str, Any]) -> Entry:
@@ -60,7 +51,6 @@ def _entry(uid: str, path: Path, folder: Path, said: Mapping[str, Any]) -> Entry
         words=tuple(filter(None, (words(said.get("category")), words(said.get("synset"))))),
         dims=dims,
         turn=turn,
-        front_known=turn is not None,
         licence=str(licence),
         author=str(author),
         placement=placement,
@@ -93,4 +83,4 @@ def _table(folder: Path) -> Path | None:
     return next((folder / name for name in TABLES if (folder / name).is_file()), None)
 
 
-CATALOGUE = Objaverse()
+CATALOGUE = Catalogue("Objaverse with objathor's annotations", _table, entries)

@@ -6,32 +6,23 @@ from pathlib import Path
 
 from echomodel.data.catalogues import MeshEntry, read_library
 from echomodel.data.meshes import class_by_name, reviewed
-from echousd.assets.catalogues.entry import Entry, Told
+from echousd.assets.catalogues.entry import Catalogue, Entry, Told
 from echousd.assets.model_file import ModelFile
 from echousd.assets.naming import fitted
 
 SUFFIX = ".sh3f"
 
 
-class SweetHome:
-    """Libraries of Sweet Home 3D."""
-
-    title = "Sweet Home 3D"
-
-    def holds(self, folder: Path) -> bool:
-        """A library, or a folder with libraries somewhere below it."""
-        return folder.suffix == SUFFIX or (folder.is_dir() and any(p.is_file() for p in folder.rglob(f"*{SUFFIX}")))
-
-    def entries(self, folder: Path, tell: Told) -> list[Entry]:
-        """All models; those that were looked at for this project have the class that was found by eye."""
-        libraries = [folder] if folder.is_file() else sorted(p for p in folder.rglob(f"*{SUFFIX}") if p.is_file())
-        found: list[Entry] = []
-        for library in libraries:
-            try:
-                found += [_entry(entry) for entry in read_library(library)]
-            except (ValueError, KeyError, OSError) as error:
-                tell(f"{library}: {error}")
-        return found
+def entries(folder: Path, tell: Told) -> list[Entry]:
+    """All models; those that were looked at for this project have the class that was found by eye."""
+    libraries = [folder] if folder.is_file() else sorted(p for p in folder.rglob(f"*{SUFFIX}") if p.is_file())
+    found: list[Entry] = []
+    for library in libraries:
+        try:
+            found += [_entry(entry) for entry in read_library(library)]
+        except (ValueError, KeyError, OSError) as error:
+            tell(f"{library}: {error}")
+    return found
 
 
 def _entry(entry: MeshEntry) -> Entry:
@@ -50,10 +41,14 @@ def _entry(entry: MeshEntry) -> Entry:
         decided=True,
         dims=entry.size,
         turn=entry.turn,
-        front_known=True,
         licence=entry.licence,
         author=entry.creator,
     )
 
 
-CATALOGUE = SweetHome()
+def _is_library(folder: Path) -> bool:
+    """A library, or a folder with libraries somewhere below it."""
+    return folder.suffix == SUFFIX or (folder.is_dir() and any(p.is_file() for p in folder.rglob(f"*{SUFFIX}")))
+
+
+CATALOGUE = Catalogue("Sweet Home 3D", _is_library, entries)
