@@ -153,6 +153,9 @@ def _library(file: Path, table: Any) -> Library:
 
 def _fault(record: AssetRecord) -> str:
     """What no index of ours says of a model, "" where nothing is wrong."""
+    for name, value in vars(record).items():
+        if isinstance(value, str) and "\0" in value:
+            return f"{name} is {value!r:.60}, allowed: text without a zero byte"
     for name, count in (("turn", 9), ("low", 3), ("high", 3), ("dims", 3)):
         numbers = getattr(record, name)
         if len(numbers) != count or not all(map(math.isfinite, numbers)):

@@ -153,7 +153,7 @@ def test_bombs_are_not_unpacked(folder, monkeypatch):
         ({"dims": ()}, r"row 1: dims is \(\), allowed: 3 finite numbers"),
         ({"low": (math.nan,) * 3}, "low is .*allowed: 3 finite numbers"),
         ({"turn": (1.0,) * 4}, "turn is .*allowed: 9 finite numbers"),
-        ({"category": "\0"}, "category is .*allowed: a word of the vocabulary"),
+        ({"category": "\0"}, "category is .*allowed: text without a zero byte"),
         ({"low": (None, 1.0, 2.0)}, "row 1 has no low"),
         ({"supports": (None,)}, "row 1 has no supports"),
         ({"tags": (None,)}, "row 1 has no tags"),
@@ -161,6 +161,7 @@ def test_bombs_are_not_unpacked(folder, monkeypatch):
         ({"descriptor": (math.inf,)}, "descriptor is .*allowed: finite numbers"),
         ({"dims": (0.0, -1.0, 1.0)}, "dims is .*allowed: metres above 0"),
         ({"confidence": math.nan}, "confidence is nan, allowed: 0 to 1"),
+        ({"uri": "chair\0.glb"}, r"row 1: uri is 'chair\\x00.glb', allowed: text without a zero byte"),
         ({"front_confidence": 7.0}, "front_confidence is 7.0, allowed: 0 to 1"),
     ],
 )
