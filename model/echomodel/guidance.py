@@ -99,7 +99,7 @@ def relation_guided(
                     pull = pull + torch.log1p(blocked / SLACK).sum()
                 if strangers is not None:  # a room's pieces run into each other where it is nearly drawn
                     plan = replace(strangers, size=boxes.size.detach(), position=boxes.position, yaw=boxes.yaw)
-                    vars(plan).update(couples=strangers.couples)
+                    vars(plan).update(couples=tuple(found.to(free.device) for found in strangers.couples))
                     seen = physics.apart(plan)
                     near = (1 - level[seen.who]).square()
                     pull = pull + (torch.log1p((SLACK - seen.margin).clamp_min(0) / SLACK) * near).sum()
@@ -114,7 +114,8 @@ def relation_guided(
 
 
 def _strangers(boxes: Boxes, category: Tensor, scene: Tensor, triplets: Tensor) -> Plan:
-    """The plan of boxes as they were drawn last, which says what belongs together and may overlap."""
+    """The plan of boxes as they were drawn last, which says what belongs together and may overlap; on the CPU."""
+    boxes = boxes.to("cpu")
     rows, rooms = vocabulary().categories, int(scene.max()) + 1 if len(scene) else 0
     return Plan(
         tuple(rows[number] for number in category.tolist()), boxes.size, boxes.position, boxes.yaw, scene.cpu(),
