@@ -13,7 +13,7 @@ assert run(["generate", "samples/bedroom.usda", "-o", sys.argv[1], "--quiet"]) =
 ours = [m for n, m in sys.modules.items() if n.partition(".")[0] in ("echousd", "echomodel", "echoscene")]
 lines = {m.__name__: len(open(m.__file__, encoding="utf-8").readlines()) for m in ours if m.__file__}
 unused = ("echousd.checks", "echousd.texturing", "echousd.batches", "echousd.exporting", "echousd.settle",
-          "echousd.assets.choose", "echousd.store", "echousd.graph.text", "echomodel.training", "echomodel.metrics",
+          "echousd.assets.choose", "echousd.graph.text", "echomodel.training", "echomodel.metrics",
           "echomodel.furniture.kitchens", "echomodel.rooms.generator", "echoscene", "sklearn", "scipy.stats")
 print(sum(lines.values()), [name for name in unused if name in sys.modules])
 """
