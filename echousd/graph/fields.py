@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
 
-from echomodel.openings import Opening, opening_from_json
+from echomodel.openings import Opening, opening_from_json, signed_area
 from echomodel.vocabulary import vocabulary
 
 MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before it is taken for a mistake
@@ -65,15 +65,15 @@ def _storable(value: str) -> str:
 
 
 def _converted(value: Any) -> float:
-    return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+    try:
+        return math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _real(allowed: str, test: Callable[[float], bool] = math.isfinite) -> Callable[[Any], float]:
     def check(value: Any) -> float:
-        try:
-            number = value if type(value) is float else _converted(value)
-        except OverflowError:
-            number = math.inf
+        number = value if type(value) is float else _converted(value)
         if not (math.isfinite(number) and test(number)):
             raise ValueError(f"found {shown(value)}, allowed: {allowed}")
         return number
@@ -98,10 +98,7 @@ def angle(value: Any) -> float:
             value = float(match[1]) * (1.0 if match[2].startswith("rad") else math.pi / 180) if match else math.nan
         except ValueError:
             value = math.nan
-    try:
-        number = _converted(value)
-    except OverflowError:
-        number = math.inf
+    number = _converted(value)
     if not math.isfinite(number):
         raise ValueError(f"found {shown(told)}, allowed: radians, or degrees as in 90 deg")
     if abs(number) > 2 * math.pi + 1e-6:
@@ -140,7 +137,7 @@ def _corners(value: Any) -> tuple[Point, ...]:
     from shapely import Polygon, is_valid_reason
 
     reason = is_valid_reason(Polygon(corners)) if len(corners) > 3 else "Valid Geometry"
-    flat = len(corners) < 3 or abs(polygon_area(corners)) < 1e-6
+    flat = len(corners) < 3 or abs(signed_area(corners)) < 1e-6
     if flat and not reason.startswith("Self-intersection"):
         raise ValueError(f"{len(corners)} corners that enclose no area, allowed: at least three around the floor")
     if reason != "Valid Geometry":
@@ -275,12 +272,6 @@ def bounding_extents(corners: tuple[Point, ...]) -> Point:
     """(x, z) extents of the bounding box of `corners`, metres."""
     xs, zs = [x for x, _ in corners], [z for _, z in corners]
     return max(xs) - min(xs), max(zs) - min(zs)
-
-
-def polygon_area(corners: tuple[Point, ...]) -> float:
-    """Signed area of a polygon in square metres (shoelace formula)."""
-    pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
-    return sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in pairs) / 2
 
 
 def shown(value: Any, most: int = 60) -> str:

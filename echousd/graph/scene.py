@@ -167,7 +167,18 @@ class SceneGraph(PlainModel):
 
     def to_json(self) -> str:
         """The canonical JSON form: fields in a fixed order, one node and one relation a line, defaults left out."""
-        return graph_to_json(self)
+
+        def line(value: Any) -> str:
+            return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+        def block(entries: list[Any]) -> str:
+            return "[\n    " + ",\n    ".join(map(line, entries)) + "\n  ]" if entries else "[]"
+
+        form = plain(self)
+        return (
+            f'{{\n  "room": {line(form["room"])},\n  "nodes": {block(form["nodes"])},\n'
+            f'  "relations": {block(form["relations"])}\n}}\n'
+        )
 
     @classmethod
     def from_yaml(cls, text: str) -> SceneGraph:
@@ -178,7 +189,17 @@ class SceneGraph(PlainModel):
 
     def to_yaml(self) -> str:
         """The short YAML form that a person would write."""
-        return graph_to_yaml(self)
+        form = plain(self)
+        room = form["room"]
+        lines = [f"room: {_flow(room['type'] if len(room) == 1 else room)}", "objects:"]
+        for node in form["nodes"]:
+            name = node.pop("name")
+            lines.append(f"  {_flow(name)}: {_flow(node['category'] if len(node) == 1 else node)}")
+        if self.relations:
+            lines.append("relations:")
+        for relation, said in zip(self.relations, form["relations"], strict=True):
+            lines.append(f"  - {relation if len(said) == 3 else _flow(said)}")
+        return "\n".join(lines) + "\n"
 
 
 def plain(graph: SceneGraph) -> dict[str, Any]:
@@ -204,37 +225,6 @@ def _lists(value: Any) -> Any:
     if isinstance(value, Opening):
         return stated(value)
     return [_lists(entry) for entry in value] if isinstance(value, tuple) else value
-
-
-def graph_to_json(graph: SceneGraph) -> str:
-    """The canonical JSON form with one node and one relation a line."""
-
-    def line(value: Any) -> str:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
-
-    def block(entries: list[Any]) -> str:
-        return "[\n    " + ",\n    ".join(map(line, entries)) + "\n  ]" if entries else "[]"
-
-    form = plain(graph)
-    return (
-        f'{{\n  "room": {line(form["room"])},\n  "nodes": {block(form["nodes"])},\n'
-        f'  "relations": {block(form["relations"])}\n}}\n'
-    )
-
-
-def graph_to_yaml(graph: SceneGraph) -> str:
-    """The short YAML form with one object and one relation a line."""
-    form = plain(graph)
-    room = form["room"]
-    lines = [f"room: {_flow(room['type'] if len(room) == 1 else room)}", "objects:"]
-    for node in form["nodes"]:
-        name = node.pop("name")
-        lines.append(f"  {_flow(name)}: {_flow(node['category'] if len(node) == 1 else node)}")
-    if graph.relations:
-        lines.append("relations:")
-    for relation, said in zip(graph.relations, form["relations"], strict=True):
-        lines.append(f"  - {relation if len(said) == 3 else _flow(said)}")
-    return "\n".join(lines) + "\n"
 
 
 def _flow(value: Any) -> str:

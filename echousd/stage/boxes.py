@@ -76,9 +76,6 @@ def room_boxes(graph: SceneGraph) -> RoomBoxes:
     )
 
 
-_FIELDS = {usd.CATEGORY: "category", usd.SIZE: "size", usd.POSITION: "position", usd.YAW: "yaw", usd.PLACE: "place"}
-
-
 def read_dressing(stage: Usd.Stage | str | os.PathLike[str], room: str | None = None) -> DressingGraph:
     """The small things that are nodes on a stage or in a file, and their relations; those of the layout that is shown.
 
@@ -100,7 +97,7 @@ def read_dressing(stage: Usd.Stage | str | os.PathLike[str], room: str | None = 
 
 def read_small(prim: Usd.Prim) -> SmallNode:
     """The small thing that a prim states; raises StageError."""
-    fields = {field: value(prim, name) for name, field in _FIELDS.items()}
+    fields = {field: value(prim, name) for name, field in usd.NODE_FIELDS.items() if field in SmallNode.model_fields}
     if fields["category"] is None:
         raise StageError(f"{place(prim)}: no category, allowed: {usd.CATEGORY}, one of those of small things")
     try:

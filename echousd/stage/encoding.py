@@ -66,6 +66,17 @@ BETWEEN = "echo:between"
 LOCKED = "echo:locked"
 SOURCE = "echo:source"
 ASSET = "echo:asset"
+NODE_FIELDS = {
+    CATEGORY: "category",
+    STYLE: "style",
+    SIZE: "size",
+    POSITION: "position",
+    YAW: "yaw",
+    PLACE: "place",
+    LOCKED: "locked",
+    SOURCE: "source",
+    ASSET: "asset",
+}
 DRESSING = "dressing"  # the source of small things, which are no furniture
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
@@ -124,35 +135,21 @@ def opening_values(opening: Opening) -> dict[str, Any]:
 def node_values(node: Node) -> dict[str, Any]:
     """The authored properties of a node's prim, in USD's types, for the `Node` `node`."""
     values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.obstacle or node.category])}
-    if node.style is not None:
-        values[STYLE] = node.style
-    if node.size is not None:
-        values[SIZE] = Gf.Vec3d(*node.size)
-    if node.position is not None:
-        values[POSITION] = Gf.Vec3d(*node.position)
-    if node.yaw is not None:
-        values[YAW] = float(node.yaw)
-    if node.place is not None:
-        values[PLACE] = node.place
-    if node.locked:
-        values[LOCKED] = True
-    if node.source is not None:
-        values[SOURCE] = node.source
-    if node.asset is not None:
-        values[ASSET] = node.asset
-    for key, value in node.attributes.items():
-        values[FREE + key] = value
-    return values
+    values |= _stated(node)
+    return values | {FREE + key: value for key, value in node.attributes.items()}
+
+
+def _stated(node: Node | SmallNode) -> dict[str, Any]:
+    """What a node says of the fields that it has, in USD's types."""
+    given = {name: getattr(node, field, None) for name, field in NODE_FIELDS.items()}
+    said = {name: value for name, value in given.items() if value is not None and value is not False}
+    return {name: Gf.Vec3d(*value) if isinstance(value, tuple) else value for name, value in said.items()}
 
 
 def small_values(node: SmallNode) -> dict[str, Any]:
     """The authored properties of a small thing that is a node, in USD's types."""
     values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SOURCE: DRESSING}
-    for name, given in ((SIZE, node.size), (POSITION, node.position)):
-        if given is not None:
-            values[name] = Gf.Vec3d(*given)
-    values |= {name: given for name, given in ((YAW, node.yaw), (PLACE, node.place)) if given is not None}
-    return values
+    return values | _stated(node)
 
 
 def value_type(name: str, value: Any) -> Sdf.ValueTypeName:

@@ -58,37 +58,27 @@ def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None =
 
 def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     """All rooms of a stage in one traversal; a node or relation belongs to the closest room above it."""
-    graphs: list[Usd.Prim] = []
-    nodes: list[Usd.Prim] = []
-    relations: list[Usd.Prim] = []
-    openings: list[Usd.Prim] = []
-    small: list[Usd.Prim] = []
+    kinds = {usd.GRAPH_TYPE: "graphs", usd.RELATION_TYPE: "relations", usd.OPENING_TYPE: "openings"}
+    found: dict[str, list[Usd.Prim]] = {kind: [] for kind in (*kinds.values(), "nodes", "small")}
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
-        type_name = prim.GetTypeName()
-        if type_name == usd.RELATION_TYPE:
-            relations.append(prim)
-        elif type_name == usd.OPENING_TYPE:
-            openings.append(prim)
-        elif type_name == usd.GRAPH_TYPE:
-            graphs.append(prim)
-        elif usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
-            (small if values.given(prim.GetAttribute(usd.SOURCE)) == usd.DRESSING else nodes).append(prim)
-    rooms = {prims.room.GetPath(): prims for prims in (_room_of(graph) for graph in graphs)}
+        kind = kinds.get(prim.GetTypeName())
+        if kind is None and usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
+            kind = "small" if values.given(prim.GetAttribute(usd.SOURCE)) == usd.DRESSING else "nodes"
+        if kind:
+            found[kind].append(prim)
+    graphs = found.pop("graphs")
+    rooms = {prims.room.GetPath(): prims for prims in map(_room_of, graphs)}
     if len(rooms) < len(graphs):
         raise StageError(f"{source(stage)}: two EchoSceneGraph prims describe the same room, allowed: one per room")
     by_graph = {prims.graph.GetPath(): prims for prims in rooms.values()}
-    members = (
-        (rooms, nodes, "nodes"),
-        (rooms, small, "small"),
-        (by_graph, relations, "relations"),
-        (by_graph, openings, "openings"),
-    )
-    for owners, found, member in members:
+    for member, prims_of_kind in found.items():
+        owners = rooms if member in ("nodes", "small") else by_graph
         known: dict[Sdf.Path, RoomPrims | None] = {}  # by parent, as siblings are many
-        for prim in found:
+        for prim in prims_of_kind:
             parent = prim.GetPath().GetParentPath()
             if parent not in known:
-                known[parent] = _closest(parent, owners)
+                above = (*parent.GetAncestorsRange(), Sdf.Path.absoluteRootPath)
+                known[parent] = next((owners[path] for path in above if path in owners), None)
             owner = known[parent]
             if owner:
                 getattr(owner, member).append(prim)
@@ -114,14 +104,6 @@ def _room_of(graph: Usd.Prim) -> RoomPrims:
     if not room:
         raise StageError(f"{place(graph)}: {usd.ROOM} points to <{targets[0]}>, where no prim is")
     return RoomPrims(room, graph)
-
-
-def _closest(path: Sdf.Path, owners: dict[Sdf.Path, RoomPrims]) -> RoomPrims | None:
-    while path != Sdf.Path.emptyPath:
-        if path in owners:
-            return owners[path]
-        path = path.GetParentPath()
-    return None
 
 
 def place(prim: Usd.Prim) -> str:
@@ -230,8 +212,8 @@ def read_node(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> Node:
     fields: dict[str, Any] = {"title": _title(prim), "between": _between(prim, names)}
     free: dict[str, Any] = {}
     for attribute in prim.GetAuthoredPropertyNames():
-        if attribute in _FIELDS:
-            fields[_FIELDS[attribute]] = value(prim, attribute)
+        if attribute in usd.NODE_FIELDS:
+            fields[usd.NODE_FIELDS[attribute]] = value(prim, attribute)
         elif attribute.startswith(usd.FREE):
             free[attribute.removeprefix(usd.FREE)] = value(prim, attribute)
     fields = {key: found for key, found in fields.items() if found is not None}
@@ -263,19 +245,6 @@ def _between(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> tuple[str, ...] | No
     return None if None in ends else tuple(end for end in ends if end is not None)
 
 
-_FIELDS = {
-    usd.CATEGORY: "category",
-    usd.STYLE: "style",
-    usd.SIZE: "size",
-    usd.POSITION: "position",
-    usd.YAW: "yaw",
-    usd.PLACE: "place",
-    usd.LOCKED: "locked",
-    usd.SOURCE: "source",
-    usd.ASSET: "asset",
-}
-
-
 def value(prim: Usd.Prim, name: str) -> Any:
     """The value of an attribute, None where there is none; raises StageError for a text that cannot be meant."""
     found = values.given(prim.GetAttribute(name))
@@ -290,8 +259,7 @@ def value(prim: Usd.Prim, name: str) -> Any:
 
 def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
     """The relation that a prim states, None where one of its ends has been deactivated; raises StageError."""
-    subject = _end(prim, usd.SUBJECT, names)
-    object_ = _end(prim, usd.OBJECT, names)
+    subject, object_ = (_ends(prim, name, 1, names)[0] for name in (usd.SUBJECT, usd.OBJECT))
     if subject is None or object_ is None:
         return None
     predicate, confidence = value(prim, usd.PREDICATE), value(prim, usd.CONFIDENCE)
@@ -304,10 +272,6 @@ def relation_of(prim: Usd.Prim, names: dict[Sdf.Path, str]) -> Relation | None:
         return Relation(subject, predicate, object_, 1.0 if confidence is None else confidence)
     except GraphError as error:
         raise StageError(f"{place(prim)}: {error}") from None
-
-
-def _end(prim: Usd.Prim, name: str, names: dict[Sdf.Path, str]) -> str | None:
-    return _ends(prim, name, 1, names)[0]
 
 
 def _ends(prim: Usd.Prim, name: str, count: int, names: dict[Sdf.Path, str]) -> list[str | None]:
@@ -324,19 +288,11 @@ def _node_at(prim: Usd.Prim, name: str, target: Sdf.Path, names: dict[Sdf.Path, 
     if node is None and not _deactivated(prim.GetStage(), target):
         there = prim.GetStage().GetPrimAtPath(target)
         why = f"which is no node of this room (no {usd.NODE_API})" if there else "where no prim is"
-        if _unloaded(there or prim.GetStage().GetPrimAtPath(target.GetParentPath())):
+        nearest = there or prim.GetStage().GetPrimAtPath(target.GetParentPath())
+        if nearest and not nearest.IsLoaded():
             why = "whose payload is not loaded"
         raise StageError(f"{place(prim)}: {name} points to <{target}>, {why}, allowed: a node of the room")
     return node
-
-
-def _unloaded(prim: Usd.Prim) -> bool:
-    """Whether the payload of a prim, or of one above it, is not loaded."""
-    while prim and not prim.IsPseudoRoot():
-        if not prim.IsLoaded():
-            return True
-        prim = prim.GetParent()
-    return False
 
 
 def _deactivated(stage: Usd.Stage, path: Sdf.Path) -> bool:

@@ -168,11 +168,9 @@ def _turn_ops(spec: Sdf.PrimSpec) -> None:
     for attribute in [each for each in spec.attributes if each.name.startswith("xformOp:")]:
         kind, value = attribute.name.split(":")[1], attribute.default
         if kind in OPS:
-            to, sign = OPS[kind]
-            name = attribute.name.replace(f"xformOp:{kind}", f"xformOp:{to}", 1)
-            if sign < 0 and value is not None:
+            if OPS[kind][1] < 0 and value is not None:
                 attribute.default = 0.0 - value
-            if name != attribute.name:
+            if (name := _renamed(attribute.name)) != attribute.name:
                 attribute.name = name
         elif value is None:
             continue

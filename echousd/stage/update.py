@@ -110,8 +110,7 @@ class _Editor:
             if old.obstacle == new.obstacle:
                 del values[usd.LABELS]
         free = [a.GetName() for a in prim.GetAuthoredPropertiesInNamespace(usd.FREE[:-1])]
-        names = (usd.STYLE, usd.SIZE, usd.POSITION, usd.YAW, usd.PLACE, usd.LOCKED, usd.SOURCE, usd.ASSET, *free)
-        edits = self.value_edits(prim, values, names)
+        edits = self.value_edits(prim, values, (*[name for name in usd.NODE_FIELDS if name != usd.CATEGORY], *free))
         path, was = prim.GetPath(), Node(new.name, new.category) if old is None else old
         if was.title != new.title:
             edits.append(lambda: self.spec(path).SetInfo("displayName", new.title or ""))

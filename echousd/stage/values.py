@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Tf, Usd, UsdGeom
 
 from echousd.graph import MAX_TEXT
 from echousd.stage.encoding import StageError
+from echousd.stage.files import said, source
 
 LARGEST = 1e9  # in the stage's unit; what is further away is a fault, and its square overflows single precision
 MAX_CORNERS = 50_000_000  # face corners of one mesh
@@ -32,8 +33,7 @@ class MeshArrays:
 
 def owner(attribute: Usd.Attribute) -> str:
     """`file: <prim path>: attribute` for error messages."""
-    layer = attribute.GetStage().GetRootLayer()
-    return f"{layer.realPath or layer.identifier}: <{attribute.GetPrimPath()}>: {attribute.GetName()}"
+    return f"{source(attribute.GetStage())}: <{attribute.GetPrimPath()}>: {attribute.GetName()}"
 
 
 def given(attribute: Usd.Attribute | None) -> Any:
@@ -43,8 +43,6 @@ def given(attribute: Usd.Attribute | None) -> Any:
     try:
         return attribute.Get()
     except Tf.ErrorException as error:
-        from echousd.stage.files import said
-
         raise StageError(f"{owner(attribute)}: a value that cannot be read ({said(error)})") from None
 
 
@@ -66,10 +64,8 @@ def array(attribute: Usd.Attribute | None, width: int = 1, *, whole: bool = Fals
     Raises StageError for other types, NaN, infinities and numbers beyond `LARGEST`.
     """
     found = given(attribute)
-    shape = (-1,) if width == 1 else (-1, width)
-    if found is None or attribute is None:
-        return np.zeros(shape if width == 1 else (0, width), np.int64 if whole else np.float64).reshape(shape)
-    return numbers(found, width, owner(attribute), whole=whole)
+    missing = found is None or attribute is None
+    return numbers([], width, "", whole=whole) if missing else numbers(found, width, owner(attribute), whole=whole)
 
 
 def numbers(found: Any, width: int, where: str, *, whole: bool = False) -> np.ndarray:
@@ -119,10 +115,7 @@ def targets(prim: Usd.Prim, name: str) -> list[Sdf.Path]:
         relationship = prim.GetRelationship(name)
         return list(relationship.GetTargets()) if relationship else []
     except Tf.ErrorException as error:
-        from echousd.stage.files import said
-
-        layer = prim.GetStage().GetRootLayer()
-        where = f"{layer.realPath or layer.identifier}: <{prim.GetPath()}>: {name}"
+        where = f"{source(prim.GetStage())}: <{prim.GetPath()}>: {name}"
         raise StageError(f"{where} is no relationship that can be read ({said(error)})") from None
 
 
@@ -131,9 +124,8 @@ def matrix(found: Gf.Matrix4d, prim: Usd.Prim) -> np.ndarray:
     table = np.array(found, float).T
     if not (np.abs(table) <= LARGEST).all():
         worst = table[~(np.abs(table) <= LARGEST)][0]
-        layer = prim.GetStage().GetRootLayer()
         raise StageError(
-            f"{layer.realPath or layer.identifier}: <{prim.GetPath()}>: its transform holds {worst:g}, "
+            f"{source(prim.GetStage())}: <{prim.GetPath()}>: its transform holds {worst:g}, "
             f"allowed: -{LARGEST:g} to {LARGEST:g}"
         )
     return table
@@ -199,10 +191,6 @@ def reading(stage: Usd.Stage) -> Iterator[None]:
     try:
         yield
     except Tf.ErrorException as error:
-        from echousd.stage.files import said
-
-        layer = stage.GetRootLayer()
-        raise StageError(f"{layer.realPath or layer.identifier}: cannot be read ({said(error)})") from None
+        raise StageError(f"{source(stage)}: cannot be read ({said(error)})") from None
     except UnicodeDecodeError as error:
-        layer = stage.GetRootLayer()
-        raise StageError(f"{layer.realPath or layer.identifier}: a text that is no UTF-8 ({error.reason})") from None
+        raise StageError(f"{source(stage)}: a text that is no UTF-8 ({error.reason})") from None

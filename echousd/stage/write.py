@@ -60,22 +60,21 @@ def author(layer: Sdf.Layer, graph: SceneGraph, room: Sdf.Path) -> None:
         relate(graph_spec, usd.ROOM, scene_path)
         for name, value in usd.room_values(graph.room).items():
             put(graph_spec, name, value)
-        author_openings(graph_spec, graph.room.openings)
-        author_relations(graph_spec, graph.relations, objects_path)
+        if graph.room.openings:
+            scope = define(layer, graph_spec.path.AppendChild(usd.OPENINGS_NAME), "Scope")
+            for opening in graph.room.openings:
+                author_opening(scope, opening)
+        taken: set[str] = set()
+        ends = {name: objects_path.AppendChild(name) for r in graph.relations for name in (r.subject, r.object)}
+        for relation in graph.relations:
+            name = usd.relation_name(*relation.triple, taken)
+            taken.add(name)
+            author_relation(graph_spec, name, relation, ends[relation.subject], ends[relation.object])
         objects = define(layer, room.AppendChild(usd.OBJECTS_NAME), "Xform")
         if not objects.kind:
             objects.kind = "group"
         for node in graph.nodes:
             author_node(objects, node)
-
-
-def author_openings(parent: Sdf.PrimSpec, openings: tuple[Opening, ...]) -> None:
-    """One EchoOpening prim per opening in a scope below `parent`."""
-    if not openings:
-        return
-    scope = define(parent.layer, parent.path.AppendChild(usd.OPENINGS_NAME), "Scope")
-    for opening in openings:
-        author_opening(scope, opening)
 
 
 def author_opening(parent: Sdf.PrimSpec, opening: Opening) -> Sdf.PrimSpec:
@@ -84,16 +83,6 @@ def author_opening(parent: Sdf.PrimSpec, opening: Opening) -> Sdf.PrimSpec:
     for name, value in usd.opening_values(opening).items():
         put(spec, name, value)
     return spec
-
-
-def author_relations(parent: Sdf.PrimSpec, relations: tuple[Relation, ...], objects: Sdf.Path) -> None:
-    """One EchoRelation prim per relation below `parent`, all ends being children of `objects`."""
-    taken: set[str] = set()
-    ends = {name: objects.AppendChild(name) for r in relations for name in (r.subject, r.object)}
-    for relation in relations:
-        name = usd.relation_name(relation.subject, relation.predicate, relation.object, taken)
-        taken.add(name)
-        author_relation(parent, name, relation, ends[relation.subject], ends[relation.object])
 
 
 def author_relation(
