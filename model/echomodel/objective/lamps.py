@@ -11,6 +11,7 @@ from echomodel.objective.plan import Plan
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room
 CLEAR = 0.9  # metres: so far from every table a lamp lights free floor
+CENTRED = 0.15  # metres that a pendant, or the middle of several, may hang off the middle of its table
 TOUCH = 0.04  # metres of air below a lamp on its table
 
 
@@ -33,6 +34,21 @@ def pendant_over(plan: Plan) -> Found:
     central = torch.where(there, MIDDLE - away, -torch.ones_like(away))
     margin = torch.maximum(torch.maximum(best, central), near - CLEAR)
     return found(who, margin, measure=near)
+
+
+def pendant_centred(plan: Plan) -> Found:
+    """What hangs over a table hangs over its middle; several pendants do so together."""
+    lamps = plan.which(lambda kind: kind.look == "pendant_lamp")
+    tables = plan.which(lambda kind: kind.role == "board" and not kind.access) & plan.standing
+    i, j = plan.pairs(lamps, tables)
+    if not len(i):
+        return nobody(plan.size)
+    over = (plan.gap(i, j) < OVER).to(plan.size)
+    away = (plan.position[i] - plan.position[j])[:, [0, 2]] * over[:, None]
+    count = over.new_zeros(len(plan)).index_add(0, j, over)
+    mean = away.new_zeros(len(plan), 2).index_add(0, j, away) / count.clamp_min(1.0)[:, None]
+    off = (mean[j].square().sum(1) + 1e-12).sqrt() * over  # of what hangs elsewhere, nothing
+    return found(i, CENTRED - off, other=j, measure=off)
 
 
 def lamp_on_surface(plan: Plan) -> Found:

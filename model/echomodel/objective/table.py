@@ -114,6 +114,8 @@ LIVING = (
          REAL + "95 % of armchairs are turned less from their group's screen", unit="rad"),
     Term("pendant_over", lamps.pendant_over, ("{a} hangs {x:.2f} m beside a table",),
          REAL + "half hang over the table itself, others over beds, sofas and the middle"),
+    Term("pendant_centred", lamps.pendant_centred, ("{a} hangs {x:.2f} m off the middle of {b}",),
+         "Neufert: the light over a table hangs over its middle", slack=0.1),
     Term("lamp_on_surface", lamps.lamp_on_surface, ("{a} stands on nothing that carries it",), "what the word means"),
     Term("front_free", access.front_free,
          ("the front of {a} has {x:.2f} m before {b}",), "access depths of the vocabulary, 60 % of them", slack=0.1),

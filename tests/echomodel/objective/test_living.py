@@ -114,6 +114,7 @@ FAULTS = [
     (DINING.moved("chair", yaw=0.0), ("chair", "seat_faces"), "chair looks 180 degrees past table"),
     (DINING.moved("chair", at=(0.3, 1.6)), ("chair", "seat_in_reach"), "chair stands 0.90 m from table"),
     (DINING.moved("pendant", at=(1.2, 0.0)), ("pendant", "pendant_over"), "pendant hangs 0.50 m beside a table"),
+    (DINING.moved("pendant", at=(0.4, 0.2)), ("pendant", "pendant_centred"), "pendant hangs 0.45 m off the middle of"),
     (BEDROOM.moved("left", yaw=HALF), ("left", "nightstand_at_head"), "left is turned by 90 degrees against bed"),
     (BEDROOM.moved("wardrobe", at=(0.0, 0.72), yaw=np.pi), ("bed", "bed_foot_free"), "the foot of bed leaves 0.30 m"),
     (SET.moved("chair_1_1", at=(1.05, 0.0), yaw=-HALF), ("table", "chairs_even"), "the chairs of table are uneven"),
