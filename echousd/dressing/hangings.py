@@ -87,10 +87,13 @@ def coats(setting: Setting) -> None:
                 return
 
 
+HUNG_OVER = {"coat_rack": "coats", "towel_radiator": "towel"}  # a row's `top` -> what hangs from it
+
+
 def hung_up(setting: Setting) -> None:
     """Coats side by side on a rack, towels over the rungs of a radiator."""
     for host in setting.of("storage"):
-        kind = {"coat_rack": "coats", "towel_radiator": "towel"}.get(host.row.top, "")
+        kind = HUNG_OVER.get(host.row.top, "")
         if not kind:
             continue
         rng = setting.rng(host.name, kind)

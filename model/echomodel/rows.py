@@ -52,7 +52,7 @@ class Category:
         round: it is as wide as deep. aspect: least and greatest width over height, () = any.
         like: the category that weights take it for which do not know it, whose sizes and furniture it borrows where it
             has none of its own, and whose models in libraries may stand for it, "" = its SG-FRONT class.
-        top: the category whose small things stand on its top (`echousd.dressing.tabletops.TOPS`), "" = none.
+        top: the category whose small things stand on its top or hang from it (`echousd.dressing`), "" = none.
         invites: small things that go with it, of `INVITES`.
         aliases: what people call it.
     """

@@ -15,6 +15,7 @@ from echousd.folder import history
 from echousd.graph import Node, RoomSpec, SceneGraph
 from echousd.make.edit import edit
 from echousd.make.reading import read_room
+from echousd.stage.files import open_stage
 from echousd.store import NESTED, Store, keys_named
 
 
@@ -276,7 +277,7 @@ def test_all_states_of_a_room_open_after_gc(tmp_path, crate, echousd_command):
             step(root)
             assert collected().startswith("removed  0 of ")
             assert read_room(root).graph.names == names
-            assert echousd.stage.open_stage(root)
+            assert open_stage(root)
 
 
 def test_what_an_interrupted_run_has_not_moved_yet_holds(tmp_path, monkeypatch, echousd_command):

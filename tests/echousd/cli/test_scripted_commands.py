@@ -132,7 +132,7 @@ def test_a_picture_for_each_camera(tmp_path, echousd_command):
     names = ["door.png", "window.png", "window_2.png"]
     assert done.out.splitlines() == [str(tmp_path / "shots" / name) for name in names]
     pictures = [Image.open(tmp_path / "shots" / name) for name in names]
-    assert [picture.size for picture in pictures] == [(16, 16)] * 3
+    assert [picture.size for picture in pictures] == [(16, 12)] * 3  # 20.955 x 15.2908 mm, as USD has it
     assert len({picture.tobytes() for picture in pictures}) == 3
 
     done = echousd_command(*words, tmp_path / "x.png")
@@ -155,6 +155,7 @@ WITHOUT_JSON = {
     "from-usd",
     "to-sgfront",
     "from-sgfront",
+    "search",
 }
 
 
