@@ -1,9 +1,8 @@
-"""Distances between sets of shapes: MMD, COV and 1-NNA with Chamfer or earth mover's distance (EchoScene, table 3)."""
+"""Distances between sets of shapes: MMD, COV and 1-NNA with the Chamfer distance (EchoScene, table 3)."""
 
 from __future__ import annotations
 
 import torch
-from scipy.optimize import linear_sum_assignment
 from torch import Tensor
 
 
@@ -33,30 +32,6 @@ def chamfer_matrix(first: Tensor, second: Tensor, chunk: int = 16) -> Tensor:
             parts.append(squares.amin(2).mean(1) + squares.amin(1).mean(1))
         rows.append(torch.cat(parts))
     return torch.stack(rows)
-
-
-def emd_matrix(first: Tensor, second: Tensor) -> Tensor:
-    """Earth mover's distances: mean Euclidean distance of the best one-to-one assignment (the CPU definition).
-
-    Arguments:
-        first: (A, P, 3) float32. second: (B, P, 3) float32, the same number of points.
-
-    Returns:
-        (A, B) float32.
-
-    Raises:
-        ValueError: as `chamfer_matrix`, or the numbers of points differ.
-    """
-    _check(first, second)
-    if first.shape[1] != second.shape[1]:
-        raise ValueError(f"point sets have {first.shape[1]} and {second.shape[1]} points, an assignment needs as many")
-    out = torch.empty(len(first), len(second))
-    for i, one in enumerate(first):
-        for j, other in enumerate(second):
-            cost = (one[:, None] - other[None]).square().sum(-1).sqrt().double().numpy()
-            rows, columns = linear_sum_assignment(cost)
-            out[i, j] = float(cost[rows, columns].mean())
-    return out
 
 
 def coverage(sample_to_reference: Tensor) -> dict[str, float]:
@@ -101,13 +76,11 @@ def one_nearest_neighbour(within_first: Tensor, between: Tensor, within_second: 
     return {"acc": float(right.mean()), "acc_t": float(right[:a].mean()), "acc_f": float(right[a:].mean())}
 
 
-def compare_sets(samples: Tensor, references: Tensor, *, emd: bool = False) -> dict[str, float]:
+def compare_sets(samples: Tensor, references: Tensor) -> dict[str, float]:
     """All of the above for two lists of point sets, samples (S, P, 3) and references (R, P, 3) float32."""
-    distance = emd_matrix if emd else chamfer_matrix
-    between = distance(samples, references)
-    scores = coverage(between)
-    scores.update(one_nearest_neighbour(distance(references, references), between.t(), distance(samples, samples)))
-    return scores
+    between = chamfer_matrix(samples, references)
+    within = chamfer_matrix(references, references), chamfer_matrix(samples, samples)
+    return coverage(between) | one_nearest_neighbour(within[0], between.t(), within[1])
 
 
 def _small(one: Tensor, others: Tensor) -> bool:
