@@ -18,7 +18,6 @@ EXTRAS = (
     ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
     ("ray", ("ray",), "`echousd batch` on a Ray cluster"),
     ("text", ("open_clip",), "text features of the released models"),
-    ("train", ("tensorboard",), "curves in TensorBoard"),
 )
 GPUS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd", "/dev/accel")  # on Linux; without one torch finds the processor alone
 OLDEST = (0, 24, 11)  # the first OpenUSD with UsdSemantics

@@ -136,7 +136,6 @@ class Trainer:
                 self.save()
         if log is not None:
             self.save()
-            log.close()
         return self.step
 
     def _train_step(self, loss_module: nn.Module) -> dict[str, float]:
@@ -236,7 +235,7 @@ def step_generator(seed: int, step: int, rank: int = 0) -> torch.Generator:
 
 
 class RunLog:
-    """Appends numbers per step to `log.csv` in long form (step, name, value), and to TensorBoard.
+    """Appends numbers per step to `log.csv` in long form (step, name, value).
 
     Arguments:
         folder: the run's folder.
@@ -250,26 +249,11 @@ class RunLog:
             writer = csv.writer(handle)
             writer.writerow(["step", "name", "value"])
             writer.writerows(rows)
-        self._board: Any = None
-        try:
-            from torch.utils.tensorboard import SummaryWriter
-
-            self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=start)
-        except ImportError:
-            pass  # TensorBoard is optional, the CSV file has everything
 
     def write(self, step: int, values: dict[str, float]) -> None:
         """Record the values of one step."""
         with self.path.open("a", newline="") as handle:
             csv.writer(handle).writerows([step, name, f"{value:.6g}"] for name, value in values.items())
-        if self._board is not None:
-            for name, value in values.items():
-                self._board.add_scalar(name, value, step)
-
-    def close(self) -> None:
-        """Flush TensorBoard."""
-        if self._board is not None:
-            self._board.close()
 
 
 def read_log(path: Path) -> list[tuple[int, str, float]]:
