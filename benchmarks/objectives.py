@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=1200)
     parser.add_argument("--objectives", default="noise,velocity,flow")
     parser.add_argument("--sampling", default="5,10,20,50")
-    parser.add_argument("--samplers", default="ddim,dpm2m,ancestral")
+    parser.add_argument("--samplers", default="ddim,ancestral")
     parser.add_argument("--rooms", type=int, default=96)
     parser.add_argument("-o", "--out", type=Path, default=Path("runs/objectives"))
     options = parser.parse_args()

@@ -11,11 +11,11 @@ from echomodel.vocabulary import vocabulary
 
 Objective = Literal["noise", "velocity", "flow"]
 Prediction = Literal["output", "sample"]
-Sampler = Literal["ddim", "ancestral", "dpm2m"]
+Sampler = Literal["ddim", "ancestral"]
 DEPTHS = frozenset({"layers", "echo_layers", "blocks", "drafts", "voices"})  # each of them costs tensors
 RANGES = {  # of what costs no tensors, but time
     "steps": (1, 1000), "candidates": (1, 64), "guidance_rounds": (0, 64), "guidance": (0, 100),
-    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "levels": (0, 1024), "patch": (1, 64),
+    "temperature": (0, 10), "heads": (1, 64), "frequencies": (0, 16), "levels": (0, 0), "patch": (1, 64),
 }  # fmt: skip
 C = TypeVar("C")
 
@@ -76,14 +76,13 @@ class AutoencoderConfig:
         channels: channels of the latent.
         width: channels of the refining convolutions of the decoder.
         blocks: residual convolution blocks of the decoder.
-        levels: levels of the finite scalar quantisation per channel, 0 = continuous latent.
     """
 
     patch: int = 4
     channels: int = 6
     width: int = 64
     blocks: int = 2
-    levels: int = 0
+    GONE: ClassVar = ("levels",)  # files of before name it: 0, latents that are not rounded
 
 
 @dataclass(frozen=True)

@@ -48,28 +48,9 @@ def ancestral(objective: Objective, generator: Randomness | None = None) -> Step
     return step
 
 
-def dpm2m(objective: Objective, generator: Randomness | None = None) -> Step:
-    """DPM-Solver++(2M) (Lu et al. 2022, Algorithm 2), first order in the first and the last step."""
-    last: list[tuple[Tensor, float]] = []
-
-    def step(x: Tensor, clean: Tensor, start: float, end: float) -> Tensor:
-        (a, s), (b, r) = _strengths(start, objective), _strengths(end, objective)
-        shrink = a * r / (b * s)  # exp(-h), h the step in log signal-to-noise ratio
-        h = -math.log(shrink) if shrink > 0 else math.inf
-        direction = clean
-        if last and math.isfinite(h) and math.isfinite(last[0][1]):
-            weight = h / (2 * last[0][1])
-            direction = (1 + weight) * clean - weight * last[0][0]
-        last[:] = [(clean, h)]
-        return (r / s) * x + b * (1 - shrink) * direction
-
-    return step
-
-
 SAMPLERS: dict[Sampler, Callable[[Objective, Randomness | None], Step]] = {
     "ddim": ddim,
     "ancestral": ancestral,
-    "dpm2m": dpm2m,
 }
 
 

@@ -76,15 +76,8 @@ def test_targets_and_clean_samples_are_inverse(objective: Objective) -> None:
     torch.testing.assert_close(output_from(clean, noisy, level, objective), output)
 
 
-def test_second_order_needs_fewer_steps() -> None:
-    predict = gaussian_denoiser("noise")
-    exact = sample("ddim", predict, start(200), 2000, "noise")
-    errors = {s: (sample(s, predict, start(200), 40, "noise") - exact).abs().mean().item() for s in ("ddim", "dpm2m")}
-    assert errors["dpm2m"] < 0.5 * errors["ddim"]
-
-
 def test_bad_arguments_are_named() -> None:
-    with pytest.raises(ValueError, match="sampler is 'heun', allowed: ddim, ancestral, dpm2m"):
+    with pytest.raises(ValueError, match="sampler is 'heun', allowed: ddim, ancestral"):
         sample("heun", gaussian_denoiser("flow"), start(4), 5, "flow")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="steps is 0, at least 1"):
         sample("ddim", gaussian_denoiser("flow"), start(4), 0, "flow")

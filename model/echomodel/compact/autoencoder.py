@@ -15,14 +15,13 @@ class Autoencoder(nn.Module):
 
     The encoder is a PCA of patches, fitted once by `initialise` and fixed: the decoder can be trained further without
     spoiling a denoiser trained on its latents. The decoder is the PCA's inverse plus residual convolutions over the
-    latent grid, which see the neighbouring patches. The latent is continuous, or rounded to `levels` values per channel
-    (finite scalar quantisation, Mentzer et al. 2023).
+    latent grid, which see the neighbouring patches.
     """
 
     def __init__(self, config: CompactConfig) -> None:
         super().__init__()
         settings = config.autoencoder
-        self.patch, self.levels, self.channels = settings.patch, settings.levels, settings.channels
+        self.patch, self.channels = settings.patch, settings.channels
         voxels = self.patch**3
         self.register_buffer("basis", torch.zeros(settings.channels, voxels))
         self.register_buffer("offset", torch.zeros(settings.channels))
@@ -54,23 +53,13 @@ class Autoencoder(nn.Module):
     def encode(self, grids: Tensor) -> Tensor:
         """Latents of grids: (N, X, Y, Z) -> (N, C, X/p, Y/p, Z/p); any multiples of the patch."""
         patches = to_patches(grids, self.patch)
-        latent = nn.functional.conv3d(patches, self.basis[:, :, None, None, None], self.offset)
-        return self.quantise(latent)
+        return nn.functional.conv3d(patches, self.basis[:, :, None, None, None], self.offset)
 
     def decode(self, latent: Tensor) -> Tensor:
         """Grids of latents: (N, C, G, G, G) -> (N, 64, 64, 64) in [-1, 1]."""
-        latent = self.quantise(latent)
         linear = self.decode_patch
         patches = nn.functional.conv3d(latent, linear.weight[:, :, None, None, None], linear.bias)
         return from_patches(patches + self.synthesis(latent), self.patch).clamp(-1, 1)
-
-    def quantise(self, latent: Tensor) -> Tensor:
-        """The latent itself, or rounded to `levels` values in [-2, 2] per channel."""
-        if not self.levels:
-            return latent
-        step = 4 / (self.levels - 1)
-        bounded = 2 * torch.tanh(latent / 2)
-        return bounded + ((bounded / step).round() * step - bounded).detach()
 
     def forward(self, grids: Tensor, noise: Tensor | float = 0.0) -> Tensor:
         """Reconstruction of grids, with noise added to the latent in between."""

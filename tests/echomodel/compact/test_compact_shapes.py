@@ -63,19 +63,6 @@ def test_untrained_autoencoder_is_the_pca_of_patches() -> None:
     assert latent.square().mean().item() == pytest.approx(1.0, rel=1e-3)
 
 
-def test_quantised_latents_take_few_values() -> None:
-    config = from_dict(CompactConfig, {"autoencoder": {"levels": 5}})
-    coder = Autoencoder(config)
-    coder.initialise(spheres())
-    values = torch.unique(coder.encode(spheres()).round(decimals=4))
-    assert set(values.tolist()) <= {-2.0, -1.0, 0.0, 1.0, 2.0}
-    assert len(values) > 2
-    free = torch.randn(1, 6, 4, 4, 4, requires_grad=True)
-    coder.quantise(free).sum().backward()
-    assert free.grad is not None
-    assert free.grad.abs().min() > 0
-
-
 def test_codes_are_the_principal_components_of_latents() -> None:
     """Latents that vary in few directions come back exactly; codes have unit power and fall in spread."""
     model = small_model()
