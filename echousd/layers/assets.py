@@ -34,6 +34,13 @@ def without_stage(stage: Usd.Stage, finish: Callable[[Sdf.Layer], None]) -> Sdf.
     return layer
 
 
+def refer(layer: Sdf.Layer, above: str, references: Mapping[str, str]) -> None:
+    """Have the prims `references` below a path each refer to the asset that it names."""
+    for name, asset in references.items():
+        prim = layer.GetPrimAtPath(f"{above}/{name}")
+        prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
+
+
 def as_asked(layer: Sdf.Layer, look: Look, theirs: Callable[[str], bool] = lambda path: False) -> Sdf.Layer:
     """A layer of ours with the unit, the up axis and the room's path that are asked for, changed in place.
 

@@ -27,6 +27,7 @@ from echousd.shapes.styles import ROOM_STYLE
 from echousd.shapes.surface import surface
 from echousd.stage.encoding import relation_name
 from echousd.stage.files import layer_bytes, new_stage
+from echousd.stage.layouts import authored_layouts
 from echousd.stage.paths import (
     OBJECTS,
     SHELL,
@@ -161,10 +162,10 @@ def geometry_layer(room: RoomData) -> Sdf.Layer:
         Usd.ModelAPI(UsdGeom.Xform.Define(stage, path)).SetKind(Kind.Tokens.group)
     for node in room.graph.nodes:
         prim = UsdGeom.Xform.Define(stage, f"{OBJECTS}/{node.name}").GetPrim()
-        _label(prim, "ade20k", ade20k(word_of(node)))
+        UsdSemantics.LabelsAPI.Apply(prim, "ade20k").CreateLabelsAttr([ade20k(word_of(node))])
         if node.name in instanced(room):
             prim.SetInstanceable(True)
-    return assets.without_stage(stage, lambda layer: _refer(layer, room.assets))
+    return assets.without_stage(stage, lambda layer: assets.refer(layer, OBJECTS, room.assets))
 
 
 def instanced(room: RoomData) -> frozenset[str]:
@@ -185,8 +186,9 @@ def layout_layer(room: RoomData) -> Sdf.Layer:
     """`layers/layout.usda`: overs with xformOps, in a variant set `layout` where there are several layouts."""
     stage = _room_stage(room, "layout")
     UsdGeom.SetStageUpAxis(stage, room.options.up_axis)  # its places are so already
-    stage.OverridePrim("/Room")
-    place_layouts(stage, room)
+    top = stage.OverridePrim("/Room")
+    for number in authored_layouts(top, len(room.layouts or (room.boxes,)), "layout_0"):
+        _place(stage, room, number)
     return stage.GetRootLayer()
 
 
@@ -287,12 +289,6 @@ def root_layer(room: RoomData, hung: Furniture | None = None) -> Sdf.Layer:
     return assets.without_stage(stage, lambda layer: setattr(layer, "subLayerPaths", paths))
 
 
-def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
-    for name, asset in references.items():
-        prim = layer.GetPrimAtPath(f"{OBJECTS}/{name}")
-        prim.referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))
-
-
 def _asset(room: RoomData, name: str, user: str, shelf: Shelf | None, folder: Path) -> Asset:
     geometry = room.geometry[user]
     if geometry.original is not None:
@@ -374,29 +370,9 @@ def _slots(made: Mapping[str, Asset]) -> list[str]:
     return sorted({slot for asset in made.values() for slots in asset.slots.values() for slot in slots})
 
 
-def _label(prim: Usd.Prim, taxonomy: str, word: str) -> None:
-    UsdSemantics.LabelsAPI.Apply(prim, taxonomy).CreateLabelsAttr([word])
-
-
 def _room_stage(room: RoomData, layer: str) -> Usd.Stage:
     name = f"{room.name}_{layer}" if layer else room.name
     return new_stage("Room", ".usda", layer_data(room, name))
-
-
-def place_layouts(stage: Usd.Stage, room: RoomData) -> None:
-    """Author the objects' xformOps, as variants `layout_0` ... where there are several."""
-    layouts = room.layouts or (room.boxes,)
-    if len(layouts) == 1:
-        _place(stage, room, 0)
-        return
-    variants = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
-    for number in range(len(layouts)):
-        name = f"layout_{number}"
-        variants.AddVariant(name)
-        variants.SetVariantSelection(name)
-        with variants.GetVariantEditContext():
-            _place(stage, room, number)
-    variants.SetVariantSelection("layout_0")
 
 
 def _place(stage: Usd.Stage, room: RoomData, layout: int) -> None:

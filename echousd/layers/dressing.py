@@ -15,6 +15,7 @@ from echousd.dressing.setting import Thing
 from echousd.layers import assets
 from echousd.layers.materials import LOOKS
 from echousd.stage.files import new_stage
+from echousd.stage.layouts import authored_layouts
 from echousd.stage.paths import DRESSING, class_path
 
 
@@ -42,27 +43,16 @@ def dressing_layer(
     several = len(dressing.layouts) > 1
     users = Counter(dressing.assets[name] for things in dressing.layouts for name in things)
     alike = frozenset(asset for asset, count in users.items() if instances and count > len(dressing.layouts))
-    references: dict[str, str] = {}
-    for number, things in enumerate(dressing.layouts):
-        if not several:
-            _write(stage, things, dressing, slots, looks, alike)
-            continue
-        variants = room.GetVariantSets().AddVariantSet("layout")
-        variants.AddVariant(f"layout_{number}")
-        variants.SetVariantSelection(f"layout_{number}")
-        with variants.GetVariantEditContext():
-            _write(stage, things, dressing, slots, looks, alike)
+    for number in authored_layouts(room, len(dressing.layouts)):
+        _write(stage, dressing.layouts[number], dressing, slots, looks, alike)
     for asset in sorted(alike):
         _bind(stage, class_path(asset), slots[asset], looks)
         assets.as_class(stage, asset)
-    for number, things in enumerate(dressing.layouts):
-        above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
-        references |= {f"{above}/{name}": dressing.assets[name] for name in things}
-    if several:  # the layer of the layout says which one is seen
-        room.GetVariantSets().GetVariantSet("layout").ClearVariantSelection()
 
     def finish(layer: Sdf.Layer) -> None:
-        _refer(layer, references)
+        for number, things in enumerate(dressing.layouts):
+            above = f"/Room{{layout=layout_{number}}}Dressing" if several else DRESSING
+            assets.refer(layer, above, {name: dressing.assets[name] for name in things})
         for number, graph in enumerate(dressing.graphs):
             write_nodes(layer, graph, Sdf.Path(f"/Room{{layout=layout_{number}}}" if several else "/Room"), taken)
 
@@ -98,8 +88,3 @@ def _bind(stage: Usd.Stage, root: str, slots: Mapping[str, Sequence[str]], looks
         UsdShade.MaterialBindingAPI.Apply(over)
         target = Sdf.Path(f"{LOOKS}/{looks[slot]}")  # another layer defines it
         over.CreateRelationship(UsdShade.Tokens.materialBinding, custom=False).SetTargets([target])
-
-
-def _refer(layer: Sdf.Layer, references: Mapping[str, str]) -> None:
-    for path, asset in references.items():
-        layer.GetPrimAtPath(path).referenceList.prependedItems.append(Sdf.Reference(f"../assets/{asset}/{asset}.usda"))

@@ -12,13 +12,13 @@ import numpy as np
 import shapely
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
-from echomodel.boxes import Boxes
 from echomodel.openings import inward_normal, segment
 from echomodel.vocabulary import vocabulary
 from echousd.draw.views import view_matrix
 from echousd.layers.cameras import Volume
 from echousd.room import RoomData
 from echousd.shapes.finishes import baking
+from echousd.stage.layouts import authored, authored_layouts
 
 LIGHTS = "/Room/Lights"
 NITS = 30.0  # cd/m² of a surface that comes to 1 in the picture: a camera in a lit room
@@ -74,20 +74,15 @@ def write_lights(stage: Usd.Stage, room: RoomData, volume: Volume) -> None:
     full |= lamps
     area = shapely.Polygon(room.floor).area
     lumens = sum(intensity for _, intensity in lamps.values()) * np.pi * NITS / area
-    times = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("light")
-    for name, shares in TIMES.items():
-        times.AddVariant(name)
-        times.SetVariantSelection(name)
+    for name in authored(stage.GetPrimAtPath("/Room"), "light", TIMES, "day"):
         exposed, radiance = 1.0, share * min(20.0, 1.6 * room.height**2 * np.pi * NITS / flux)
         if name in LIT:
             exposed = min(1.0, BRIGHT / max(lumens, 1.0))
             radiance = max(LIT[name] - lumens, FILL) * area / flux
-        with times.GetVariantEditContext():
-            UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
-            for path, (column, intensity) in full.items():
-                light = UsdLux.LightAPI(stage.OverridePrim(path))
-                light.CreateIntensityAttr(round(intensity * shares[column] * exposed, 4))
-    times.SetVariantSelection("day")
+        UsdLux.LightAPI(stage.OverridePrim(panel)).CreateIntensityAttr(round(radiance * exposed, 4))
+        for path, (column, intensity) in full.items():
+            light = UsdLux.LightAPI(stage.OverridePrim(path))
+            light.CreateIntensityAttr(round(intensity * TIMES[name][column] * exposed, 4))
 
 
 def image_files(room: RoomData) -> dict[str, bytes]:
@@ -143,24 +138,13 @@ def _lamps(stage: Usd.Stage, room: RoomData) -> Intensities:
         bulb.CreateColorAttr(UsdLux.BlackbodyTemperatureAsRgb(BULBS))
         bulb.AddTranslateOp()
         full[bulb.GetPath()] = (2, LUMENS[row.support] / (np.pi * NITS))
-    if len(room.layouts) < 2:
-        _hang_bulbs(stage, room, room.boxes)
-        return full
-    layouts = stage.GetPrimAtPath("/Room").GetVariantSets().AddVariantSet("layout")
-    for number, boxes in enumerate(room.layouts):
-        layouts.AddVariant(f"layout_{number}")
-        layouts.SetVariantSelection(f"layout_{number}")
-        with layouts.GetVariantEditContext():
-            _hang_bulbs(stage, room, boxes)
-    layouts.ClearVariantSelection()  # the layer of the layout says which one is seen
+    for layout in authored_layouts(stage.GetPrimAtPath("/Room"), max(len(room.layouts), 1)):
+        boxes = room.layouts[layout] if len(room.layouts) > 1 else room.boxes
+        for number, node in enumerate(room.graph.nodes):
+            row = vocabulary().category(node.category)
+            if row.role == "light":
+                x, y, z = (float(v) for v in boxes.position[number])
+                height = y - 0.06 if row.support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
+                over = stage.OverridePrim(f"{LIGHTS}/lamp_{node.name}")
+                over.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(x, height, z))
     return full
-
-
-def _hang_bulbs(stage: Usd.Stage, room: RoomData, boxes: Boxes) -> None:
-    for number, node in enumerate(room.graph.nodes):
-        row = vocabulary().category(node.category)
-        if row.role == "light":
-            x, y, z = (float(v) for v in boxes.position[number])
-            height = y - 0.06 if row.support == "ceiling" else y + float(boxes.size[number][1]) + 0.06
-            over = stage.OverridePrim(f"{LIGHTS}/lamp_{node.name}")
-            over.CreateAttribute("xformOp:translate", Sdf.ValueTypeNames.Double3, False).Set(Gf.Vec3d(x, height, z))

@@ -9,6 +9,7 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdSemantics, UsdShade
 from echousd.shapes.finishes import baking
 from echousd.shapes.finishes.slots import material_of
 from echousd.shapes.looks import Look
+from echousd.stage.layouts import authored
 
 LOOKS = "/Room/Looks"
 IMAGES = {"diffuseColor": "image", "normal": "normal", "roughness": "roughness"}  # input -> its image's prim
@@ -155,11 +156,6 @@ def write_palettes(
         looks: harmony -> material name -> look.
         root: path of the prim that gets the set. scope: of the materials.
     """
-    variants = stage.GetPrimAtPath(root).GetVariantSets().AddVariantSet("palette")
-    for harmony, table in looks.items():
-        variants.AddVariant(harmony)
-        variants.SetVariantSelection(harmony)
-        with variants.GetVariantEditContext():
-            for name, look in sorted(table.items()):  # bytes must not show the order of a set
-                tint_material(stage, f"{scope}/{name}", looks[chosen][name], look)
-    variants.SetVariantSelection(chosen)
+    for harmony in authored(stage.GetPrimAtPath(root), "palette", looks, chosen):
+        for name, look in sorted(looks[harmony].items()):  # bytes must not show the order of a set
+            tint_material(stage, f"{scope}/{name}", looks[chosen][name], look)

@@ -12,6 +12,7 @@ from pxr import Gf, Sdf, Usd, UsdShade
 
 from echousd.layers.materials import LOOKS, look_images, tint_factor
 from echousd.shapes.looks import Look
+from echousd.stage.layouts import authored
 
 CONTEXT = "mtlx"  # the render context of the outputs
 SURFACE = "ND_UsdPreviewSurface_surfaceshader"
@@ -28,13 +29,9 @@ def write_networks(stage: Usd.Stage, chosen: str, looks: Mapping[str, Mapping[st
     """
     for name, look in sorted(looks[chosen].items()):
         _network(stage, f"{LOOKS}/{name}", look, chosen)
-    variants = stage.GetPrimAtPath("/Room").GetVariantSets().GetVariantSet("palette")
-    for harmony, table in looks.items():
-        variants.SetVariantSelection(harmony)
-        with variants.GetVariantEditContext():
-            for name, look in sorted(table.items()):
-                _tint(stage, f"{LOOKS}/{name}", looks[chosen][name], look)
-    variants.SetVariantSelection(chosen)
+    for harmony in authored(stage.GetPrimAtPath("/Room"), "palette", looks, chosen):
+        for name, look in sorted(looks[harmony].items()):
+            _tint(stage, f"{LOOKS}/{name}", looks[chosen][name], look)
 
 
 def _network(stage: Usd.Stage, path: str, look: Look, harmony: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 from pxr import Sdf, Usd
@@ -30,6 +30,30 @@ def layout_names(stage: Usd.Stage) -> tuple[str, ...]:
 def selected_layout(stage: Usd.Stage) -> str:
     """Which layout a stage shows, "" where there is only one."""
     return next((prim.GetVariantSet(VARIANTS).GetVariantSelection() for prim in layout_prims(stage)), "")
+
+
+def authored(prim: Usd.Prim, variants: str, names: Iterable[str], chosen: str | None) -> Iterator[str]:
+    """Each variant of a set on a prim in turn, which gets what a loop over them authors; then one is selected.
+
+    Arguments:
+        chosen: that variant, None = another layer says which one is seen.
+    """
+    made = prim.GetVariantSets().AddVariantSet(variants)
+    for name in names:
+        made.AddVariant(name)
+        made.SetVariantSelection(name)
+        with made.GetVariantEditContext():
+            yield name
+    if chosen is None:
+        made.ClearVariantSelection()
+    else:
+        made.SetVariantSelection(chosen)
+
+
+def authored_layouts(room: Usd.Prim, count: int, chosen: str | None = None) -> Iterator[int]:
+    """The numbers of a room's layouts, as `authored` goes through their variants; one alone is no variant."""
+    names = [f"{VARIANTS}_{number}" for number in range(count)]
+    yield from [0] if count == 1 else map(names.index, authored(room, VARIANTS, names, chosen))
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import shutil
 import tempfile
@@ -22,7 +23,7 @@ from echousd.stage.values import reading
 from echousd.texturing import scenetex
 from echousd.texturing.atlas import Unwrapped, layout_digest, texels, unwrap
 from echousd.texturing.glb import glb_bytes
-from echousd.texturing.job import JOB, RESULTS, TOOLS, Job, job_bytes
+from echousd.texturing.job import JOB, RESULTS, TOOLS, Job
 from echousd.texturing.obj import obj_bytes
 from echousd.texturing.viewpoints import FIELDS, SEEN_FROM, SPHERE, free_point, sphere_cameras, visible_shares
 
@@ -74,7 +75,7 @@ def export_job(
         if not (tool not in SCRIPTS if shell is None else shell):
             surfaces = _without_shell(surfaces)
         job, files = _made(stage, surfaces, tool, prompt, dressing, resolution)
-    _write_folder(out, {**files, JOB: job_bytes(job)})
+    _write_folder(out, {**files, JOB: (json.dumps(job.model_dump(), indent=1) + "\n").encode()})
     return job
 
 
@@ -230,7 +231,9 @@ def _write_folder(out: Path, files: dict[str, bytes]) -> None:
                 place.write_bytes(content)
                 if place.suffix == ".sh":
                     place.chmod(0o755)
-            beside.chmod(0o777 & ~_umask())
+            mask = os.umask(0)
+            os.umask(mask)
+            beside.chmod(0o777 & ~mask)
             if out.is_dir():
                 shutil.rmtree(out)
             beside.replace(out)
@@ -238,12 +241,6 @@ def _write_folder(out: Path, files: dict[str, bytes]) -> None:
             shutil.rmtree(beside, ignore_errors=True)
     except OSError as error:
         raise ValueError(f"{out}: cannot be written ({error.strerror or error}); nothing was changed") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def room_prompt(surfaces: Surfaces) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import stat
 from collections import Counter
 from pathlib import Path
@@ -110,11 +109,6 @@ def read_job(folder: Path) -> Job:
     if count > 1:
         raise ValueError(f"{path}: objects: {twice!r} comes twice, allowed: each name once")
     return job
-
-
-def job_bytes(job: Job) -> bytes:
-    """The `job.json` of a job."""
-    return (json.dumps(job.model_dump(), indent=1) + "\n").encode()
 
 
 def job_mesh(folder: Path, thing: JobObject) -> Unwrapped:

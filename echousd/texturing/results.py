@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -158,17 +158,12 @@ def _beside(folder: Path, stem: str, endings: tuple[str, ...]) -> Path | None:
 def _last_step(folder: Path) -> Path | None:
     """The picture of the highest step of any run, of the run that was written to last among equals."""
     found = []
-    for path in _steps(folder):
+    for path in (*(folder / OUTPUTS).glob("*/vsd/*/texture_*.png"), *(folder / RESULTS).glob("texture_*.png")):
         step = STEP.match(path.name)
         if step and path.is_file():
             check_links(folder, path, f"{folder}: {path.relative_to(folder)}")
             found.append((int(step[1]), path.stat().st_mtime, str(path)))
     return Path(max(found)[2]) if found else None
-
-
-def _steps(folder: Path) -> Iterator[Path]:
-    yield from (folder / OUTPUTS).glob("*/vsd/*/texture_*.png")
-    yield from (folder / RESULTS).glob("texture_*.png")
 
 
 TOLERANCE = 5e-5  # of the diagonal of the object
