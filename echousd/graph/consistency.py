@@ -39,11 +39,6 @@ def faults_of(file: str) -> Iterator[None]:
         raise told from None
 
 
-def check_triples(triples: Sequence[Triple], names: Iterable[str]) -> None:
-    """Raise `GraphError` of all the `triple_faults`."""
-    raise_all(triple_faults(triples, names))
-
-
 def raise_all(wrong: Sequence[GraphError]) -> None:
     """Raise the first of some faults with the others (`MAX_ERRORS` in all); none, and nothing happens."""
     if wrong:

@@ -7,7 +7,7 @@ from typing import Any
 
 from echomodel.rows import Habit
 from echomodel.vocabulary import vocabulary
-from echousd.graph.consistency import GraphError, check_triples
+from echousd.graph.consistency import GraphError, triple_faults
 from echousd.graph.nodes import Node, Relation, RoomSpec
 from echousd.graph.scene import SceneGraph
 
@@ -50,11 +50,8 @@ def starting_graph(
         return graph.replaced(relations=tuple(usual))
     kept = list(graph.relations)
     for relation in usual:
-        try:
-            check_triples([other.triple for other in (*kept, relation)], graph.names)
-        except GraphError:
-            continue
-        kept.append(relation)
+        if not triple_faults([other.triple for other in (*kept, relation)], graph.names):
+            kept.append(relation)
     stated = len(graph.relations)
     return graph.replaced(relations=(*kept[stated:], *kept[:stated]))
 
