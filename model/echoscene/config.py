@@ -117,7 +117,7 @@ class VQConfig:
 
 @dataclass(frozen=True)
 class ReleasedConfig:
-    """The whole published model, or the parts of it that a file holds (None = absent).
+    """The whole published model (the defaults), or the parts of it that a file holds (None = absent).
 
     Arguments:
         preset: `released` (the published wiring: both denoisers see the object embedding only, although the encoder
@@ -144,11 +144,6 @@ class ReleasedConfig:
     def from_json(cls, raw: Mapping[str, Any]) -> ReleasedConfig:
         """The inverse of `to_json`; raises ValueError naming an unknown or mistyped field."""
         return from_dict(cls, dict(raw))
-
-
-def released(classes: int = 14) -> ReleasedConfig:
-    """The published full model (EchoScene)."""
-    return ReleasedConfig(encoder=EncoderConfig(classes=classes))
 
 
 @dataclass(frozen=True)

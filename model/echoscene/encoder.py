@@ -106,7 +106,6 @@ class GraphEncoder(nn.Module):
         touched: Sequence[int] = (),
         noise: Tensor | None = None,
         generator: torch.Generator | None = None,
-        replace: bool = True,
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Latents of an edited graph from those of the graph before (generation: no edit).
 
@@ -118,7 +117,6 @@ class GraphEncoder(nn.Module):
             touched: ends of changed triples, in the numbering after the edit.
             noise: (added and touched nodes, flag) float32, change flags, a row a node in ascending order of the nodes
                 after the edit; drawn with `generator` when None.
-            replace: take the manipulator's output for all nodes (published default), not for the edited ones alone.
 
         Returns:
             (N, node) latents, (E, node) edge latents and (N,) bool, the nodes that were kept.
@@ -146,7 +144,7 @@ class GraphEncoder(nn.Module):
         new, new_edges = self.gconv_net_manipulation(
             torch.cat([latent, flags, nodes], dim=1), edges, graph.triples[:, [0, 2]]
         )
-        return (new if replace else torch.where(keep[:, None], latent, new)), new_edges, keep
+        return new, new_edges, keep
 
 
 def insert_zeros(latent: Tensor, places: Sequence[int]) -> Tensor:

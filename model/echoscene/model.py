@@ -295,8 +295,6 @@ def ancestral(
     tables: LayoutTables,
     *,
     noise: Callable[[int], Tensor],
-    start: int | None = None,
-    stop: int = 0,
     variance: str = "posterior",
 ) -> Iterator[tuple[int, Tensor]]:
     """Ancestral sampling of the layout branch (Ho et al. 2020, algorithm 2; EchoScene, section 3.3).
@@ -307,7 +305,6 @@ def ancestral(
         tables: schedule.
         noise: draws (N, 8) float32 for a step; called at step 0 too, where its value is not used, so that the random
             stream is the published one.
-        start, stop: first and last step, both included; default T - 1 and 0.
         variance: `posterior` (published code) or `beta` (the paper's text).
 
     Yields:
@@ -316,8 +313,7 @@ def ancestral(
     if variance not in ("posterior", "beta"):
         raise ValueError(f"variance is {variance!r}, allowed: posterior, beta")
     log_variance = tables.posterior_log_variance_clipped if variance == "posterior" else tables.betas.log()
-    start = len(tables.betas) - 1 if start is None else start
-    for step in range(start, stop - 1, -1):
+    for step in reversed(range(len(tables.betas))):
         predicted = denoise(x, torch.full((len(x),), step, dtype=torch.int64, device=x.device))
         # No clamp: the published sampler leaves the estimate of the clean box unbounded.
         clean = tables.sqrt_recip_alphas_cumprod[step] * x - tables.sqrt_recipm1_alphas_cumprod[step] * predicted

@@ -14,7 +14,7 @@ from published_shapes import fit_to_box, mesh_from_grid, vertex_points
 from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, coverage
 from echomodel.vocabulary import vocabulary
 from echoscene.checkpoint import read_bounds, statistics_from_bounds
-from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, released, shape_unet
+from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, paper, shape_unet
 from echoscene.echo import published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.gcn import TripletGCN
@@ -78,7 +78,7 @@ DESK = _graph([5, 4], [[1, 3, 0]])
 
 
 def test_presets_are_consistent() -> None:
-    for config in (released(36), paper()):
+    for config in (ReleasedConfig(encoder=EncoderConfig(classes=36)), paper()):
         assert ReleasedConfig.from_json(config.to_json()) == config
         with torch.device("meta"):
             model = ReleasedModel(config)

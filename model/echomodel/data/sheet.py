@@ -103,14 +103,14 @@ HANGING = 0.8  # metres; what hangs higher is drawn lightly
 
 
 def plot_rooms(
-    rooms: Sequence[RoomBoxes], path: str | os.PathLike[str], *, columns: int = 8, labels: bool = True, dpi: int = 80
+    rooms: Sequence[RoomBoxes], path: str | os.PathLike[str], *, columns: int = 8, labels: bool = True
 ) -> None:
     """Draw rooms beside one another, +X to the right and +Z down (an observer who faces +X has left above).
 
     Arguments:
         rooms: at least one.
         path: picture file (.png, .pdf, .svg).
-        columns: rooms in a row. labels: write the categories. dpi: resolution.
+        columns: rooms in a row. labels: write the categories.
 
     Raises:
         ValueError: no rooms.
@@ -155,7 +155,7 @@ def plot_rooms(
         axes.set_title(f"{room.id} ({room.room_type})", fontsize=5, pad=1)
     figure.subplots_adjust(0.005, 0.005, 0.995, 0.98, 0.03, 0.08)
     with whole_file(path, Path(path).suffix) as beside:
-        figure.savefig(beside, dpi=dpi)
+        figure.savefig(beside, dpi=80)
 
 
 def _coarse(word: str) -> str | None:
