@@ -70,9 +70,7 @@ def washbasin(size: Size, style: Style, choices: Choices) -> list[Solid]:
     rim.append(box(*bottom, "enamel", 0.0, "basin"))
     rim += spout(0.0, h, (z0 - d / 2) / 2, TAP, 0.1)
     if w < 0.62 and choices.chance("kind", 0.35):
-        column = turned(
-            (0, 0, -0.05), (0.11, 0.1), h - thick + 0.004, 0.085, power=2.8, material="enamel", role="foot"
-        )
+        column = turned((0, 0, -0.05), (0.11, 0.1), h - thick + 0.004, 0.085, power=2.8, material="enamel", role="foot")
         return [*rim, column]
     foot = 0.25 if choices.chance("raised", 0.6) else 0.08
     x, z = w / 2 - 0.02, d / 2 - 0.05
