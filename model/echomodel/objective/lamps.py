@@ -11,7 +11,7 @@ from echomodel.objective.plan import Plan
 OVER = 0.25  # metres by which a pendant's middle may lie beyond the edge of what it hangs over
 MIDDLE = 0.22  # share of the room's extent: so near to the middle a lamp lights the room
 CLEAR = 0.9  # metres: so far from every table a lamp lights free floor
-CENTRED = 0.15  # metres that a pendant, or the middle of several, may hang off the middle of its table
+CENTRED = 0.3  # metres that a pendant, or the middle of several, may hang off the middle of its table
 TOUCH = 0.04  # metres of air below a lamp on its table
 
 
@@ -43,7 +43,7 @@ def pendant_centred(plan: Plan) -> Found:
     i, j = plan.pairs(lamps, tables)
     if not len(i):
         return nobody(plan.size)
-    over = (plan.gap(i, j) < OVER).to(plan.size)
+    over = (plan.gap(i, j) < 1e-3).to(plan.size)
     away = (plan.position[i] - plan.position[j])[:, [0, 2]] * over[:, None]
     count = over.new_zeros(len(plan)).index_add(0, j, over)
     mean = away.new_zeros(len(plan), 2).index_add(0, j, away) / count.clamp_min(1.0)[:, None]
