@@ -118,6 +118,8 @@ def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
 def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
     """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
 
+    Where all of them would waste more than a small one is, and hulls are few enough, it stays alone.
+
     Arguments:
         points: vertices (n, 3) of each solid, metres.
         box: volume of the whole piece's box, m³; what is far smaller is no obstacle of its own.
@@ -126,21 +128,22 @@ def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDER
     groups: list[list[np.ndarray]] = [[p] for p in points]
     low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
     volume = _volume(low, high)
-    left = len(groups)
-    while left > 1:
-        small = int(np.argmin(volume))
-        if left <= most and volume[small] >= SMALL * box:
+    alone, gone = np.zeros((2, len(groups)), bool)
+    while (left := int((~gone).sum())) > 1:
+        small = int(np.argmin(np.where(alone | gone, np.inf, volume)))
+        if left <= most and (alone[small] or gone[small] or volume[small] >= SMALL * box):
             break
         wasted = _volume(np.minimum(low, low[small]), np.maximum(high, high[small])) - volume
-        wasted[small] = np.inf
-        other = int(np.argmin(wasted))  # what is gone has an infinite volume and never wins
+        wasted[gone], wasted[small] = np.inf, np.inf
+        other = int(np.argmin(wasted))
+        if left <= most and wasted[other] > SMALL * box:  # on a wedge from panel to mirror nothing could stand
+            alone[small] = True
+            continue
         groups[other] += groups[small]
-        groups[small] = []
         low[other], high[other] = np.minimum(low[other], low[small]), np.maximum(high[other], high[small])
         volume[other] = _volume(low[other], high[other])
-        low[small], high[small], volume[small] = 1e9, 2e9, np.inf
-        left -= 1
-    return [_hull(np.concatenate(group)) for group in groups if group]
+        gone[small] = True
+    return [_hull(np.concatenate(group)) for group, joined in zip(groups, gone, strict=True) if not joined]
 
 
 def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:
