@@ -24,6 +24,54 @@ def register(app: typer.Typer) -> None:
     app.add_typer(eval_app, name="eval")
 
 
+@eval_app.command("suite")
+def suite(
+    systems: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="default, network, guided, shuffled, generator, random, retrieval, real, each also with +search or "
+            "+half; weights; rooms from elsewhere. None: default, network, guided.",
+            show_default=False,
+        ),
+    ] = None,
+    against: Annotated[
+        str, typer.Option(help="Rooms file, room set or SG-FRONT folder; generated: held-out rooms of the generator.")
+    ] = "generated",
+    out: Annotated[Path, typer.Option("-o", "--output", help="REPORT: gets .md, .json and .html.")] = Path("report"),
+    only: Annotated[str, typer.Option(help="Sections, with commas; default: all.")] = "",
+    samples: Annotated[int, typer.Option(help="Rooms that every system lays out.", min=2)] = 24,
+    seed: Annotated[int, typer.Option(help="Seed of every draw.")] = 0,
+    workers: Annotated[int, typer.Option(help="Processes that place rooms.", min=1)] = 2,
+) -> None:
+    """Ask systems the same rooms, score them beside chance and plain baselines, and write a report.
+
+    Example: echousd eval suite default guided --against rooms.json -o report --only relations,faults
+    """
+    from rich.progress import Progress
+
+    from echousd.cli.output import say
+    from echousd.cli.terminal import Terminal
+    from echousd.evaluation.report import write_report
+    from echousd.evaluation.suite import SYSTEMS, SuiteSettings, evaluate
+
+    chosen = tuple(word.strip() for word in only.split(",") if word.strip())
+    asked = tuple(systems) if systems else SYSTEMS
+    settings = SuiteSettings(asked, against, samples, seed, chosen, workers=workers)
+    command = f"echousd eval suite {' '.join(asked)} --against {against} --samples {samples} --seed {seed}"
+    command += f" --only {','.join(chosen)}" if chosen else ""
+    console = Terminal(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        tasks: dict = {}
+
+        def progress(what: str, done: int, total: int) -> None:
+            tasks.setdefault(what, bar.add_task(what, total=total) if what not in tasks else None)
+            bar.update(tasks[what], completed=done)
+
+        found, run = evaluate(settings, progress)
+    for path in write_report(found, run, out, command):
+        say(str(path))
+
+
 @eval_app.command("layout")
 def layout(
     rooms: Annotated[Path, typer.Option(help="Rooms file (JSON) or folder of a room set.")],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from echomodel.objective import plan_of
+from echomodel.objective import TERMS, plan_of
 from echomodel.objective.sizes import (
     fitting_loads,
     has_proportions,
@@ -218,6 +218,7 @@ def place_boxes(
     none = np.zeros(n, bool)
     fixed, rigid, turned = (none if mask is None else np.asarray(mask, bool) for mask in (fixed, rigid, turned))
     config = config or PlaceConfig()
+    terms = tuple(term for term in TERMS if term.name not in config.without)
 
     sizes = [predicate.id for predicate in vocabulary().predicates if predicate.measures == "size"]
     told = np.unique(triplets[np.isin(triplets[:, 1], sizes)][:, [0, 2]])
@@ -252,7 +253,7 @@ def place_boxes(
         at = suited(at, at.size)
 
         def searched(of: Posed, anew: int = ANEW) -> Arranged:
-            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon)).run(anew)
+            return Search(setting_of(of, turned, openings=openings, outline=floor_polygon), terms).run(anew)
 
         less = suited(at, smaller_sizes(at.problem.categories, at.size, free)) if fullness(at) > FULL else at
         shrinks = not np.array_equal(less.size, at.size)

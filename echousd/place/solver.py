@@ -46,6 +46,7 @@ class PlaceConfig:
         arrange: first choose for every piece among the places that a person would try; False = only by millimetres.
         rounds: most linearisations in one attempt; patience: how many of them without progress end it.
         budget: most linearisations in all attempts together: what a room may cost, the same on every machine.
+        without: names of terms of the objective that the search does not see, so that others can judge by them.
     """
 
     move: float = 0.3
@@ -56,6 +57,7 @@ class PlaceConfig:
     arrange: bool = True
     patience: int = 6
     budget: int = 26
+    without: frozenset[str] = frozenset()
 
 
 # Stiffness of each kind of constraint; walls and ceilings give way to relations and collisions.

@@ -1,0 +1,289 @@
+"""Whoever lays out rooms, by one protocol: asked the same tasks, each room drawn from a seed of its own."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy.optimize import linear_sum_assignment
+
+from echomodel.boxes import Boxes
+from echomodel.echo import EchoModel
+from echomodel.furniture import sample_size
+from echomodel.graph import GraphBatch
+from echomodel.loading import load_model
+from echomodel.metrics.layouts import HALVES, layout_scores
+from echomodel.metrics.tasks import Task
+from echomodel.objective.sizes import size_range
+from echomodel.protocols import GraphEdit, RoomModel
+from echomodel.randomness import SceneGenerators
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms.generator import generate_room, generate_rooms
+from echomodel.rooms.statistics import room_type_statistics
+from echomodel.vocabulary import vocabulary
+from echousd.place import PlaceConfig, place_boxes
+from echousd.reproducible import one_thread
+from echousd.tensors import seeded
+
+TOGETHER = 64  # scenes in one pass of a network
+POOL, POOL_SEED = 400, 910_000  # generated rooms from which `retrieval` takes
+QUARTERS = np.pi / 2
+Layouts = Callable[[Sequence[Task], int], list[RoomBoxes]]
+FINISHES = {
+    "search": "placed by search over all terms, as `generate` does",
+    "half": "placed by search over half A of the terms; the best of the drafts by that half",
+}
+
+
+@dataclass(frozen=True)
+class System:
+    """Who lays out rooms.
+
+    Arguments:
+        name: as the command has it. base: of `BASES`, a weights file, or rooms of somebody else.
+        finish: of `FINISHES`, "" = as drawn.
+    """
+
+    name: str
+    base: str
+    finish: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> System:
+        """From `BASE[+FINISH]`; raises ValueError for what there is not."""
+        if text == "default":
+            text = "network+search"
+        base, plus, finish = text.partition("+")
+        if plus and finish not in FINISHES:
+            raise ValueError(f"{text}: finish is {finish!r}, allowed after +: {', '.join(FINISHES)}")
+        if base not in BASES and not Path(base).exists():
+            raise ValueError(f"{text}: no such file, folder or system, allowed: {', '.join(BASES)}, default, or a path")
+        return cls(text, base, finish)
+
+    @property
+    def weights(self) -> Path | None:
+        """The weights file or folder that it is, None for everything else."""
+        path = Path(self.base)
+        holds = path.is_dir() and any(path.glob("*.safetensors"))
+        return path if self.base not in BASES and (path.suffix == ".safetensors" or holds) else None
+
+    @property
+    def foreign(self) -> Path | None:
+        """The rooms from elsewhere that it is, None for what can be asked tasks."""
+        return None if self.base in BASES or self.weights else Path(self.base)
+
+
+def drawn(system: System, tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+    """The layouts of a system that can be asked, without its finish."""
+    return (networks(load_model(system.weights)) if system.weights else BASES[system.base])(tasks, seed)
+
+
+def finished(system: System, task: Task, drafts: Sequence[RoomBoxes]) -> RoomBoxes:
+    """What becomes of the drafts of one room: the best by half A of the terms, if there are several."""
+    match system.finish:
+        case "search":
+            made = [searched(task, draft, PlaceConfig()) for draft in drafts]
+        case "half":
+            made = [searched(task, draft, PlaceConfig(without=HALVES[1])) for draft in drafts]
+        case _:
+            made = list(drafts)
+    if len(made) == 1:
+        return made[0]
+
+    def worth(number: int) -> tuple[float, ...]:
+        scores = layout_scores(task, made[number])
+        kept, told = map(np.sum, scores["told"])
+        return float(told - kept), *(float(np.sum(scores[name][0])) for name in ("physics", "faults A")), float(number)
+
+    return made[min(range(len(made)), key=worth)]
+
+
+def searched(task: Task, draft: RoomBoxes, config: PlaceConfig) -> RoomBoxes:
+    """A draft placed until the room keeps what is told and the objective holds."""
+    with one_thread():
+        done = place_boxes(
+            draft.categories, draft.size, draft.position, draft.yaw, task.told,
+            floor_polygon=draft.floor_polygon if len(draft.floor_polygon) else None, height=draft.height,
+            openings=draft.openings, rules=task.rules, config=config,
+        )  # fmt: skip
+    return replace(draft, size=done.size, position=done.position, yaw=done.yaw)
+
+
+# -- networks ----------------------------------------------------------------------------------------------------------
+
+
+def networks(model: RoomModel, guidance: float | None = 0.0) -> Layouts:
+    """Layouts by a model, many scenes at once; `guidance` of compact ones while sampling, None = the model's own."""
+    extra = {} if guidance is None or not isinstance(model, EchoModel) else {"relation_guidance": guidance}
+
+    def layouts(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+        out: list[RoomBoxes] = []
+        for start in range(0, len(tasks), TOGETHER):
+            part = tasks[start : start + TOGETHER]
+            graph, rows = GraphBatch.pack([task.graph for task in part]), [len(task.room) for task in part]
+            each: SceneGenerators | torch.Generator = seeded(seed, "layout", start)
+            if isinstance(model, EchoModel):
+                each = SceneGenerators([seeded(seed, "layout", start + k) for k in range(len(part))], rows)
+            with one_thread():
+                found = model.sample_layout(graph, generator=each, edit=_edit(part), **extra).to("cpu")
+            for task, one in zip(part, torch.arange(sum(rows)).split(rows), strict=True):
+                out.append(_with_boxes(task.room, found[one]))
+        return out
+
+    return layouts
+
+
+def _edit(tasks: Sequence[Task]) -> GraphEdit | None:
+    if any(task.before is None for task in tasks):
+        return None
+    first = np.cumsum([0, *(len(task.room) for task in tasks)])
+    before = [
+        task.before + np.array([at, 0, at])
+        for task, at in zip(tasks, first[:-1], strict=True)
+        if task.before is not None
+    ]
+    added = [task.added for task in tasks if task.added is not None]
+    return GraphEdit(torch.from_numpy(np.concatenate(before)), torch.from_numpy(np.concatenate(added)))
+
+
+def _with_boxes(room: RoomBoxes, boxes: Boxes) -> RoomBoxes:
+    """The room with other boxes, which lie about the middle of its floor."""
+    centre = np.zeros(3)
+    if len(room.floor_polygon):
+        centre[[0, 2]] = (room.floor_polygon.min(0) + room.floor_polygon.max(0)) / 2
+    size, position, yaw = (np.asarray(value, float) for value in (boxes.size, boxes.position, boxes.yaw))
+    return replace(room, size=size, position=position + centre, yaw=yaw, relations=None)
+
+
+@cache
+def shuffled_model(seed: int = 0) -> EchoModel:
+    """The shipped weights, the numbers of each tensor in another order: an untrained network of the same sizes."""
+    model = EchoModel.load()
+    luck = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for value in model.model.parameters():
+            value.copy_(value.flatten()[torch.randperm(value.numel(), generator=luck)].reshape(value.shape))
+    return model
+
+
+# -- without a network -------------------------------------------------------------------------------------------------
+
+
+def random_places(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+    """Usual sizes at random places of the floor, along its walls; what hangs hangs. Chance for all that is told."""
+    return [_random(task.room, np.random.default_rng([seed, 7, number])) for number, task in enumerate(tasks)]
+
+
+def _random(room: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
+    import shapely
+
+    floor = room.floor_polygon if len(room.floor_polygon) > 2 else np.array([(-2, -2), (2, -2), (2, 2), (-2, 2)], float)
+    polygon, low, high = shapely.Polygon(floor), floor.min(0), floor.max(0)
+    position, yaw = np.zeros((len(room), 3)), rng.integers(4, size=len(room)) * QUARTERS
+    size = np.array([np.clip(sample_size(word, rng), *size_range(word)) for word in room.categories]).reshape(-1, 3)
+    for k, word in enumerate(room.categories):
+        for _ in range(100):
+            position[k, [0, 2]] = rng.uniform(low, high)
+            if polygon.contains(shapely.Point(position[k, [0, 2]])):
+                break
+        row = vocabulary().category(word)
+        if row.support == "ceiling":
+            position[k, 1] = max(room.height - size[k, 1], 0.0)
+        elif row.mounted:
+            position[k, 1] = row.mounted
+    return replace(room, size=size, position=position, yaw=yaw, relations=None)
+
+
+def generator(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+    """The room generator, asked for the same furniture on a floor of the same extents; what it left out is random."""
+    out = []
+    for number, task in enumerate(tasks):
+        room, rng = task.room, np.random.default_rng([seed, 8, number])
+        short, long = np.sort(np.ptp(room.floor_polygon, axis=0))
+        statistics = replace(
+            room_type_statistics(room.room_type), short=(short,) * 5, long=(long,) * 5, height=(room.height,) * 5,
+            area=tuple(short * long * np.array([0.98, 0.99, 1.0, 1.01, 1.02])),
+            presence={word: (1.0, (count,), (1.0,)) for word, count in sorted(Counter(room.categories).items())},
+        )  # fmt: skip
+        drawn = generate_room(rng, room.room_type, statistics=statistics)
+        out.append(borrowed(room, drawn, rng))
+    return out
+
+
+def retrieval(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+    """The boxes of the training room whose furniture and floor are most like the asked ones; the rest is random."""
+    out = []
+    for number, task in enumerate(tasks):
+        have = Counter(task.room.categories)
+        extent = np.ptp(task.room.floor_polygon, axis=0)
+
+        def apart(other: RoomBoxes, have: Counter[str] = have, extent: np.ndarray = extent) -> float:
+            there = Counter(other.categories)
+            odd = sum((have - there).values()) + sum((there - have).values())
+            return odd + float(np.abs(np.ptp(other.floor_polygon, axis=0) - extent).sum())
+
+        out.append(borrowed(task.room, min(_pool(), key=apart), np.random.default_rng([seed, 9, number])))
+    return out
+
+
+@cache
+def _pool() -> tuple[RoomBoxes, ...]:
+    return tuple(generate_rooms(POOL, POOL_SEED))
+
+
+def borrowed(room: RoomBoxes, other: RoomBoxes, rng: np.random.Generator) -> RoomBoxes:
+    """The room with the boxes of another one, category by category, its floor stretched to this one's extents."""
+    mine, theirs = (r.floor_polygon for r in (room, other))
+    wide, other_wide = (np.ptp(floor, axis=0)[0] > np.ptp(floor, axis=0)[1] for floor in (mine, theirs))
+    plan, corners, yaw = other.position[:, [0, 2]], theirs, other.yaw
+    if wide != other_wide:  # turned by a quarter: x goes to z
+        plan, corners, yaw = plan[:, ::-1] * [1, -1], corners[:, ::-1] * [1, -1], yaw + QUARTERS
+    stretch = np.ptp(mine, axis=0) / np.maximum(np.ptp(corners, axis=0), 1e-6)
+    plan = (plan - (corners.max(0) + corners.min(0)) / 2) * stretch + (mine.max(0) + mine.min(0)) / 2
+    made = _random(room, rng)
+    size, position, heading = made.size.copy(), made.position.copy(), made.yaw.copy()
+    words, others = np.array(room.categories, dtype=object), np.array(other.categories, dtype=object)
+    for word in sorted(set(room.categories)):
+        here, there = np.flatnonzero(words == word), np.flatnonzero(others == word)
+        cost = np.linalg.norm(position[here][:, None, [0, 2]] - plan[there][None], axis=-1)
+        for k, j in zip(*linear_sum_assignment(cost), strict=True):
+            at, source = here[k], there[j]
+            size[at], heading[at] = other.size[source], yaw[source]
+            position[at] = (plan[source, 0], other.position[source, 1], plan[source, 1])
+    return replace(made, size=size, position=position, yaw=heading)
+
+
+def true_boxes(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
+    """The true boxes: what the figures are for real rooms themselves."""
+    return [task.room for task in tasks]
+
+
+BASES: dict[str, Layouts] = {
+    "network": lambda tasks, seed: networks(load_model(None))(tasks, seed),
+    "guided": lambda tasks, seed: networks(load_model(None), None)(tasks, seed),
+    "shuffled": lambda tasks, seed: networks(shuffled_model())(tasks, seed),
+    "generator": generator,
+    "random": random_places,
+    "retrieval": retrieval,
+    "real": true_boxes,
+}
+MEANS = {
+    "network": "the compact network from noise, unguided",
+    "guided": "the same, pulled by the rules' margins while it samples",
+    "shuffled": "the same network, the numbers of each of its tensors in another order: untrained",
+    "generator": "the room generator, asked for the same furniture on such a floor",
+    "random": "usual sizes at random places: chance",
+    "retrieval": f"boxes of the most similar of {POOL} rooms like those of the training",
+    "real": "the true boxes",
+}
+
+
+def described(system: System) -> str:
+    """What a system is, in a few words."""
+    base = MEANS.get(system.base, "weights" if system.weights else "rooms from elsewhere")
+    return base + (f"; {FINISHES[system.finish]}" if system.finish else "")

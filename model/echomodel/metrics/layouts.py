@@ -1,0 +1,119 @@
+"""What a laid out room scores by itself: faults by the terms of the objective, and the field's figures by its boxes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+
+from echomodel.metrics.statistics import Pair
+from echomodel.metrics.tasks import Task, kept_relations
+from echomodel.objective import BY_EYE, KINDS, REACHED, TERMS, faults_of, plan_of, unreached, walk
+from echomodel.openings import segment, zone
+from echomodel.roomboxes import RoomBoxes, footprints
+from echomodel.vocabulary import vocabulary
+
+ROBOT = 0.2  # metres, width of SceneEval's robot
+OVERHEAD = 2.0  # metres: what has its middle higher is in nobody's way there
+BEFORE_WINDOW = 0.5  # metres that it wants free before a window; before a door the door's width
+JUDGED = tuple(term.name for term in TERMS if term.kind in BY_EYE)
+# Half of the terms chooses, the other one judges; they take turns down the table, so that both look at everything.
+HALVES = (frozenset(JUDGED[::2]), frozenset(JUDGED[1::2]) | {REACHED})
+NOT_ASKED = (0.0, 0.0)
+
+
+def layout_scores(task: Task, room: RoomBoxes) -> dict[str, Pair]:
+    """Name -> (part, whole), whose sums over rooms are divided.
+
+    Arguments:
+        task: what was asked. room: its boxes as a system made them.
+
+    Returns:
+        Faults an object in all (`faults`), of either half of the terms (`faults A`, `faults B`), of collisions and the
+        like (`physics`) and of each term that found one (`term NAME`); `faultless` rooms; `told` relations kept;
+        `walkable` share of the free floor that is reached, SceneEval's `navigability` and `clearance` of openings;
+        `fullness`, share of the floor that is covered.
+    """
+    objects = float(len(room))
+    floor, openings = room.floor_polygon, room.openings
+    plan = plan_of(room, room.categories, floor, openings, task.told, height=room.height, rules=task.rules)
+    found = Counter(fault.rule for fault in [*faults_of(plan, KINDS), *unreached(plan)])
+    kinds = {term.name: term.kind for term in TERMS} | {REACHED: BY_EYE[0]}
+    seen = sum(n for name, n in found.items() if kinds[name] in BY_EYE)
+    walked = walk(plan) if len(room.floor_polygon) else None
+    scores = {
+        "faults": (float(seen), objects),
+        "faults A": (float(sum(found[name] for name in HALVES[0])), objects),
+        "faults B": (float(sum(found[name] for name in HALVES[1])), objects),
+        "physics": (float(sum(n for name, n in found.items() if kinds[name] == "physics")), objects),
+        "faultless": (float(not seen), 1.0),
+        "told": kept_relations(task, room)["all"],
+        "walkable": NOT_ASKED if walked is None else (walked.share, 1.0),
+        "navigability": navigability(room),
+        "clearance": clearance(room),
+        "fullness": fullness(room),
+    }
+    return scores | {f"term {name}": (float(n), objects) for name, n in found.items() if kinds[name] in BY_EYE}
+
+
+def navigability(room: RoomBoxes) -> Pair:
+    """SceneEval's: of the floor on which a robot of 0.2 m can stand, the share of the largest connected part."""
+    import shapely
+
+    if len(room.floor_polygon) < 3:
+        return NOT_ASKED
+    low = room.position[:, 1] + room.size[:, 1] / 2 <= OVERHEAD
+    solid = shapely.union_all([p.buffer(ROBOT / 2, join_style="mitre") for p in _prints(room)[low]])
+    free = shapely.Polygon(room.floor_polygon).buffer(-ROBOT / 2, join_style="mitre").difference(solid)
+    parts = [part.area for part in getattr(free, "geoms", [free])]
+    return (max(parts) / sum(parts), 1.0) if sum(parts) > 0 else (0.0, 1.0)
+
+
+def clearance(room: RoomBoxes) -> Pair:
+    """SceneEval's: share of each opening before which nothing stands (a door's width deep, 0.5 m before windows)."""
+    import shapely
+
+    if len(room.floor_polygon) < 3 or not room.openings:
+        return NOT_ASKED
+    prints, free = _prints(room), 0.0
+    for opening in room.openings:
+        depth = BEFORE_WINDOW if opening.kind == "window" else opening.width
+        before = shapely.Polygon(zone(room.floor_polygon, opening, depth))
+        start, end = segment(room.floor_polygon, opening)
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+        covered = []
+        for k in np.flatnonzero(shapely.intersects(prints, before)):
+            met = shapely.get_coordinates(prints[k].intersection(before))
+            reach, low = (met - start) @ along, float(room.position[k, 1])
+            covered.append(shapely.box(reach.min(), low, reach.max(), low + float(room.size[k, 1])))
+        hole = shapely.box(0.0, opening.sill, opening.width, opening.sill + opening.height)
+        free += 1.0 - shapely.union_all(covered).intersection(hole).area / hole.area
+    return free, float(len(room.openings))
+
+
+def fullness(room: RoomBoxes) -> Pair:
+    """Square metres under furniture that stands, and of the floor."""
+    import shapely
+
+    if len(room.floor_polygon) < 3:
+        return NOT_ASKED
+    stands = np.array([vocabulary().category(word).support == "floor" for word in room.categories], bool)
+    floor = shapely.Polygon(room.floor_polygon)
+    return float(shapely.union_all(_prints(room)[stands]).intersection(floor).area), float(floor.area)
+
+
+def strata_of(task: Task) -> Mapping[str, str]:
+    """How a room is counted: its type, how many objects, how much is told of each."""
+    objects, told = len(task.room), len(task.told) / max(len(task.room), 1)
+    return {
+        "room type": task.room.room_type,
+        "objects": "up to 6" if objects <= 6 else "7 to 10" if objects <= 10 else "more than 10",
+        "told an object": "below 1" if told < 0.95 else "1 to 5" if told <= 5 else "more than 5",
+    }
+
+
+def _prints(room: RoomBoxes) -> np.ndarray:
+    import shapely
+
+    return np.atleast_1d(shapely.polygons(footprints(np.maximum(room.size, 1e-6), room.position, room.yaw)))

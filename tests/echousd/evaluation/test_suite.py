@@ -1,0 +1,113 @@
+"""The suite: honest rows in every table, equal files for equal runs, and what it refuses."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echomodel.metrics.tasks import tasks_of
+from echomodel.roomboxes import write_rooms
+from echomodel.rooms.generator import generate_rooms
+from echousd.cli.main import run
+from echousd.evaluation import suite, systems
+from echousd.evaluation.suite import SuiteSettings, evaluate, run_systems
+from echousd.evaluation.systems import BASES, System, borrowed, finished
+
+
+@pytest.fixture(scope="module")
+def rooms():
+    return generate_rooms(8, 11)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Only rows that cost nothing."""
+    monkeypatch.setattr(suite, "HONEST", ("random", "retrieval", "real"))
+
+
+def test_every_table_holds_the_honest_rows_and_two_runs_are_equal(rooms, tmp_path, quick, capsys):
+    write_rooms(tmp_path / "rooms.json", rooms)
+    command = ["eval", "suite", "generator", "--against", str(tmp_path / "rooms.json"), "--samples", "4"]
+    for name in ("one", "two"):
+        assert run([*command, "--workers", "1", "-o", str(tmp_path / name)]) == 0
+    assert [line.rpartition(".")[2] for line in capsys.readouterr().out.split()[:4]] == ["md", "json", "html", "json"]
+    for ending in (".md", ".json", ".html"):
+        assert (tmp_path / f"one{ending}").read_bytes() == (tmp_path / f"two{ending}").read_bytes()
+    page = (tmp_path / "one.html").read_text("utf-8")
+    assert "http://" not in re.sub("http://www.w3.org/[0-9a-z/]*", "", page)
+    assert "https://" not in page
+    assert "<svg" in page
+    assert "data:image/png;base64," in page
+    told = json.loads((tmp_path / "one.json").read_text("utf-8"))
+    assert {table["name"] for table in told["tables"]} == set(suite.SECTIONS)
+    asked = {"generator", "random", "retrieval", "real"}
+    assert all(set(table["rows"]) == asked for table in told["tables"] if table["name"] in ("relations", "faults"))
+    assert set(told["about"]["versions"]) >= {"python", "torch", "scikit-learn"}
+    first = told["tables"][0]["rows"]
+    assert first["real"]["all"]["value"] == 1.0
+    assert first["random"]["all"]["value"] < 0.8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["nowhere"], "no such file, folder or system, allowed: network"),
+        (["random+luck"], "finish is 'luck', allowed after +: search, half"),
+        (["--only", "beauty"], "no section 'beauty', allowed: relations"),
+        (["--against", "nowhere.json"], "nowhere.json: no such file or folder"),
+    ],
+)
+def test_what_there_is_not_is_named(arguments, text, tmp_path, capsys):
+    assert run(["eval", "suite", *arguments, "-o", str(tmp_path / "r")]) == 2
+    assert text in " ".join(capsys.readouterr().err.split())
+
+
+def test_too_few_rooms_are_told(rooms, tmp_path, quick):
+    write_rooms(tmp_path / "one.json", rooms[:1])
+    with pytest.raises(ValueError, match="1 rooms with a floor and two known objects, 4 are needed"):
+        evaluate(SuiteSettings(against=str(tmp_path / "one.json")))
+
+
+def test_systems_keep_furniture_and_floor_and_draw_from_their_seed(rooms):
+    tasks = tasks_of(rooms, 0, told=1.0)
+    for name in ("random", "generator", "retrieval", "shuffled", "real"):
+        one, again = (BASES[name](tasks, 3) for _ in range(2))
+        for task, room, same in zip(tasks, one, again, strict=True):
+            assert room.categories == task.room.categories
+            assert np.array_equal(room.floor_polygon, task.room.floor_polygon)
+            assert np.isfinite(room.position).all()
+            assert np.array_equal(room.position, same.position)
+
+
+def test_a_retrieved_room_is_itself(rooms):
+    room = rooms[0]
+    found = borrowed(room, room, np.random.default_rng(0))
+    order = np.lexsort(room.position.T)
+    assert np.allclose(found.position[np.lexsort(found.position.T)], room.position[order], atol=1e-9)
+
+
+def test_half_chooses_by_one_half_of_the_terms_alone(rooms, monkeypatch):
+    task = tasks_of(rooms[:1], 0, told=1.0)[0]
+    drafts = [rooms[0], replace(rooms[0], id="better")]
+    scores = {"room": (5.0, 0.0), "better": (1.0, 9.0)}
+    seen = []
+
+    def scored(task, room):
+        a, b = scores["better" if room.id == "better" else "room"]
+        return {"told": (1.0, 1.0), "physics": (0.0, 1.0), "faults A": (a, 1.0), "faults B": (b, 1.0)}
+
+    monkeypatch.setattr(systems, "layout_scores", scored)
+    monkeypatch.setattr(systems, "searched", lambda task, draft, config: seen.append(config.without) or draft)
+    assert finished(System.parse("random+half"), task, drafts).id == "better"
+    assert seen == [systems.HALVES[1]] * 2
+
+
+def test_workers_change_nothing(rooms):
+    tasks = tasks_of(rooms[:2], 0, told=1.0)
+    asked = [System.parse("random+search")]
+    alone, together = (
+        run_systems(asked, tasks, SuiteSettings(workers=count))[0]["random+search"] for count in (1, 2)
+    )
+    assert all(np.array_equal(a.position, b.position) for a, b in zip(alone, together, strict=True))
