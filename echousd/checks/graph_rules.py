@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom
 
 from echousd.checks.findings import Finding, applied, rule
 from echousd.checks.reading import Reading
+from echousd.shapes.joints import FRICTION_API
 from echousd.stage import encoding as usd
 from echousd.stage.boxes import read_small
 from echousd.stage.encoding import StageError
@@ -18,6 +19,7 @@ from echousd.stage.values import targets
 LABELS_PREFIX = "SemanticsLabelsAPI:"
 # Known to this package even in a process that opened a stage before it could register the schema plugin.
 OURS = frozenset((usd.GRAPH_TYPE, usd.RELATION_TYPE, usd.NODE_API))
+WRITTEN = OURS | {FRICTION_API}
 
 
 @rule("echo:EdgeTargets")
@@ -84,7 +86,7 @@ def known_types(_reading: Reading, prim: Usd.Prim) -> Iterator[str]:
         yield f"unknown prim type {name!r}: no registered schema defines it"
     for schema in applied(prim):
         base = Usd.SchemaRegistry.GetTypeNameAndInstance(schema)[0]
-        if not registry.FindAppliedAPIPrimDefinition(base) and base not in OURS:
+        if not registry.FindAppliedAPIPrimDefinition(base) and base not in WRITTEN:
             yield f"unknown API schema {schema!r}: no registered schema defines it"
 
 

@@ -45,8 +45,8 @@ def write_asset_physics(stage: Usd.Stage, asset: str, category: str, geometry: G
         slots: its material slots, the one that most of it is made of first.
     """
     root = f"/{asset}"
-    lies = category in SMALL and SMALL[category].lies  # cloth is carried by what is below it
-    for collider in () if lies or geometry.theirs_collides else geometry.colliders:
+    cloth = category in SMALL and (SMALL[category].lies or SMALL[category].yields)  # stops nothing
+    for collider in () if cloth or geometry.theirs_collides else geometry.colliders:
         guide = stage.OverridePrim(piece_path(root, asset, collider.name, collider.body))
         UsdPhysics.CollisionAPI.Apply(guide)
         UsdPhysics.MeshCollisionAPI.Apply(guide).CreateApproximationAttr(collider.approximation)

@@ -30,6 +30,7 @@ LENGTHS = {  # attribute -> power of the unit that it is given in
     "inputs:radius": 1, "inputs:width": 1, "inputs:height": 1, "inputs:length": 1,
     "physics:centerOfMass": 1, "physics:localPos0": 1, "physics:localPos1": 1, "physics:gravityMagnitude": 1,
     "physics:diagonalInertia": 2, "drive:angular:physics:damping": 2, "physics:density": -3,
+    "drive:linear:physics:maxForce": 1, "drive:angular:physics:maxForce": 2,
 }  # fmt: skip
 LIMITS = ("physics:lowerLimit", "physics:upperLimit")  # lengths of what slides, else degrees
 SAYS_Y, SAYS_Z = "+Y up, +Z is the front", "+Z up, -Y is the front"
@@ -68,6 +69,8 @@ def _rescale(attribute: Sdf.AttributeSpec, spec: Sdf.PrimSpec, units: float, *, 
     power = LENGTHS.get(name, 0)
     outside = spec.layer.GetPrimAtPath(spec.path.StripAllVariantSelections())
     kind = spec.typeName or (outside.typeName if outside else "")
+    if name == "newton:friction":
+        power = 1 if kind == "PhysicsPrismaticJoint" else 2
     if name.startswith("xformOp:translate") or (name in LIMITS and kind == "PhysicsPrismaticJoint"):
         power = 1
     if name == "inputs:intensity" and kind == "SphereLight":

@@ -26,6 +26,7 @@ class Kind:
         program: builds it. low, high: usual extents, metres; what is fitted to its place has extents of its own.
         fixed: hangs or lies still; others are rigid bodies.
         lies: cloth that lies on something and carries nothing itself.
+        yields: cloth that hangs and gives way, to the door of a wardrobe say.
         faces: most triangles of its mesh.
     """
 
@@ -36,6 +37,7 @@ class Kind:
     high: Size3
     fixed: bool = False
     lies: bool = False
+    yields: bool = False
     faces: int = 1200
 
 
@@ -44,7 +46,7 @@ KINDS: dict[str, Kind] = {
     for kind in (
         Kind("rug", "rug", textiles.rug, (1.2, 0.012, 0.8), (3.5, 0.012, 2.5), True, True),
         Kind("rug", "rug", textiles.round_rug, (1.2, 0.012, 1.2), (2.6, 0.012, 2.6), True, True),
-        Kind("curtain", "curtain", textiles.curtain, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True),
+        Kind("curtain", "curtain", textiles.curtain, (0.3, 1.2, 0.09), (0.8, 2.6, 0.09), True, yields=True),
         Kind("blind", "blind", textiles.blind, (0.5, 0.2, 0.016), (2.0, 0.8, 0.016), True),
         Kind("cushion", "cushion", textiles.cushion, (0.38, 0.36, 0.13), (0.46, 0.42, 0.16), faces=400),
         Kind("throw", "blanket", textiles.throw, (1.0, 0.2, 0.4), (2.0, 0.3, 0.7), True, True),

@@ -103,6 +103,7 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
     from pxr import Usd, UsdGeom, UsdPhysics
 
     import echousd
+    from echousd.checks.findings import applied
     from echousd.checks.mesh_rules import extents
     from echousd.checks.reading import Reading
     from echousd.graph import Node, RoomSpec, SceneGraph
@@ -132,6 +133,12 @@ def test_an_asset_has_joints_and_levels_of_detail_in_variants(tmp_path):
         assert str(ends[0]).endswith("_frame")
         slide = UsdPhysics.PrismaticJoint(joint)
         assert 0 == slide.GetLowerLimitAttr().Get() < slide.GetUpperLimitAttr().Get() < 0.45
+        # what leans a little stays shut, and a hand opens it
+        weight = 9.81 * UsdPhysics.MassAPI(stage.GetPrimAtPath(ends[1])).GetMassAttr().Get()
+        friction = slide.GetPrim().GetAttribute("newton:friction").Get()
+        assert 0.02 * weight < friction < 0.1 * weight
+        assert UsdPhysics.DriveAPI(slide, "linear").GetMaxForceAttr().Get() == friction
+        assert "NewtonJointAPI" in applied(slide.GetPrim())
     drawer = UsdGeom.Xformable(stage.GetPrimAtPath(joints[0].GetBody1Rel().GetTargets()[0]))
     drawer.AddTranslateOp().Set((0.0, 0.0, 0.4))
     for state in ("articulated", "static"):  # pulled out, it is as good

@@ -134,8 +134,16 @@ def test_joints_of_drawers_slide_as_far_in_another_unit():
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     for kind, limit in ((UsdPhysics.PrismaticJoint, 0.4), (UsdPhysics.RevoluteJoint, 90.0)):
-        kind.Define(stage, f"/{kind.__name__}").CreateUpperLimitAttr(limit)
+        joint = kind.Define(stage, f"/{kind.__name__}")
+        joint.CreateUpperLimitAttr(limit)
+        joint.GetPrim().CreateAttribute("newton:friction", Sdf.ValueTypeNames.Float).Set(2.0)
+        way = "linear" if limit < 1 else "angular"
+        UsdPhysics.DriveAPI.Apply(joint.GetPrim(), way).CreateMaxForceAttr(2.0)
     rescale(layer, 0.01)
+    for name, force in (("newton:friction", 200.0), ("drive:linear:physics:maxForce", 200.0)):
+        assert stage.GetPrimAtPath("/PrismaticJoint").GetAttribute(name).Get() == pytest.approx(force)
+    for name, force in (("newton:friction", 2e4), ("drive:angular:physics:maxForce", 2e4)):
+        assert stage.GetPrimAtPath("/RevoluteJoint").GetAttribute(name).Get() == pytest.approx(force)
     assert stage.GetPrimAtPath("/PrismaticJoint").GetAttribute("physics:upperLimit").Get() == pytest.approx(40.0)
     assert stage.GetPrimAtPath("/RevoluteJoint").GetAttribute("physics:upperLimit").Get() == 90.0
     once = layer.ExportToString()
