@@ -31,7 +31,6 @@ from echomodel.compact.pairs import pairs_of
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.packed import pack_linear_maps
-from echoscene.compiled_shape import CompiledShape
 from echoscene.config import shape_unet
 from echoscene.shape import ShapeUNet
 
@@ -113,7 +112,7 @@ def decode_modes(model: EchoModel, objects: int) -> dict[str, Run | None]:
 
 
 def released_modes(objects: int) -> dict[str, Run | None]:
-    """One step of the released shape U-Net at its published size; its own fast path is there for comparison."""
+    """One step of the released shape U-Net at its published size."""
     generator = torch.Generator().manual_seed(0)
     with torch.device("meta"):
         net = ShapeUNet(shape_unet())
@@ -127,7 +126,6 @@ def released_modes(objects: int) -> dict[str, Run | None]:
     condition = torch.randn(objects, net.config.objects, generator=generator)
     triples = torch.randint(0, objects, (4 * objects, 3), generator=generator)
     t = torch.full((objects,), 501)
-    bound = CompiledShape(net).bind(condition, triples)
     last = copy.deepcopy(net).to(memory_format=LAST)
     x_last = x.contiguous(memory_format=LAST)
     faster = compiled(net)
@@ -137,7 +135,6 @@ def released_modes(objects: int) -> dict[str, Run | None]:
         "bf16": bf16(lambda: net(x, condition, triples, t)),
         "last": lambda: last(x_last, condition, triples, t),
         "bf16+last": bf16(lambda: last(x_last, condition, triples, t)),
-        "fast path": lambda: bound(x, t),
     }
 
 

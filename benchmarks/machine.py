@@ -1,10 +1,9 @@
-"""What this machine can do, measured: matrix products and reading memory; and who multiplied how much."""
+"""What this machine can do, measured: matrix products and reading memory."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import torch
 
@@ -49,34 +48,3 @@ def read_bandwidth(megabytes: int = 512) -> float:
     """Bytes/s of summing a tensor that fits no cache."""
     data = torch.randn(megabytes * 250_000)
     return data.numel() * 4 / alternate({"sum": data.sum}, repeats=5)["sum"]
-
-
-@contextmanager
-def tally() -> Iterator[dict[str, float]]:
-    """Counts FLOPs and bytes of weights of the packed products inside the block."""
-    counts = {"flops": 0.0, "bytes": 0.0}
-    plain = PackedLinear.__call__
-
-    def counted(self: PackedLinear, x: torch.Tensor) -> torch.Tensor:
-        out, width = self.shape
-        counts["flops"] += 2.0 * x.numel() * out
-        counts["bytes"] += 4.0 * out * width
-        return plain(self, x)
-
-    PackedLinear.__call__ = counted  # type: ignore[method-assign]
-    try:
-        yield counts
-    finally:
-        PackedLinear.__call__ = plain  # type: ignore[method-assign]
-
-
-def scene_graph(scenes: int, generator: torch.Generator) -> torch.Tensor:
-    """(51 scenes, 3) int64 triples: ten objects, floor and scene node each, 40 relations and 11 `in` edges."""
-    triples = []
-    for scene in range(scenes):
-        ends = torch.stack([torch.randperm(11, generator=generator)[:2] for _ in range(40)])
-        predicates = torch.randint(1, 16, (40,), generator=generator)
-        related = torch.stack([ends[:, 0], predicates, ends[:, 1]], dim=1)
-        inside = torch.stack([torch.arange(11), torch.zeros(11, dtype=torch.int64), torch.full((11,), 11)], dim=1)
-        triples.append(torch.cat([related, inside]) + torch.tensor([12 * scene, 0, 12 * scene]))
-    return torch.cat(triples)

@@ -25,22 +25,15 @@ def measure(tree: Path) -> None:
     """Print a line a measurement: its name and the least CPU seconds of several."""
     sys.path.insert(0, str(tree / "benchmarks"))
     import graph_stage
-    import machine
     import numpy as np
     import torch
 
     import echousd
-    from echoscene.config import UNetConfig
-    from echoscene.layout import LayoutNet
     from echousd.graph import load_graph
     from echousd.stage.files import save_layer
     from echousd.stage.graphs import read_graph
     from echousd.stage.write import graph_layer
 
-    try:
-        from echoscene.compiled_layout import CompiledLayout
-    except ImportError:  # as it was called once
-        from echoscene.frozen_layout import FrozenLayout as CompiledLayout  # type: ignore[no-redef]
     warnings.simplefilter("ignore")
     torch.set_num_threads(1)
     folder = Path(tempfile.mkdtemp())
@@ -52,10 +45,6 @@ def measure(tree: Path) -> None:
     graph_stage.WORDS = Words  # type: ignore[assignment, misc]
     graph = graph_stage.random_graph(150, 1500, np.random.default_rng(0))
     room = echousd.generate(load_graph(tree / "samples" / "bedroom.usda"), seed=1, shapes="boxes", place=False)
-    draw = torch.Generator().manual_seed(0)
-    triples, t = machine.scene_graph(1, draw), torch.full((12,), 500)
-    x, bound = torch.randn(12, 8, generator=draw), CompiledLayout(LayoutNet(UNetConfig()).eval())
-    step = bound.bind(torch.randn(12, 640, generator=draw), triples)
 
     def stage() -> None:
         save_layer(graph_layer(graph), folder / "graph.usda")
@@ -67,7 +56,6 @@ def measure(tree: Path) -> None:
     work: dict[str, Callable[[], object]] = {
         "graph stage": stage,
         "room writing": write,
-        "layout step": lambda: step(x, t),
     }
     for name, run in work.items():
         spent = []

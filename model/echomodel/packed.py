@@ -76,20 +76,3 @@ def packing_available() -> bool:
             return torch.equal(torch.ops.mkldnn._linear_pointwise(x, packed, None, "none", [], ""), weight.t())
     except (RuntimeError, AttributeError, NotImplementedError):
         return False
-
-
-def folded_norm(weight: Tensor, bias: Tensor | None, norm: Any) -> tuple[Tensor, Tensor]:
-    """A linear map after the gains and shifts of a norm, as one map: float64 weight (out, in) and bias (out,)."""
-    gain, shift = norm.weight.double(), norm.bias.double()
-    matrix = weight.double()
-    offset = matrix @ shift
-    return matrix * gain, offset if bias is None else offset + bias.double()
-
-
-def folded_batch_norm(linear: Any, norm: Any) -> tuple[Tensor, Tensor]:
-    """A linear map before a batch norm with fixed statistics, as one map: float64 weight (out, in) and bias (out,)."""
-    if norm.running_mean is None or norm.running_var is None:
-        raise ValueError("batch norm without running statistics cannot be folded")
-    scale = norm.weight.double() / (norm.running_var.double() + norm.eps).sqrt()
-    bias = (linear.bias.double() - norm.running_mean.double()) * scale + norm.bias.double()
-    return linear.weight.double() * scale[:, None], bias

@@ -13,13 +13,12 @@ from torch import Tensor, nn
 from echomodel.boxes import Boxes, BoxStatistics
 from echomodel.progress import StepListener
 from echomodel.randomness import normal
-from echoscene.compiled_layout import CompiledLayout
-from echoscene.compiled_shape import CompiledShape
 from echoscene.config import ReleasedConfig
 from echoscene.encoder import GraphEncoder, SceneGraphTensors
 from echoscene.layout import LayoutNet
 from echoscene.shape import ShapeNet
 from echoscene.tables import DDIMGrid, LayoutTables, ShapeTables
+from echoscene.unet import packed
 from echoscene.vqvae import VQVAE
 
 STRUCTURE = ("floor", "_scene_")  # nodes that take part in both diffusions and have no shape
@@ -166,18 +165,17 @@ class ReleasedModel(GraphEncoder):
         tables, chosen = self.layout_tables.spaced(steps or len(self.layout_tables.betas))
         tables, chosen = tables.to(device), chosen.to(device)
 
-        def as_trained(x: Tensor, t: Tensor) -> Tensor:
-            return net(x, conditions.layout, graph.triples, t, conditions.edge_attr)
+        fast = packed(net) if device.type == "cpu" else net
 
-        bound: Denoiser = as_trained
-        if device.type == "cpu":
-            bound = CompiledLayout(net).bind(conditions.layout, graph.triples, conditions.edge_attr)
+        def denoise(x: Tensor, t: Tensor) -> Tensor:
+            return fast(x, conditions.layout, graph.triples, chosen[t], conditions.edge_attr)
+
         shape = (len(graph.classes), net.config.channels)
         start = normal(shape, generator, device)
         # The paper's text takes sigma_t^2 = beta_t; the published code takes the posterior variance.
         variance = "beta" if self.config.preset == "paper" else "posterior"
         states = ancestral(
-            lambda x, t: bound(x, chosen[t]),
+            denoise,
             start,
             tables,
             noise=lambda step: normal(shape, generator, device),
@@ -194,7 +192,6 @@ class ReleasedModel(GraphEncoder):
         steps: int = 100,
         shared_noise: bool = True,
         change: GraphChange | None = None,
-        winograd: bool = True,
         progress: StepListener | None = None,
     ) -> Tensor:
         """Shape latents of all nodes by deterministic DDIM (EchoScene, section 3.4); decode them with `vqvae.decode`.
@@ -202,8 +199,7 @@ class ReleasedModel(GraphEncoder):
         Arguments:
             graph: one or many scenes. generator: source of all randomness. steps: DDIM steps.
             shared_noise: all nodes start from one draw (published code) rather than from one each (paper).
-            change: as `conditions`. winograd: as `CompiledShape`: faster, at the cost of memory.
-            progress: called with (steps done, steps).
+            change: as `conditions`. progress: called with (steps done, steps).
 
         Returns:
             (N, 3, 16, 16, 16) float32; floor and `_scene_` nodes have latents that mean nothing.
@@ -221,14 +217,9 @@ class ReleasedModel(GraphEncoder):
         )
         start = drawn.expand(count, -1, -1, -1, -1).contiguous()
 
-        def as_trained(x: Tensor, t: Tensor) -> Tensor:
+        def denoise(x: Tensor, t: Tensor) -> Tensor:
             return self.shape_df(x, conditions.shape, graph.triples, t, conditions.edge_attr)
 
-        denoise: Denoiser = as_trained
-        compiled = self.device.type == "cpu" and self.config.shape.conditioning == "crossattn"
-        if compiled and conditions.shape is not None:
-            net = self.shape_df.diffusion_net
-            denoise = CompiledShape(net, winograd).bind(conditions.shape, graph.triples, conditions.edge_attr)
         return last(ddim(denoise, start, DDIMGrid.uniform(self.shape_tables, steps)), progress, steps)
 
     def _here(self, change: GraphChange | None) -> GraphChange | None:

@@ -25,7 +25,7 @@ SIZES = PaperSizes(
 )  # fmt: skip
 GPU = pytest.param(torch.device("cuda"), marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU"))
 DEVICES = [pytest.param(SECOND, id="second"), GPU]
-CLOSE = {"rtol": 1e-3, "atol": 1e-3}  # the CPU runs the compiled networks, other devices those that were trained
+CLOSE = {"rtol": 1e-3, "atol": 1e-3}  # the CPU runs packed maps, other devices those that were trained
 
 
 @pytest.fixture(scope="module")

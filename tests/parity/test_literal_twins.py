@@ -10,12 +10,11 @@ from literal_networks import literal_layout, literal_shape
 from parity_numbers import close, fill
 from torch.nn import functional as F
 
-from echoscene.compiled_layout import CompiledLayout
-from echoscene.compiled_shape import CompiledShape
 from echoscene.config import UNetConfig, shape_unet
 from echoscene.layout import LayoutNet
 from echoscene.shape import ShapeUNet
-from echoscene.volumes import WinogradConv, convolve_repeated
+from echoscene.unet import packed
+from echoscene.volumes import convolve_repeated
 
 LAYOUT = UNetConfig(width=128, context=96, objects=40, hidden=32, layers=3, residual=True)
 SHAPE = shape_unet(width=32, mult=(1, 2), blocks=1, attention=(2,), context=48, objects=24, hidden=32, layers=2, grid=8)
@@ -42,10 +41,7 @@ def test_layout(graph: str, change: dict) -> None:
     expected = literal_layout(net, x, objects, _graph(graph), t)
     with torch.inference_mode():
         close(net(x, objects, _graph(graph), t), expected, 1e-4)
-    bound = CompiledLayout(net, t).bind(objects, _graph(graph))
-    close(bound(x, t), expected, 1e-4)
-    with pytest.raises(ValueError, match="step 17 was not prepared"):
-        bound(x, torch.full((6,), 17))
+        close(packed(net)(x, objects, _graph(graph), t), expected, 1e-4)
 
 
 @pytest.mark.parametrize("graph", TRIPLES)
@@ -60,8 +56,6 @@ def test_shape(graph: str, change: dict) -> None:
     expected = literal_shape(net, x, objects, _graph(graph), t)
     with torch.inference_mode():
         close(net(x, objects, _graph(graph), t), expected, 5e-5)
-    for winograd in (True, False):
-        close(CompiledShape(net, winograd).bind(objects, _graph(graph))(x, t), expected, 5e-5)
 
 
 def test_one_node_alone() -> None:
@@ -70,9 +64,11 @@ def test_one_node_alone() -> None:
     fill(shape, seed=4)
     t, none = torch.tensor([7]), _graph("no edges")
     x, objects = torch.randn(1, 8), torch.randn(1, LAYOUT.objects)
-    close(CompiledLayout(layout, t).bind(objects, none)(x, t), literal_layout(layout, x, objects, none, t), 1e-4)
+    with torch.inference_mode():
+        close(packed(layout)(x, objects, none, t), literal_layout(layout, x, objects, none, t), 1e-4)
     x, objects = torch.randn(1, 3, 8, 8, 8), torch.randn(1, SHAPE.objects)
-    close(CompiledShape(shape).bind(objects, none)(x, t), literal_shape(shape, x, objects, none, t), 5e-5)
+    with torch.inference_mode():
+        close(shape(x, objects, none, t), literal_shape(shape, x, objects, none, t), 5e-5)
 
 
 @pytest.mark.parametrize("doubled", [(False, True, True), (True, True, True), (True, False, False)])
@@ -87,12 +83,3 @@ def test_repeated_voxels(doubled: tuple[bool, bool, bool]) -> None:
     wanted = torch.autograd.grad(expected.square().sum(), (x, weight))
     for gradient, other in zip(torch.autograd.grad(found.square().sum(), (x, weight)), wanted, strict=True):
         close(gradient, other, 1e-9)
-
-
-def test_winograd() -> None:
-    x, weight, bias = torch.randn(3, 5, 4, 6, 8), torch.randn(7, 5, 3, 3, 3), torch.randn(7)
-    expected = F.conv3d(x, weight, bias, padding=1)
-    for tiles in (1, 512):
-        close(WinogradConv(weight, bias, tiles)(x), expected, 1e-4)
-    with pytest.raises(ValueError, match="must be even"):
-        WinogradConv(weight, bias)(x[..., :5])

@@ -7,7 +7,6 @@ import torch
 from parity_configs import shape_config, vq_config
 from parity_numbers import Numbers, check_gradients, close
 
-from echoscene.compiled_shape import CompiledShape
 from echoscene.model import ddim, shape_loss
 from echoscene.shape import ShapeNet
 from echoscene.tables import DDIMGrid, ShapeTables
@@ -33,9 +32,6 @@ def test_step() -> None:
     close(embedding, numbers["time_emb"], 1e-4)
     close(net.diffusion_net.echo(x, _objects(numbers), triples, embedding, None), numbers["echo"], 1e-4)
     close(net(x, _objects(numbers), triples, numbers["t"]), numbers["eps"], 5e-5)
-    for winograd in (True, False):
-        bound = CompiledShape(net.diffusion_net, winograd).bind(_objects(numbers), triples)
-        close(bound(x, numbers["t"]), numbers["eps"], 5e-5)
 
 
 @torch.inference_mode()
@@ -46,8 +42,7 @@ def test_ddim() -> None:
     assert grid.timesteps.tolist() == numbers["timesteps"].tolist()
     close(grid.alphas, numbers["ddim_alphas"], 1e-7)
     close(grid.alphas_prev, numbers["ddim_alphas_prev"], 1e-7)
-    bound = CompiledShape(net.diffusion_net).bind(_objects(numbers), numbers["triples"])
-    states = ddim(bound, numbers["x_T"], grid)
+    states = ddim(lambda x, t: net(x, _objects(numbers), numbers["triples"], t), numbers["x_T"], grid)
     for number, (_, x) in enumerate(states):
         close(x, numbers["x_steps"][number], 1e-3)
     close(x, numbers["out"], 1e-3)
