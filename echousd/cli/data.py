@@ -305,22 +305,45 @@ def _with_relations(room: RoomBoxes, relations: np.ndarray | None) -> RoomBoxes:
     return replace(room, relations=relations)
 
 
-@data_app.command("from-usd")
-def from_usd(
-    stages: Annotated[list[Path], typer.Argument(help="Stages, or folders of stages.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
+@data_app.command("import")
+def import_rooms(
+    sources: Annotated[list[Path], typer.Argument(help="Rooms files, sets, stages, or folders of stages or SG-FRONT.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="A set to train on (.npz), or a rooms file (.json).")],
+    room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
+    split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
 ) -> None:
-    """Read the rooms of USD stages, whose objects all have boxes, into a rooms file.
+    """Bring rooms of any source into one file: for `echousd train --set data=FILE.npz`, or for eval.
 
-    Example: echousd data from-usd stages -o rooms.json
+    A set holds every twentieth room out and is labelled anew where it is read; a rooms file keeps what is told.
+
+    Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
+    from echomodel.data.roomset import kept_out, load_rooms, pack_rooms
+    from echomodel.data.sgfront import SGFront
+    from echomodel.metrics.room_figures import with_known_words
     from echomodel.roomboxes import write_rooms
+    from echousd.cli.terminal import Terminal
     from echousd.stage.boxes import read_stages
 
-    found = read_stages(stages)
+    if out.suffix not in (".npz", ".json"):
+        raise ValueError(f"{out}: allowed are a set to train on (.npz) and a rooms file (.json)")
+    found: list[RoomBoxes] = []
+    for source in sources:
+        if (source / "classes_all.txt").exists():
+            found += SGFront(source, room, split).rooms()
+        elif source.suffix in USD_FILES or (source.is_dir() and not any(source.rglob("rooms*.json"))):
+            found += read_stages([source])
+        else:
+            found += load_rooms(source)
     if not found:
-        raise ValueError(f"{', '.join(map(str, stages))}: no room found")
-    write_rooms(out, found)
+        raise ValueError(f"{', '.join(map(str, sources))}: no room found")
+    if out.suffix == ".json":
+        write_rooms(out, found)
+        return
+    known = [one for one in with_known_words(found) if len(one)]
+    pack_rooms(out, known, [kept_out(k) for k in range(len(known))], {"kind": "imported rooms"})
+    left = sum(map(len, found)) - sum(map(len, known))
+    Terminal(stderr=True).print(f"{out}: {len(known)} rooms; objects of unknown words left out: {left}")
 
 
 @data_app.command("to-sgfront")
@@ -340,20 +363,3 @@ def to_sgfront(
     from echomodel.metrics.room_figures import with_known_words
 
     write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)
-
-
-@data_app.command("from-sgfront")
-def from_sgfront(
-    folder: Annotated[Path, typer.Argument(help="Folder with the files of SG-FRONT.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
-    room: Annotated[str, typer.Option(help="bedroom, livingroom, diningroom, library or all.")] = "all",
-    split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
-) -> None:
-    """Read SG-FRONT into a rooms file, with its relations.
-
-    Example: echousd data from-sgfront 3D-FRONT --split test -o test.json
-    """
-    from echomodel.data.sgfront import SGFront
-    from echomodel.roomboxes import write_rooms
-
-    write_rooms(out, SGFront(folder, room, split).rooms())

@@ -26,12 +26,13 @@ def test_rooms_come_back(folder):
     assert rooms.held_out.sum() == 2
     for number, true in enumerate(generate_rooms(40, 3, styles=5)):
         read = rooms.room(number)
+        assert [o.name for o in read.openings] == [o.name for o in true.openings]
         assert read.categories == true.categories
         assert read.models == true.models
         assert read.room_type == true.room_type
-        assert np.allclose(read.size, true.size, atol=1e-4)
-        assert np.allclose(read.position, true.position, atol=1e-4)
-        assert np.allclose(read.floor_polygon, true.floor_polygon, atol=1e-4)
+        assert np.allclose(read.size, true.size, atol=6e-4)
+        assert np.allclose(read.position, true.position, atol=6e-4)
+        assert np.allclose(read.floor_polygon, true.floor_polygon, atol=6e-4)
         for rules in ("strict", "sgfront"):
             assert np.array_equal(rooms.relations(number, rules=rules), label_relations(read, rules=rules))
 
@@ -48,16 +49,16 @@ def test_equal_seeds_give_equal_bytes_also_after_an_interruption(folder, tmp_pat
         build_rooms(tmp_path / "broken", 24, 3, 5, stop)
     with pytest.raises(ValueError, match="not a room set \\(unfinished set, run the build again\\)"):
         RoomSet(tmp_path / "broken")
-    assert [p.name for p in sorted((tmp_path / "broken").glob("*.bin"))] == ["rooms-0000.bin"]
+    assert [p.name for p in sorted((tmp_path / "broken").glob("rooms-*"))] == ["rooms-0000.npz"]
     build_rooms(tmp_path / "broken", 24, 3, 5)
     for path in (tmp_path / "whole").iterdir():
         assert path.read_bytes() == (tmp_path / "broken" / path.name).read_bytes()
     build_rooms(tmp_path / "other", 24, 4, 5)
-    name = "rooms-0000.bin"
+    name = "rooms-0000.npz"
     assert (tmp_path / "other" / name).read_bytes() != (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_packed_set_is_its_rooms_in_millimetres(folder, tmp_path):
+def test_a_set_of_one_file(folder, tmp_path):
     whole, path = RoomSet(folder), tmp_path / "rooms.npz"
     rooms = [whole.room(k) for k in range(len(whole))]
     pack_rooms(path, rooms, whole.held_out.tolist(), {"seed": 3})
@@ -65,17 +66,13 @@ def test_a_packed_set_is_its_rooms_in_millimetres(folder, tmp_path):
     assert np.array_equal(packed.held_out, whole.held_out)
     assert path.stat().st_size < 300 * len(rooms)
     for number, true in enumerate(rooms):
-        read = packed.room(number)
-        assert (read.categories, read.styles, read.room_type) == (true.categories, true.styles, true.room_type)
-        assert np.abs(read.position - true.position).max() <= 0.5001e-3
-        assert [o.name for o in read.openings] == [o.name for o in true.openings]
-        assert np.array_equal(packed.relations(number), label_relations(read, rules="strict"))
+        assert packed.room(number).to_json() == true.to_json()
     far = replace(rooms[0], position=rooms[0].position + 40)
-    with pytest.raises(ValueError, match=r"objects.position reaches \d+.* steps, a packed set holds 32767"):
+    with pytest.raises(ValueError, match=r"objects.position reaches \d+.* steps, a set of rooms holds 32767"):
         pack_rooms(path, [far], [False], {})
-    for content, said in ((b"PK", "not a packed set of rooms"), (pickle.dumps({}), "not a packed set of rooms")):
+    for content in (b"PK", pickle.dumps({})):
         (tmp_path / "bad.npz").write_bytes(content)
-        with pytest.raises(ValueError, match=f"bad.npz: {said}"):
+        with pytest.raises(ValueError, match=r"bad.npz: not a packed set of rooms"):
             RoomSet(tmp_path / "bad.npz")
 
 
@@ -85,17 +82,16 @@ def test_bad_folders_are_told(folder, tmp_path):
     with pytest.raises(ValueError, match=r"no rooms\.json"):
         RoomSet(tmp_path)
     build_rooms(tmp_path, 5, 1, 2)
-    shard = tmp_path / "rooms-0000.bin"
+    shard = tmp_path / "rooms-0000.npz"
+    with np.load(shard) as held:
+        columns = dict(held)
+    for name, said in (("rooms.objects", "objects"), ("objects.category", "categories"), ("rooms.type", "room types")):
+        np.savez(shard, **{**columns, name: np.full_like(columns[name], 255)})
+        with pytest.raises(ValueError, match=f"rooms-0000.npz: damaged, its {said} are not those of its rooms"):
+            RoomSet(tmp_path)
     shard.write_bytes(shard.read_bytes()[:-3])
-    with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, \d+ bytes of \d+; remove it and build again"):
+    with pytest.raises(ValueError, match=r"rooms-0000.npz: not a packed set of rooms"):
         RoomSet(tmp_path)
-    build_rooms(tmp_path / "zeros", 5, 1, 2)
-    shard = tmp_path / "zeros/rooms-0000.bin"
-    raw = bytearray(shard.read_bytes())
-    raw[48:52] = bytes(4)  # the first room's number of objects
-    shard.write_bytes(raw)
-    with pytest.raises(ValueError, match=r"rooms-0000.bin: damaged shard, its objects are not those of its rooms"):
-        RoomSet(shard.parent)
     for text, said in (
         ("{", "cannot be read as JSON"),
         ("[" * 60_000, "cannot be read as JSON"),
@@ -120,23 +116,8 @@ def test_the_smoke_recipe_makes_rooms_that_refer_to_its_shapes(tmp_path):
         room = rooms.room(number)
         for model, category in zip(room.models, room.categories, strict=True):
             assert shapes.categories[shapes.category[shapes.index_of(model)]] == category
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.bin")}
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*-0000.*")}
     build_data(tmp_path, "smoke", 7)
-    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.bin")}
+    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*-0000.*")}
     with pytest.raises(ValueError, match="was begun with seed 7"):
         build_data(tmp_path, "smoke", 8)
-
-
-def test_a_set_of_16_relations_is_still_read(tmp_path, monkeypatch):
-    new = build_rooms(tmp_path / "new", 3, seed=5, styles=4)
-    monkeypatch.setattr(roomset, "PAIR", np.dtype(("<u2", len(roomset.RULES))))
-    monkeypatch.setattr(roomset, "TABLES", (*roomset.TABLES[:-1], ("pairs", roomset.PAIR)))
-    monkeypatch.setattr(roomset, "MAGIC", roomset.MAGIC_OF_16)
-    build_rooms(tmp_path / "old", 3, seed=5, styles=4)
-    monkeypatch.undo()
-    old = roomset.RoomSet(tmp_path / "old")
-    sizes = [next((tmp_path / name).glob("*.bin")).stat().st_size for name in ("old", "new")]
-    assert sizes[0] < sizes[1]
-    for number in range(3):
-        for rules in roomset.RULES:
-            assert np.array_equal(old.relations(number, rules=rules), new.relations(number, rules=rules))

@@ -80,7 +80,7 @@ class PackedRooms:
     def from_set(cls, rooms: RoomSet, rules: Sequence[str], *, held: bool) -> PackedRooms:
         """One part of a room set, every room once per rule set; the last twentieth where nothing is held out."""
         mask = rooms.held_out if rooms.held_out.any() else np.arange(len(rooms)) >= len(rooms) * 19 // 20
-        numbers = ((mask == held) & ~rooms.shaken).nonzero()[0]
+        numbers = (mask == held).nonzero()[0]
         parts = [
             cls.build([rooms.room(int(n), rules=name) for n in some], number)
             for number, name in enumerate(rules)

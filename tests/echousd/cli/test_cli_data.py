@@ -1,13 +1,16 @@
 """`echousd data` and `echousd eval layout` end to end on small sets."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from echomodel.data.roomset import RoomSet, build_rooms
 from echomodel.roomboxes import RoomBoxes, read_rooms, write_rooms
 from echomodel.rooms.generator import generate_rooms
 from echomodel.rules import label_relations
+from echomodel.training.rooms import PackedRooms
 from echousd.cli.main import run
 from echousd.stage.boxes import graph_of, room_of
 
@@ -41,13 +44,32 @@ def test_rooms_are_written_and_seeded(rooms_file, tmp_path):
 
 def test_rooms_to_usd_and_back(rooms_file, tmp_path):
     assert run(["data", "to-usd", str(rooms_file), "-o", str(tmp_path / "usd")]) == 0
-    assert run(["data", "from-usd", str(tmp_path / "usd"), "-o", str(tmp_path / "back.json")]) == 0
+    assert run(["data", "import", str(tmp_path / "usd"), "-o", str(tmp_path / "back.json")]) == 0
     true, back = read_rooms(rooms_file), read_rooms(tmp_path / "back.json")
     assert [room.id for room in back] == sorted(room.id for room in true)
     found = {room.id: room for room in back}
     for room in true:
         assert same(room, found[room.id])
         assert sorted(map(tuple, found[room.id].relations)) == sorted(map(tuple, label_relations(room)))
+
+
+def test_rooms_of_all_sources_make_a_set_to_train_on(rooms_file, tmp_path, capsys):
+    odd = replace(read_rooms(rooms_file)[0], categories=("sculpture", *read_rooms(rooms_file)[0].categories[1:]))
+    write_rooms(tmp_path / "odd.json", [odd])
+    run(["data", "to-usd", str(rooms_file), "-o", str(tmp_path / "usd"), "--limit", "3"])
+    run(["data", "to-sgfront", str(rooms_file), "-o", str(tmp_path / "sg")])
+    sources = [str(rooms_file), *(str(tmp_path / name) for name in ("usd", "sg", "odd.json"))]
+    out = tmp_path / "mine.npz"
+    capsys.readouterr()
+    assert run(["data", "import", *sources, "-o", str(out)]) == 0
+    assert "20 rooms; objects of unknown words left out: 1" in capsys.readouterr().err.replace("\n", "")
+    made = RoomSet(out)
+    assert made.held_out.nonzero()[0].tolist() == [19]
+    assert made.room(0).categories == read_rooms(rooms_file)[0].categories
+    packed = PackedRooms.from_set(made, ("strict",), held=False)
+    assert len(packed) == 19
+    assert run(["data", "import", str(rooms_file), "-o", str(tmp_path / "x.bin")]) == 2
+    assert "allowed are a set to train on (.npz) and a rooms file (.json)" in capsys.readouterr().err
 
 
 def test_graph_keeps_relations_and_names_twins():
@@ -69,7 +91,7 @@ def test_unknown_objects_are_left_out_or_told(tmp_path, capsys):
     path = tmp_path / "r.json"
     write_rooms(path, [room])
     assert run(["data", "to-usd", str(path), "-o", str(tmp_path / "usd")]) == 0
-    assert run(["data", "from-usd", str(tmp_path / "usd" / "r.usda"), "-o", str(tmp_path / "b.json")]) == 0
+    assert run(["data", "import", str(tmp_path / "usd" / "r.usda"), "-o", str(tmp_path / "b.json")]) == 0
     assert read_rooms(tmp_path / "b.json")[0].categories == ("multi_seat_sofa", "stool")
     assert run(["data", "to-usd", str(path), "--no-known", "-o", str(tmp_path / "none")]) == 2
     assert "unknown category 'sculpture'" in capsys.readouterr().err
@@ -77,7 +99,7 @@ def test_unknown_objects_are_left_out_or_told(tmp_path, capsys):
 
 def test_sgfront_files_and_back(rooms_file, tmp_path):
     assert run(["data", "to-sgfront", str(rooms_file), "-o", str(tmp_path)]) == 0
-    assert run(["data", "from-sgfront", str(tmp_path), "-o", str(tmp_path / "back.json")]) == 0
+    assert run(["data", "import", str(tmp_path), "-o", str(tmp_path / "back.json")]) == 0
     back = read_rooms(tmp_path / "back.json")
     assert len(back) == 8
     assert all(len(room.relations) > 0 for room in back)
@@ -120,8 +142,6 @@ def test_evaluation_with_few_relations(rooms_file, capsys):
 
 
 def test_a_built_set_serves_as_rooms(tmp_path, capsys):
-    from echomodel.data.roomset import build_rooms
-
     build_rooms(tmp_path / "rooms", 22, 1, 2)
     arguments = ["eval", "layout", "--rooms", str(tmp_path), "--model", "truth", "--json"]
     assert run([*arguments, "--limit", "4"]) == 0
@@ -136,7 +156,7 @@ def test_a_built_set_serves_as_rooms(tmp_path, capsys):
         (["data", "plot", "missing.json", "-o", "x.png"], "missing.json: no such file or folder"),
         (["data", "build", "--recipe", "huge", "-o", "x"], "unknown recipe 'huge': allowed are smoke, packed, full"),
         (["data", "rooms", "--room", "garage", "-o", "x"], "unknown room type 'garage'"),
-        (["data", "from-sgfront", "nowhere", "-o", "x"], "nowhere/classes_all.txt: no such file"),
+        (["data", "import", "nowhere", "-o", "x.npz"], "nowhere: no such file or folder"),
         (["eval", "layout", "--rooms", __file__, "--held-out"], "a rooms file holds nothing out"),
         (["eval", "layout", "--rooms", "nothing"], "nothing: no such file or folder"),
     ],

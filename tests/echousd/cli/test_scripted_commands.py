@@ -152,9 +152,8 @@ WITHOUT_JSON = {
     "meshes",
     "sheet",
     "to-usd",
-    "from-usd",
     "to-sgfront",
-    "from-sgfront",
+    "import",
     "search",
 }
 
