@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -74,13 +73,10 @@ def generate(
             held.enter_context(writing(output, flat=flat, force=force, wait=wait))
         held.enter_context(telling_faults())
         listen = held.enter_context(progress_bar())
-        gc.disable()  # imports make a million objects and no garbage; looking for it took a fifth of their time
-        try:
-            from echousd.make.pipeline import generate as make
-            from echousd.make.written import write_room, write_rooms
-            from echousd.progress import StageTimer
-        finally:
-            gc.enable()
+        from echousd.make.pipeline import generate as make
+        from echousd.make.written import write_room, write_rooms
+        from echousd.progress import StageTimer
+
         spent = {"imports": time.perf_counter() - started}
 
         def one(path: str | None, folder: Path) -> Written:

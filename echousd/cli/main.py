@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import sys
@@ -43,6 +44,7 @@ TOPICS = {
 
 BAD_INPUT, OWN_FAULT, INTERRUPTED, CLOSED_PIPE = 2, 70, 130, 141
 MOST_PARTS = 500
+GARBAGE = 200_000  # objects made between two looks for garbage: imports make a million and none of it
 
 
 def _version(wanted: bool) -> None:
@@ -66,7 +68,10 @@ def main() -> None:
     warnings.formatwarning = lambda message, *_, **__: f"warning: {safe(str(message))}\n"  # no line of our source
     sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: PTH123, SIM115  # `echousd check room.usda >&-`
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: PTH123, SIM115
-    sys.exit(run(sys.argv[1:]))
+    gc.set_threshold(GARBAGE)
+    code = run(sys.argv[1:])
+    gc.freeze()  # the end of the process looks through all objects that are left, modules for the most part, three times
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:
