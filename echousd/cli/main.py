@@ -70,7 +70,7 @@ def main() -> None:
     sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: PTH123, SIM115
     gc.set_threshold(GARBAGE)
     code = run(sys.argv[1:])
-    gc.freeze()  # the end of the process looks through all objects that are left, modules for the most part, three times
+    gc.freeze()  # else the end of the process looks through all objects that are left, three times
     sys.exit(code)
 
 

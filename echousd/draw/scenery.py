@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from pxr import Usd
@@ -14,6 +15,7 @@ from echousd.draw.sight import Furniture
 
 GOLDEN = 0.61803398875
 LINEAR = (np.arange(256, dtype=np.float32) / 255) ** 2.2  # of a byte of sRGB
+MIXED = np.array([0.3141, 0.2718, 0.1618], np.float32)  # so that no two colours of a room add up to the same
 SHELL = ("floor", "wall", "ceiling", "door", "window")
 SMALL = 0.35  # metres: what is no larger hides nothing that a picture is of
 SEEN_THROUGH = 0.5  # opacity of a window's pane below which one looks out
@@ -82,20 +84,23 @@ class Scenery:
         fewer = {name: getattr(self, name)[keep] for name in names}
         return replace(self, panes=self.panes[seen], pane_wall=self.pane_wall[seen], **fewer)
 
-    def colors(self, face: np.ndarray, bary: np.ndarray) -> np.ndarray:
-        """(n, 3) colour at points given by face number and barycentric coordinates (n, 3)."""
+    @cached_property
+    def material(self) -> np.ndarray:
+        """(f,) float32, a number that differs where colour, glow or texture do."""
+        return (self.flat_colors @ MIXED + 3 * self.emissive @ MIXED + self.texture).astype(np.float32)
+
+    def colors(self, face: np.ndarray, st: np.ndarray) -> np.ndarray:
+        """(n, 3) mean colour of faces (n,) at texture coordinates (n, k, 2)."""
         out = self.flat_colors[face]
         texture = self.texture[face]
-        order = np.argsort(texture, kind="stable")
-        ends = np.searchsorted(texture[order], np.arange(len(self.images) + 1))
-        for image, start, end in zip(self.images, ends, ends[1:], strict=False):
-            if start < end:
-                here = order[start:end]
-                st = (self.st[face[here]] * bary[here, :, None]).sum(1)
+        for number, image in enumerate(self.images):
+            here = np.flatnonzero(texture == number)
+            if len(here):
                 height, width = image.shape[:2]
-                column = (st[:, 0] % 1.0 * width).astype(int) % width
-                row = ((1 - st[:, 1] % 1.0) * height).astype(int) % height
-                out[here] = image[row, column]
+                places = st[here] % 1.0
+                column = (places[..., 0] * width).astype(np.int32) % width
+                row = ((1 - places[..., 1]) * height).astype(np.int32) % height
+                out[here] = image.reshape(-1, 3)[row * width + column].mean(1)
         return out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,9 +23,10 @@ class RenderUnavailable(ImportError, ValueError):
 def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: int = 0) -> np.ndarray:
     """The picture as (size / aspect, size, 3) float sRGB in [0, 1].
 
-    Every pixel sends `rays`² rays; together they cover the sun's disc and the sky evenly, each pixel with another
-    shift (randomised quasi-Monte Carlo), so that little noise is left. In a `QUICK` picture a pixel's light is that
-    of its first ray wherever its others meet the same piece of surface.
+    Every pixel sends `rays`² rays; those that meet the surface of the first only look its texture up. Light is asked
+    `rays`² times a pixel, in a `QUICK` picture, away from edges, once at every second pixel of every second row. What
+    asks for light covers the sun's disc and the sky evenly, each pixel with another shift (randomised quasi-Monte
+    Carlo), so that little noise is left.
 
     Arguments:
         scenery: triangles and their colours.
@@ -32,37 +35,210 @@ def trace(scenery: Scenery, view: View, size: int, *, rays: int = FINE, seed: in
         rays: along each side of a pixel.
         seed: of the shifts; the same seed gives the same picture.
     """
-    rng = np.random.default_rng(seed)
-    scene = _embree(scenery)
-    height = round(size / view.aspect)
-    across, down = np.meshgrid(np.arange(size), np.arange(height))
-    shift = ((across[..., None] * LATTICE[0] + down[..., None] * LATTICE[1] + rng.random(4)) % 1.0).astype(np.float32)
-    layers = np.zeros((height, size, LAYERS), np.float32)
-    rows = max(1, 200_000 // size)  # a block of rows at a time bounds the memory
-    for start in range(0, height, rows):
-        block = slice(start, min(height, start + rows))
-        first = None
-        for sample in range(rays**2):
-            got = _shade(scene, scenery, view, size, rays, block, sample, shift[block], first)
-            layers[block] += got
-            first = got if rays <= QUICK and first is None else first
-    layers /= rays**2
-    light = smooth_light(layers[..., LIGHT], layers[..., NORMAL], layers[..., POINT])
-    color = layers[..., ALBEDO] * light + layers[..., GLOW]
-    return (exposed(color, thrown_back(scenery)) if view.inside else _tone(color)) ** (1 / 2.2)
+    height, many = round(size / view.aspect), rays**2
+    across, down = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(height)))
+    noise = np.random.default_rng(seed).random(4)
+    shift = ((across[:, None] * LATTICE[0] + down[:, None] * LATTICE[1] + noise) % 1.0).astype(np.float32)
+    world = World(_embree(scenery), scenery, view, size, shift, thrown_back(scenery))
+    places = [((inner % rays + 0.5) / rays, (inner // rays + 0.5) / rays) for inner in range(many)]
+    _, seen = _met(world, across + places[0][0], down + places[0][1])
+    finer = [_met(world, across + right, down + below, seen) for right, below in places[1:]]
+    edge = np.zeros(len(across), bool)
+    for pixel, _ in finer:
+        edge[pixel] = True
+    light = _light_of(world, seen, edge, 2 if rays <= QUICK else 1, many)
+    color, met = seen.glow.copy(), np.flatnonzero(seen.face >= 0)
+    st = _spread(seen.st.reshape(height, size, 2), rays).reshape(-1, many, 2)[met]
+    color[met] = _colored(scenery, seen.face[met], st, light[met])
+    mixed = color.copy()
+    for pixel, more in finer:
+        met = np.flatnonzero(more.face >= 0)
+        lent = _lent(world, more.of(met), pixel[met], seen, light)
+        more.glow[met] = _colored(scenery, more.face[met], more.st[met, None], lent)
+        mixed[pixel] += (more.glow - color[pixel]) / many
+    mixed = mixed.reshape(height, size, 3)
+    return (exposed(mixed, world.thrown) if view.inside else _tone(mixed)) ** (1 / 2.2)
 
 
-# What a ray brings back; the light that falls on a surface is kept apart from its colour until it has been smoothed.
-ALBEDO, LIGHT, GLOW, NORMAL, POINT, LAYERS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15), 15
-RINGS = (1, 2, 4, 8)  # pixels between neighbours, pass by pass
+BLOCK = 250_000  # rays at a time, which bounds the memory
+RINGS = (1, 2, 4, 8)  # places between neighbours, pass by pass
+ALIKE, FLAT = 0.95, 0.02  # cosine and metres within which two points lie on one flat piece of surface
+KEPT, NOTHING = ("primID", "u", "v", "tfar"), np.float32(-9)  # of a hit; the material of what is not there
+TORN = 0.25  # of a texture: where it changes by more from pixel to pixel, it begins anew
 
 
-def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Mean of the light over neighbours on the same flat piece of surface (joint bilateral filter), (h, w, 3) each."""
+class World(NamedTuple):
+    """What rays run through: the tree, what is in it, the camera, pixels across, shifts by pixel, light thrown back."""
+
+    scene: Any
+    scenery: Scenery
+    view: View
+    size: int
+    shift: np.ndarray
+    thrown: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What n rays met: faces (n,), -1 for none; points and normals (n, 3), st (n, 2); colour (n, 3) where none is."""
+
+    face: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    st: np.ndarray
+    glow: np.ndarray
+    material: np.ndarray
+
+    def of(self, rows: np.ndarray) -> Seen:
+        """Those of some rays."""
+        return Seen(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+def _rays(world: World, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where rays through places of the picture, in pixels from its upper left corner, begin and go, (n, 3) float32."""
+    view, axes = world.view, world.view.matrix.astype(np.float32)
+    u = ((x / world.size * 2 - 1) * view.half).astype(np.float32)[:, None]
+    v = ((1 / view.aspect - y / world.size * 2) * view.half).astype(np.float32)[:, None]
+    aside = u * axes[:3, 0] + v * axes[:3, 1]
+    if view.orthographic:
+        return axes[:3, 3] + aside, np.broadcast_to(-axes[:3, 2], aside.shape)
+    return np.broadcast_to(axes[:3, 3], aside.shape), _unit(aside - axes[:3, 2])
+
+
+def _met(world: World, x: np.ndarray, y: np.ndarray, first: Seen | None = None) -> tuple[np.ndarray, Seen]:
+    """What is seen at places in all pixels, x and y in pixels from the picture's upper left corner, and in which.
+
+    Where `first` tells what was seen in each pixel already: only what is another surface or material.
+    """
+    parts, pixels = [], []
+    for start in range(0, len(x), BLOCK):
+        origin, direction = _rays(world, x[start : start + BLOCK], y[start : start + BLOCK])
+        hit = world.scene.run(_f32(origin), _f32(direction), output=1)
+        rows = np.arange(len(origin))
+        if first is not None:
+            rows = np.flatnonzero(hit["primID"] != first.face[start : start + BLOCK])
+        part = _seen(world, origin[rows], direction[rows], {key: hit[key][rows] for key in KEPT})
+        if first is not None:
+            known = first.of(start + rows)
+            other = (part.material != known.material) | ~_same(part.normal, part.point, known.normal, known.point)
+            part, rows = part.of(other), rows[other]
+        parts.append(part)
+        pixels.append(start + rows)
+    joined = (np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Seen))
+    return np.concatenate(pixels), Seen(*joined)
+
+
+def _seen(world: World, origin: np.ndarray, direction: np.ndarray, hit: Mapping[str, np.ndarray]) -> Seen:
+    """What rays met, of what Embree says of them."""
+    scenery, face = world.scenery, hit["primID"]
+    missed = np.flatnonzero(face < 0)
+    glow = np.zeros((len(face), 3), np.float32)
+    glow[missed] = outside(scenery.panes, origin[missed], direction[missed])
+    glow *= np.float32(VIEW * scenery.lights.sky if world.view.inside else 1.0)
+    u, v, far = (np.where(face < 0, np.float32(0), hit[key]) for key in ("u", "v", "tfar"))
+    bary = np.stack([1 - u - v, u, v], 1)
+    normal = _unit(np.einsum("ncx,nc->nx", scenery.normals[face], bary))
+    normal[_dot(normal, direction) > 0] *= -1
+    point = origin + far[:, None] * direction
+    st = np.einsum("ncx,nc->nx", scenery.st[face], bary)
+    return Seen(face, point, normal, st, glow, np.where(face < 0, NOTHING, scenery.material[face]))
+
+
+def _asked(world: World, seen: Seen, pixel: np.ndarray, samples: int) -> np.ndarray:
+    """(n, 4) light that falls on what was seen in some pixels, and what of it is mirrored to the eye."""
+    view, out = world.view, np.zeros((len(pixel), 4), np.float32)
+    for rows in (slice(start, start + BLOCK) for start in range(0, len(pixel), BLOCK)):
+        point, normal = seen.point[rows], seen.normal[rows]
+        toward = np.broadcast_to(view.matrix[:3, 2], point.shape) if view.orthographic else view.matrix[:3, 3] - point
+        gloss = world.scenery.gloss[seen.face[rows]]
+        hits = Hits(point + np.float32(2e-3) * normal, normal, _unit(toward.astype(np.float32)), gloss)
+        for sample in range(samples):
+            out[rows] += (_light_inside if view.inside else _light)(world, hits, sample, world.shift[pixel[rows]])
+    return out / samples
+
+
+def _light_of(world: World, seen: Seen, edge: np.ndarray, step: int, samples: int) -> np.ndarray:
+    """(n, 4) light at all pixels: asked at every `step`th of every `step`th row, lent to those of the same surface.
+
+    Where there is little of a surface around to smooth the light over, at an `edge` (n,), it is asked more often.
+    """
+    shape = len(seen.face) // world.size, world.size
+    met, asked = seen.face.reshape(shape) >= 0, np.zeros(shape, bool)
+    normal, point = (each.reshape(*shape, 3) for each in (seen.normal, seen.point))
+    light = np.zeros((*shape, 4), np.float32)
+    coarse = slice(None, None, step), slice(None, None, step)
+    asked[coarse] = met[coarse]
+    torn = edge.reshape(shape)
+    for here, often in ((asked & torn, samples), (asked & ~torn, samples if step == 1 else 1)):
+        pixel = np.flatnonzero(here)
+        light[here] = _asked(world, seen.of(pixel), pixel, often)
+    light[coarse] = smooth_light(light[coarse], normal[coarse], point[coarse])
+    for axis in (1, 0)[: 2 * (step - 1)]:  # between two in a row, then between two rows
+        here, *sides = (_along_axis(axis, start, shape[axis], step) for start in (1, 0, 2))
+        total, weight = np.zeros_like(light[here]), np.zeros((*light[here].shape[:2], 1), np.float32)
+        for side in sides:
+            end = light[side].shape[axis]
+            inside = (slice(None),) * axis + (slice(end),)
+            fits = _same(normal[here][inside], point[here][inside], normal[side], point[side]) & asked[side]
+            total[inside] += fits[..., None] * light[side]
+            weight[inside] += fits[..., None]
+        light[here] = total / np.maximum(weight, 1)
+        asked[here] = (weight[..., 0] > 0) & met[here]
+    rest = np.flatnonzero(met & ~asked)
+    light.reshape(-1, 4)[rest] = _asked(world, seen.of(rest), rest, samples)
+    return (light if step == 1 else smooth_light(light, normal, point, RINGS[:1])).reshape(-1, 4)
+
+
+def _along_axis(axis: int, start: int, end: int, step: int) -> tuple[slice, slice]:
+    """Every second place along an axis of a picture; along the other those that have light by then."""
+    return (slice(start, end, 2), slice(None)) if axis == 0 else (slice(None, None, step), slice(start, end, 2))
+
+
+def _same(normal: np.ndarray, point: np.ndarray, other_normal: np.ndarray, other_point: np.ndarray) -> np.ndarray:
+    """Whether points lie on one flat piece of surface, (...) bool of (..., 3)."""
+    turn = np.einsum("...x,...x->...", normal, other_normal)
+    return (turn > ALIKE) & (np.abs(np.einsum("...x,...x->...", normal, point - other_point)) < FLAT)
+
+
+def _spread(st: np.ndarray, rays: int) -> np.ndarray:
+    """(h, w, rays², 2) texture coordinates at all rays of each pixel, of those at its first (h, w, 2)."""
+    across, down = np.zeros_like(st), np.zeros_like(st)
+    across[:, :-1], down[:-1] = np.diff(st, axis=1), np.diff(st, axis=0)
+    for step in (across, down):
+        step[np.abs(step).max(-1) > TORN] = 0
+    inner = np.arange(rays, dtype=np.float32) / rays
+    return np.stack([st + x * across + y * down for y in inner for x in inner], 2)
+
+
+def _lent(world: World, met: Seen, pixel: np.ndarray, seen: Seen, light: np.ndarray) -> np.ndarray:
+    """(n, 4) light of what further rays in some pixels met: that of the same surface there or beside it, else asked."""
+    out, wanted = np.zeros((len(pixel), 4), np.float32), np.arange(len(pixel))
+    for apart in (0, 1, -1, world.size, -world.size):
+        other = np.clip(pixel[wanted] + apart, 0, len(light) - 1)
+        fits = (seen.face[other] >= 0) & _same(
+            met.normal[wanted], met.point[wanted], seen.normal[other], seen.point[other]
+        )
+        out[wanted[fits]] = light[other[fits]]
+        wanted = wanted[~fits]
+    out[wanted] = _asked(world, met.of(wanted), pixel[wanted], 1)
+    return out
+
+
+def _colored(scenery: Scenery, face: np.ndarray, st: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """(n, 3) radiance of faces whose textures are looked up at st (n, k, 2), in light (n, 4)."""
+    return scenery.colors(face, st) * light[:, :3] + scenery.emissive[face] + np.float32(0.5) * light[:, 3:]
+
+
+def smooth_light(light: np.ndarray, normal: np.ndarray, point: np.ndarray, rings: Sequence[int] = RINGS) -> np.ndarray:
+    """Mean of the light (h, w, 4) over neighbours on the same flat piece of surface (joint bilateral filter).
+
+    Arguments:
+        normal, point: (h, w, 3) of the surface.
+    """
     height, width = light.shape[:2]
     light, normal, point = (np.ascontiguousarray(a.transpose(2, 0, 1)) for a in (light, normal, point))
     here = _along(normal, point)
-    for apart in RINGS:  # passes with ever wider holes reach far with few neighbours ("a trous")
+    for apart in rings:  # passes with ever wider holes reach far with few neighbours ("a trous")
         edge = ((0, 0), (apart, apart), (apart, apart))
         padded = [np.pad(a, edge, mode="edge") for a in (light, normal, point)]
         total, weight = np.zeros_like(light), np.zeros((height, width), np.float32)
@@ -111,63 +287,6 @@ def _embree(scenery: Scenery) -> Any:
     return scene
 
 
-def _shade(
-    scene: Any,
-    scenery: Scenery,
-    view: View,
-    size: int,
-    rays: int,
-    rows: slice,
-    sample: int,
-    shift: np.ndarray,
-    first: np.ndarray | None,
-) -> np.ndarray:
-    """(rows, size, LAYERS) what one ray for each pixel of some rows brings back; light that `first` has is its own."""
-    across, down = sample % rays, sample // rays
-    x = (np.arange(size, dtype=np.float32) + (across + 0.5) / rays) / size * 2 - 1
-    y = 1 / view.aspect - (np.arange(rows.start, rows.stop, dtype=np.float32) + (down + 0.5) / rays) / size * 2
-    u, v = (g.ravel() * view.half for g in np.meshgrid(x, y))
-    axes, eye = view.matrix[:3, :3].astype(np.float32), view.matrix[:3, 3].astype(np.float32)
-    if view.orthographic:
-        origin = eye + u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1]
-        direction: np.ndarray = np.broadcast_to(-axes[:, 2], origin.shape)
-    else:
-        direction = u[:, None] * axes[:, 0] + v[:, None] * axes[:, 1] - axes[:, 2]
-        direction = _unit(direction)
-        origin = np.broadcast_to(eye, direction.shape)
-    hit = scene.run(_f32(origin), _f32(direction), output=1)
-    seen = np.flatnonzero(hit["primID"] >= 0)
-    out = np.zeros((len(u), LAYERS), np.float32)
-    out[:, GLOW] = BACKGROUND
-    missed = np.flatnonzero(hit["primID"] < 0)
-    out[missed, GLOW] = outside(scenery.panes, origin[missed], direction[missed])
-    if view.inside:
-        out[missed, GLOW] *= VIEW * scenery.lights.sky
-    if not len(seen):
-        return out.reshape(-1, size, LAYERS)
-    face = hit["primID"][seen]
-    bary = np.stack([1 - hit["u"][seen] - hit["v"][seen], hit["u"][seen], hit["v"][seen]], 1)
-    point = origin[seen] + hit["tfar"][seen, None] * direction[seen]
-    normal = np.einsum("ncx,nc->nx", scenery.normals[face], bary)
-    normal = _unit(normal)
-    toward = -direction[seen]
-    normal = np.where(_dot(normal, toward)[:, None] < 0, -normal, normal)
-    light, glow = np.empty((len(seen), 3), np.float32), scenery.emissive[face]
-    ask = np.arange(len(seen))
-    if first is not None:
-        known = first.reshape(-1, LAYERS)[seen]
-        same = (_dot(normal, known[:, NORMAL]) > 0.95) & (np.abs(_dot(normal, point - known[:, POINT])) < 0.02)
-        light[same], glow[same] = known[same, LIGHT], known[same, GLOW]
-        ask = np.flatnonzero(~same)
-    hits = Hits(point[ask] + 2e-3 * normal[ask], normal[ask], toward[ask], scenery.gloss[face[ask]])
-    light[ask], shine = (_light_inside if view.inside else _light)(
-        scene, scenery, hits, sample, shift.reshape(-1, 4)[seen][ask]
-    )
-    glow[ask] += 0.5 * shine[:, None]
-    out[seen] = np.concatenate([scenery.colors(face, bary), light, glow, normal, point], axis=1)
-    return out.reshape(-1, size, LAYERS)
-
-
 def outside(panes: np.ndarray, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """(n, 3) colour that rays which meet nothing see: sky over fields through a window's pane, else the paper."""
     out: np.ndarray = np.broadcast_to(BACKGROUND, direction.shape).copy()
@@ -195,8 +314,9 @@ class Hits(NamedTuple):
         return self.gloss * np.clip(_dot(self.normal, _unit(self.toward + light)), 0, None) ** (4 + 90 * self.gloss)
 
 
-def _light(scene: Any, scenery: Scenery, hits: Hits, sample: int, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Light that falls on the points, (n, 3), and the strength of the sun's reflection, (n,)."""
+def _light(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
+    """(n, 4) light that falls on the points, and the strength of the sun's reflection."""
+    scene, scenery = world.scene, world.scenery
     point, normal, count = hits.point, hits.normal, len(hits.point)
     sun = ABOVE + SUN_SPREAD * _on_sphere(_even(sample, shift[:, :2]))
     sun = _unit(sun)
@@ -217,13 +337,12 @@ def _light(scene: Any, scenery: Scenery, hits: Hits, sample: int, shift: np.ndar
         open_sky = (0.72 + 0.28 * np.clip(away[:, 1:2], -1, 1)) * SKY_LIGHT
         sky += np.where(blocked[:, None], bounce * (0.45 + 0.55 * near), open_sky)
     sky /= SKY_RAYS
-    return 0.55 * direct + 1.05 * sky, hits.shine(ABOVE) * lit
+    return np.concatenate([0.55 * direct + 1.05 * sky, (hits.shine(ABOVE) * lit)[:, None]], 1)
 
 
-def _light_inside(
-    scene: Any, scenery: Scenery, hits: Hits, sample: int, shift: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _light_inside(world: World, hits: Hits, sample: int, shift: np.ndarray) -> np.ndarray:
     """As `_light`, in a closed room: sky in the windows, sun through them, lamps, and what the room throws back."""
+    scene, scenery = world.scene, world.scenery
     lights, point, normal, count = scenery.lights, hits.point, hits.normal, len(hits.point)
     spot, turn = _even(sample, shift[:, :2]), _even(sample, shift[:, 2:])
     light, shine = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
@@ -248,14 +367,15 @@ def _light_inside(
         facing = np.clip(_dot(normal, way), 0, None) * len(lights.bulbs) / np.maximum(away, OWN) ** 2
         lit = _free(scene, point, way, away - OWN, facing > 0) * facing
         light += lit[:, None] * lights.power[which] / np.float32(np.pi)
-    around, thrown = np.zeros((count, 3), np.float32), thrown_back(scenery)
+    around = np.zeros((count, 3), np.float32)
     for ray in range(AROUND):
         way = _unit(normal + _on_sphere(_even(sample * AROUND + ray, shift[:, 2:])))  # cosine-weighted
         other = scene.run(_f32(point), _f32(way), output=1)
         near = np.clip(other["tfar"] / 1.5, 0, 1)[:, None]
         hue = scenery.flat_colors[np.clip(other["primID"], 0, None)] / np.float32(THROWN)
         around += np.where(other["primID"][:, None] >= 0, (0.4 + 0.6 * hue) * (0.3 + 0.7 * near), 1.0)
-    return light + around / AROUND * thrown + 0.8 * shine[:, None], np.zeros_like(shine)
+    light += around / AROUND * world.thrown + 0.8 * shine[:, None]
+    return np.concatenate([light, np.zeros((count, 1), np.float32)], 1)
 
 
 def _way(point: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
