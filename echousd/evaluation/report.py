@@ -112,7 +112,7 @@ def bars(table: Table) -> str:
         axes.spines[["top", "right"]].set_visible(False)
         out = io.StringIO()
         canvas.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    return re.sub(r"<metadata>.*?</metadata>", "", out.getvalue(), flags=re.DOTALL).partition(".dtd\">")[2].strip()
+    return re.sub(r"<metadata>.*?</metadata>", "", out.getvalue(), flags=re.DOTALL).partition('.dtd">')[2].strip()
 
 
 def pictures(run: Run) -> dict[str, str]:

@@ -24,7 +24,7 @@ GROUPS = {
 }  # fmt: skip
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
 COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
-COLLIDERS = 24  # convex pieces of one body at most
+COLLIDERS = 64  # convex pieces of one body at most
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
@@ -118,32 +118,30 @@ def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
 def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:
     """Convex hulls (each a closed mesh) around solids; a small one joins the one that it wastes the least room with.
 
-    Where all of them would waste more than a small one is, and hulls are few enough, it stays alone.
+    Where all of them would waste more than a small one is, and hulls are few enough, it stays alone: on a wedge from a
+    panel to the mirror above it nothing could stand.
 
     Arguments:
         points: vertices (n, 3) of each solid, metres.
         box: volume of the whole piece's box, m³; what is far smaller is no obstacle of its own.
         most: number of hulls.
     """
-    groups: list[list[np.ndarray]] = [[p] for p in points]
+    groups = list(points)
     low, high = np.array([p.min(0) for p in points]), np.array([p.max(0) for p in points])
-    volume = _volume(low, high)
-    alone, gone = np.zeros((2, len(groups)), bool)
-    while (left := int((~gone).sum())) > 1:
-        small = int(np.argmin(np.where(alone | gone, np.inf, volume)))
-        if left <= most and (alone[small] or gone[small] or volume[small] >= SMALL * box):
+    while len(groups) > 1:
+        volume = _volume(low, high)
+        union = _volume(np.minimum(low[:, None], low), np.maximum(high[:, None], high))
+        wasted = union - volume - volume[:, None] + np.diag(np.full(len(groups), np.inf))
+        if len(groups) <= most:
+            small = np.minimum(volume, volume[:, None]) < SMALL * box
+            wasted[~small | (wasted > SMALL * box)] = np.inf
+        one, other = sorted(map(int, np.unravel_index(np.argmin(wasted), wasted.shape)))
+        if np.isinf(wasted[one, other]):
             break
-        wasted = _volume(np.minimum(low, low[small]), np.maximum(high, high[small])) - volume
-        wasted[gone], wasted[small] = np.inf, np.inf
-        other = int(np.argmin(wasted))
-        if left <= most and wasted[other] > SMALL * box:  # on a wedge from panel to mirror nothing could stand
-            alone[small] = True
-            continue
-        groups[other] += groups[small]
-        low[other], high[other] = np.minimum(low[other], low[small]), np.maximum(high[other], high[small])
-        volume[other] = _volume(low[other], high[other])
-        gone[small] = True
-    return [_hull(np.concatenate(group)) for group, joined in zip(groups, gone, strict=True) if not joined]
+        groups[one] = np.concatenate([groups[one], groups.pop(other)])
+        low[one], high[one] = groups[one].min(0), groups[one].max(0)
+        low, high = np.delete(low, other, axis=0), np.delete(high, other, axis=0)
+    return [_hull(group) for group in groups]
 
 
 def _volume(low: np.ndarray, high: np.ndarray) -> np.ndarray:

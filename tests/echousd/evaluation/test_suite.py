@@ -107,7 +107,5 @@ def test_half_chooses_by_one_half_of_the_terms_alone(rooms, monkeypatch):
 def test_workers_change_nothing(rooms):
     tasks = tasks_of(rooms[:2], 0, told=1.0)
     asked = [System.parse("random+search")]
-    alone, together = (
-        run_systems(asked, tasks, SuiteSettings(workers=count))[0]["random+search"] for count in (1, 2)
-    )
+    alone, together = (run_systems(asked, tasks, SuiteSettings(workers=count))[0]["random+search"] for count in (1, 2))
     assert all(np.array_equal(a.position, b.position) for a, b in zip(alone, together, strict=True))
