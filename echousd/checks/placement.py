@@ -23,7 +23,7 @@ BESIDE = 0.6  # metres that a curtain or a blind may hang beside its window
 SCREENS = ("tv", "television")
 ACROSS = np.cos(np.radians(60))  # of the angle between a screen and what it stands on
 CLOSE = 0.5  # metres before a screen that no wall stands in
-LARGE, LITTLE = 3.2, 0.25  # how often as large as its kind a small thing may be: books fill their shelf
+LARGE, LITTLE = 4.0, 0.25  # how often as large as its kind a small thing may be: books fill their shelf
 
 
 @dataclass(frozen=True)

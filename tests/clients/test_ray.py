@@ -15,4 +15,4 @@ SCRIPT = Path(__file__).with_name("ray_batch.py")
 
 @pytest.mark.parametrize("what", ["worker", "node", "limits"])
 def test_what_is_lost_on_ray_is_made_again(what: str) -> None:
-    assert run(python_of("ray"), SCRIPT, what, "--rooms", "6", timeout=600).splitlines()[-1].startswith("same ")
+    assert run(python_of("ray"), SCRIPT, what, "--rooms", "6", timeout=1800).splitlines()[-1].startswith("same ")

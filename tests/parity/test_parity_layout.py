@@ -70,6 +70,7 @@ def test_thousand_step_sampling() -> None:
     tables = _tables(numbers.meta["diffusion"])
     noise, top = numbers["noise"], len(tables.betas) - 1
     checked = 0
+
     def denoise(x: torch.Tensor, t: torch.Tensor) -> torch.Tensor:
         return net(x, numbers["obj_embed"], numbers["triples"], t)
 

@@ -6,7 +6,7 @@ One row per kind; the words stand beside the furniture's vocabulary, because no 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,7 +94,15 @@ KINDS: dict[str, Kind] = {
     )
 }
 
-SMALL: dict[str, Kind] = {kind.name: kind for kind in KINDS.values()}  # by category; kinds of one category agree
+
+def _category(name: str) -> Kind:
+    """The kinds of one category, which agree but for their sizes, as one from the least to the largest."""
+    kinds = [kind for kind in KINDS.values() if kind.name == name]
+    low, high = np.min([kind.low for kind in kinds], axis=0), np.max([kind.high for kind in kinds], axis=0)
+    return replace(kinds[0], low=tuple(low.tolist()), high=tuple(high.tolist()))
+
+
+SMALL: dict[str, Kind] = {name: _category(name) for name in dict.fromkeys(kind.name for kind in KINDS.values())}
 
 
 def usual_size(kind: str, rng: np.random.Generator) -> np.ndarray:
