@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 
 HOUSE = "echousd_house"  # in the metadata of a layer that composes rooms
+HOME = "home.usda"  # that layer
 
 
 def as_identifier(word: str) -> str:

@@ -21,7 +21,7 @@ def with_vocabulary(schema: str) -> str:
     alone = [row for row in words.placements if not row.others]
     for name, rows in (
         ("echo:roomType", words.room_types),
-        ("echo:predicate", words.predicates),
+        ("echo:predicate", (*words.predicates, *words.home_relations)),
         ("echo:place", alone),
     ):
         tokens = ", ".join(f'"{row.name}"' for row in rows)

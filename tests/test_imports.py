@@ -12,6 +12,7 @@ LINES = 600  # of a module that is read in one sitting
 # packages of echousd, those above first; each knows only what stands below its own row
 LAYERS = (
     ("cli",),
+    ("home",),
     ("batches", "diagnosis", "evaluation"),
     ("checks", "texturing"),
     ("make",),

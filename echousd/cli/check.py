@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from echousd.checks import CheckReport
     from echousd.checks.report import LayoutReport
+    from echousd.home.check import HomeReport
     from echousd.settle import SettleReport
 
 
@@ -73,10 +74,16 @@ def _one(
     Raises ValueError for one that cannot be read if it is alone; of several, that is its report.
     """
     from echousd.checks import check as checked
+    from echousd.home.check import check_home, is_home
     from echousd.stage.apart import check_apart
 
     try:
         check_apart(room)
+        if is_home(room):
+            home = check_home(room, rules=rules, layout=layout, settle=settle)
+            if not json:
+                _show_home(home, strict)
+            return home.good(strict=strict), home.to_json()
         report = checked(room, rules=rules, layout=layout, settle=settle)
     except (ValueError, OSError) as error:
         if alone:
@@ -90,13 +97,34 @@ def _one(
         _show(report, strict)
         _show_settled(report.settled or ())
     elif not json:
-        seen = [f"{len(report.errors)} USD errors"] * bool(report.errors)
-        for each in report.layouts:
-            counts = {"broken": each.broken, "colliding": each.collisions, "misplaced": each.placement}
-            seen += [f"{each.name} {len(what)} {word}".strip() for word, what in counts.items() if what]
-        seen += [f"{rest.layout} {len(rest.restless)} restless".strip() for rest in report.settled or () if not rest.ok]
-        say(f"{'ok' if good else 'no'}  {room}  {', '.join(seen)}".rstrip())
+        say(f"{'ok' if good else 'no'}  {room}{_seen(report)}")
     return good, report.to_json()
+
+
+def _show_home(home: HomeReport, strict: bool) -> None:
+    """The home as a whole, then a line for each of its rooms."""
+    kinds = [kind for kind, _ in home.faults]
+    broken, ways = kinds.count("broken"), kinds.count("ways")
+    for good, what in (
+        (not broken, f"plan     {home.relations - broken} of {home.relations} relations of rooms kept"),
+        ("walls" not in kinds, f"walls    {kinds.count('walls')} faults where rooms meet"),
+        (not ways, f"ways     {len(home.reached) - ways} of {len(home.reached)} rooms reached from the entrance"),
+    ):
+        say(f"{'ok' if good else 'no'}  {what}")
+    for kind, says in home.faults:
+        say(f"    {kind:<8} {says}")
+    for name, report in home.rooms.items():
+        say(f"{'ok' if report.good(strict=strict) else 'no'}  room     {name}{_seen(report)}")
+
+
+def _seen(report: CheckReport) -> str:
+    """What is wrong in a room, in a few words."""
+    seen = [f"{len(report.errors)} USD errors"] * bool(report.errors)
+    for each in report.layouts:
+        counts = {"broken": each.broken, "colliding": each.collisions, "misplaced": each.placement}
+        seen += [f"{each.name} {len(what)} {word}".strip() for word, what in counts.items() if what]
+    seen += [f"{rest.layout} {len(rest.restless)} restless".strip() for rest in report.settled or () if not rest.ok]
+    return f"  {', '.join(seen)}" if seen else ""
 
 
 def _show(report: CheckReport, strict: bool) -> None:

@@ -12,12 +12,13 @@ import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import say
-from echousd.cli.report import report, telling_faults
+from echousd.cli.report import report, say_written, telling_faults
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
-    from echousd.layers.house import Place
+    from echousd.home.graph import HomeGraph
     from echousd.make.written import Written
+    from echousd.options import RoomOptions
 
 TITLES = {
     "read": "Reading the graph",
@@ -30,6 +31,7 @@ TITLES = {
     "settle": "Simulating the room",
     "write": "Writing the layers",
     "preview": "Drawing the preview",
+    "rooms": "Making the rooms",
 }
 
 
@@ -54,7 +56,7 @@ def generate(
     outside: Outside = None,
     **given: Any,
 ) -> None:
-    """Generate a room from a scene graph, as layers of USD; of a house, its rooms and a layer that composes them.
+    """Generate a room from a scene graph, as layers of USD; of a home, its plan, its rooms and what composes them.
 
     Of a graph's numbers, lengths are metres in the room's frame (+Y up, the floor at 0), yaw is `90 deg` or radians
     about +Y: at 0 a front looks along +Z.
@@ -67,14 +69,16 @@ def generate(
     check_output(output, flat=flat, force=force)
     if flat and store:
         raise ValueError(f"--store is {store}, which a file of --flat does not use; leave one of them out")
-    house = () if room or flat else rooms_of(graph)
+    home = None if room or flat else home_of(graph)
+    if home is not None:
+        generate_home(graph, home, output, options, outside or (), force=force, json=json)
+        return
     with ExitStack() as held:
-        if not house:
-            held.enter_context(writing(output, flat=flat, force=force, wait=wait))
+        held.enter_context(writing(output, flat=flat, force=force, wait=wait))
         held.enter_context(telling_faults())
         listen = held.enter_context(progress_bar())
         from echousd.make.pipeline import generate as make
-        from echousd.make.written import write_room, write_rooms
+        from echousd.make.written import write_room
         from echousd.progress import StageTimer
 
         spent = {"imports": time.perf_counter() - started}
@@ -94,25 +98,62 @@ def generate(
                 spent[stage] = spent.get(stage, 0.0) + seconds
             return written
 
-        if house:
-            root, made = write_rooms(output, house, one, force=force, wait=wait)
-            if not json:
-                say(f"house    {root}")
-        else:
-            root, made = None, [one(room, output)]
+        made = [one(room, output)]
     total = time.perf_counter() - started
     spent |= {"other": total - sum(spent.values()), "total": total}
     more = {"timings": {stage: round(seconds, 3) for stage, seconds in spent.items()}}
-    report(made, since=started, json=json, house=root, more=more)
+    report(made, since=started, json=json, more=more)
 
 
-def rooms_of(graph: Path) -> Sequence[Place]:
-    """The rooms of a stage that holds several; text is not worth loading USD for."""
-    if graph.suffix.lower() not in (".usda", ".usdc", ".usd", ".usdz"):
-        return ()
-    from echousd.layers.house import places
+def home_of(graph: Path) -> HomeGraph | None:
+    """The home in a file, None where it holds one room or is none; text is not worth loading USD for."""
+    if not graph.is_file():
+        return None
+    from echousd.home.files import load_home
 
-    return places(graph)
+    return load_home(graph)
+
+
+def generate_home(
+    graph: Path,
+    home: HomeGraph,
+    output: Path,
+    options: RoomOptions,
+    outside: Sequence[Path],
+    *,
+    force: bool,
+    json: bool,
+) -> None:
+    """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults."""
+    started = time.perf_counter()
+    from echousd.home.assemble import earlier, write_rooms
+    from echousd.home.given import plan_of
+
+    plan = plan_of(graph, home, seed=options.seed, before=earlier(output, options.seed))
+    with progress_bar() as listen:
+        made = write_rooms(
+            plan, output, options, outside=[str(path) for path in outside], force=force,
+            tell=lambda done, total: listen("rooms", done, total),
+        )  # fmt: skip
+    faults = [f"{name}: {why}" for name, why in made.failed.items()]
+    lines = [f"home     {made.root}", f"plan     {len(plan.floors)} rooms, {plan.area:.1f} m²"]
+    for name, row in made.rooms.items():
+        if name in made.failed:
+            lines.append(f"failed   {name}: {made.failed[name]}")
+        elif row is None:
+            lines.append(f"kept     {name}")
+        else:
+            kept = f"{row['relations_kept']} of {row['relations_asked']} measured relations kept"
+            lines.append(f"room     {name}: {row['objects']} objects, {kept}")
+            faults += [] if row["check"] else [f"{name}: {'; '.join(row['check_errors']) or 'see echousd check'}"]
+    if json:
+        rows = {name: dict(row) if row else None for name, row in made.rooms.items()}
+        say_written([made.root], started, faults, {"rooms": rows})
+    else:
+        for line in [*lines, *(f"fault    {fault}" for fault in faults)]:
+            say(line)
+    if faults:
+        raise typer.Exit(1)
 
 
 @contextmanager

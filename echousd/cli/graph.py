@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from echousd.graph import Node, Relation, SceneGraph
+    from echousd.home.graph import HomeGraph
 
 NEW_EXAMPLES = """Examples:
 
@@ -27,6 +29,8 @@ NEW_EXAMPLES = """Examples:
     echousd new bedroom.usda --room bedroom --size 4 3.5 --door 'south 0.3' --window 'north 1.2 1.6'
 
     echousd new bedroom.yaml --room bedroom     (a text to edit by hand)
+
+    echousd new flat.usda --rooms "kitchen open_to living, hall door bedroom*2, hall door bathroom" --area 75
 
 Frames: the room's front is +X, its right +Z, up +Y; lengths are metres, yaw is radians about +Y or, as in 90 deg,
 degrees; at yaw 0 the front of an object looks along +Z."""
@@ -77,12 +81,21 @@ def new(
         list[str] | None,
         typer.Option(metavar="CATEGORY=N", autocompletion=_counts, help="Objects of a category; 0 leaves it out."),
     ] = None,
+    rooms: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'A PREDICATE B, ...'",
+            help="A home: its rooms and how they lie (door, open_to, adjacent, north_of, larger_than ...).",
+        ),
+    ] = None,
+    area: Annotated[float | None, typer.Option(metavar="M2", help="Of a home: all its floors, square metres.")] = None,
     relate: Annotated[
         list[str] | None,
         typer.Option(metavar="'A PREDICATE B'", help="One more relation, such as 'desk left of double_bed'."),
     ] = None,
     size: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="X Z", help="Extents of the floor, metres.")
+        tuple[float, float] | None,
+        typer.Option(metavar="X Z", help="Extents of the floor, metres; of a home, of its outer walls."),
     ] = None,
     height: Annotated[float | None, typer.Option(metavar="M", help="Height of the room, metres.")] = None,
     door: Annotated[
@@ -106,12 +119,24 @@ def new(
     from echousd.graph.text import with_openings
 
     started = time.perf_counter()
-    if (source is None) == (room is None):
-        raise GraphError("say where the graph comes from: either --from GRAPH or --room TYPE")
-    if source is not None and count:
+    if sum(given is not None for given in (source, room, rooms)) != 1:
+        raise GraphError("say where the graph comes from: either --from GRAPH, --room TYPE or --rooms ROOMS")
+    if room is None and count:
         raise GraphError("--count goes with --room; edit the objects of a file in the file")
     if out.exists() and not force:
         raise GraphError(f"{out} exists, allowed: a new path, or --force to overwrite it")
+    home = None if room else home_given(source, rooms, area, size, relate or ())
+    if home is not None:
+        if height or door or window:
+            raise GraphError("--height, --door and --window are of one room; write those of a home's into its file")
+        from echousd.home.files import save_home
+
+        save_home(home, out)
+        told = f"wrote {out}: {_summary_of_home(home)}"
+        say_done(json, [out], started, [told], {"rooms": len(home.rooms), "relations": len(home.relations)})
+        return
+    if area is not None:
+        raise GraphError("--area goes with --rooms; the floor of one room is --size")
     given = {name: value for name, value in {"size": size, "height": height}.items() if value is not None}
     if source is not None:
         made = load_graph(source)
@@ -135,6 +160,34 @@ def new(
     save_graph(made, out)
     counts = {"objects": len(made.nodes), "relations": len(made.relations), "placements": len(made.placements)}
     say_done(json, [out], started, [f"wrote {out}: {_summary(made)}"], counts)
+
+
+def home_given(
+    source: Path | None, rooms: str | None, area: float | None, size: tuple[float, float] | None, relate: Sequence[str]
+) -> HomeGraph | None:
+    """The home that a command line describes, None where its file holds a single room."""
+    from echousd.home.files import load_home
+    from echousd.home.graph import home_of_words
+
+    if rooms is not None:
+        home = home_of_words(rooms)
+    else:
+        found = load_home(source) if source is not None and source.is_file() else None
+        if found is None:
+            return None
+        home = found
+    if area is not None:
+        home = home.replaced(area=area)
+    if size is not None:
+        home = home.replaced(outline=((0.0, 0.0), (size[0], 0.0), size, (0.0, size[1])))
+    for sentence in relate:
+        home = home.relate(sentence)
+    return home
+
+
+def _summary_of_home(home: HomeGraph) -> str:
+    area = "" if home.area is None else f" on {home.area:g} m²"
+    return f"a home of {len(home.rooms)} rooms{area}, {len(home.relations)} relations between them"
 
 
 def _counted(text: str) -> tuple[str, int]:

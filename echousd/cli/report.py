@@ -30,7 +30,6 @@ def report(
     *,
     since: float = 0.0,
     json: bool = False,
-    house: Path | None = None,
     more: Mapping[str, Any] | None = None,
 ) -> None:
     """Say what was made and what the graphs asked for in vain; exit code 1 for faults.
@@ -39,12 +38,11 @@ def report(
         made: the rooms.
         since: `time.perf_counter()` when the command began.
         json: as one JSON object instead of lines.
-        house: the layer that composes the rooms, told in JSON.
         more: further entries of the JSON object.
     """
     faults = [fault for each in made for fault in each.room.faults]
     if json:
-        files = [house, *(path for each in made for path in (each.root, each.preview))]
+        files = [path for each in made for path in (each.root, each.preview)]
         rooms = {"rooms": [_room(each) for each in made]}
         say_written([path for path in files if path], since, faults, {**rooms, **(more or {})})
     else:

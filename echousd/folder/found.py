@@ -7,7 +7,7 @@ from pathlib import Path
 
 from echousd.folder.manifest import find_manifest
 from echousd.graph.files import STAGE_FORMS
-from echousd.naming import HOUSE
+from echousd.naming import HOME, HOUSE
 from echousd.pending import half_written
 
 HEAD = 2**16  # bytes in which a layer's own metadata stand
@@ -15,6 +15,8 @@ HEAD = 2**16  # bytes in which a layer's own metadata stand
 
 def rooms_at(place: Path) -> list[Path]:
     """The root layers of the rooms at a path, sorted; raises ValueError for a folder or pattern without any."""
+    if (place / HOME).is_file():
+        return [place / HOME]
     if place.is_dir():
         found = _rooms_below(place)
         if not found:
@@ -38,7 +40,7 @@ def room_at(place: Path) -> Path:
         return found
     rooms = rooms_at(place)
     if len(rooms) > 1:
-        named = [path.relative_to(place) for path in (*sorted(place.glob("*.usda")), *rooms)]  # a house, then its rooms
+        named = [path.relative_to(place) for path in rooms]
         shown = ", ".join(map(str, named[:8])) + ", ..." * (len(named) > 8)
         raise ValueError(f"{place}: a folder of {len(rooms)} rooms, name one file: {shown}")
     return rooms[0]
@@ -48,7 +50,7 @@ def refuse_house(place: Path) -> None:
     """Raises ValueError that names its rooms for a layer of ours that composes several."""
     if place.suffix == ".usda" and place.is_file() and f"int {HOUSE} ".encode() in place.read_bytes()[:HEAD]:
         rooms = ", ".join(str(path.relative_to(place.parent)) for path in _rooms_below(place.parent)[:8])
-        raise ValueError(f"{place}: a house, which composes rooms; name one of them: {rooms}")
+        raise ValueError(f"{place}: a home, which composes rooms; name one of them: {rooms}")
 
 
 def layer_over(place: Path) -> Path:

@@ -264,6 +264,9 @@ Attributes: TypeAlias = Annotated[dict[str, Scalar], BeforeValidator(_attributes
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Extents: TypeAlias = Annotated[Point | None, _optional(_numbers(2, _positive, "two positive numbers [x, z], metres"))]
 Corners: TypeAlias = Annotated[tuple[Point, ...] | None, _optional(_corners)]
+Thicknesses: TypeAlias = Annotated[
+    tuple[float, ...], BeforeValidator(lambda value: tuple(_positive(each) for each in _items(value)))
+]
 Openings: TypeAlias = Annotated[tuple[Opening, ...], BeforeValidator(_openings)]
 Height: TypeAlias = Annotated[float | None, _optional(_positive)]
 

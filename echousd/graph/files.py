@@ -6,6 +6,7 @@ import importlib
 import math
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
@@ -33,7 +34,13 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
     if path.suffix.lower() in STAGE_FORMS:
         graph: SceneGraph = _stages("graphs").read_graph(path, room=room)
         return graph
-    if path.suffix.lower() not in TEXT_FORMS:
+    return read_file(path, lambda *text: _texts().graph_from_text(SceneGraph, *text))
+
+
+def read_file(path: Path, build: Callable[[str, Any, str], Any]) -> Any:
+    """What `build` makes of (text, its form, what errors call it) of a YAML or JSON file; raises `GraphError`."""
+    form = TEXT_FORMS.get(path.suffix.lower())
+    if form is None:
         raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join((*TEXT_FORMS, *STAGE_FORMS))}")
     try:
         found = path.stat()
@@ -43,9 +50,7 @@ def load_graph(path: str | os.PathLike[str], room: str | None = None) -> SceneGr
             size = math.ceil(found.st_size / 2**20 * 10) / 10  # up, so that it never says what is allowed
             raise GraphError(f"{path}: {size:g} MiB, allowed: {MAX_BYTES // 2**20} MiB for a scene graph")
         with within_memory(path):
-            from echousd.graph.text import graph_from_text
-
-            return graph_from_text(SceneGraph, path.read_text("utf-8-sig"), TEXT_FORMS[path.suffix.lower()], str(path))
+            return build(path.read_text("utf-8-sig"), form, str(path))
     except UnicodeDecodeError as error:
         raise GraphError(f"{path}: no text in UTF-8 (byte {error.start})") from None
     except OSError as error:
@@ -78,6 +83,12 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
             beside.write_text(text, "utf-8")
     except OSError as error:
         raise GraphError(f"{path}: cannot be written ({(error.strerror or str(error)).lower()})") from None
+
+
+def _texts() -> Any:
+    from echousd.graph import text  # which knows scene graphs, too
+
+    return text
 
 
 def _stages(module: str) -> Any:

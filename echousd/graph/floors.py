@@ -90,7 +90,7 @@ def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGr
     from echomodel.rooms.openings import place_openings
 
     corners = graph.room.corners
-    if corners is None or any(opening.kind == "window" for opening in graph.room.openings):
+    if corners is None or graph.room.walls or any(opening.kind == "window" for opening in graph.room.openings):
         return graph
     placed = place_openings(
         corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings

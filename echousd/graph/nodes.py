@@ -84,6 +84,7 @@ class RoomSpec(PlainModel):
         height: metres.
         openings: doors, windows and passages in the walls; wall i is the edge from corner i of the floor to the next,
             of a rectangle the one at -z, +x, +z and -x.
+        walls: thickness of each wall, metres; of a room of a home, whose openings are all stated.
     """
 
     type: field.RoomTypeWord
@@ -91,6 +92,7 @@ class RoomSpec(PlainModel):
     size: field.Extents = None
     height: field.Height = None
     openings: field.Openings = ()
+    walls: field.Thicknesses = ()
 
     def __init__(self, type: str, **fields: Any) -> None:
         super().__init__(type=type, **fields)
@@ -105,6 +107,9 @@ class RoomSpec(PlainModel):
             found = field.bounding_extents(self.floor_polygon)
             if max(abs(a - b) for a, b in zip(found, self.size, strict=True)) > 1e-3:
                 raise ValueError(f"size is {self.size} but floor_polygon spans {found}; leave one of them out")
+        if self.walls and (self.corners is None or len(self.walls) != len(self.corners)):
+            edges = 0 if self.corners is None else len(self.corners)
+            raise GraphError(f"{len(self.walls)} thicknesses of {edges} walls, allowed: one each", ("walls",))
         for position in range(len(self.openings)):
             try:
                 check_openings(self.openings[: position + 1], self.corners, self.height)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from echomodel.vocabulary import normalised, vocabulary
@@ -29,7 +30,13 @@ TOP_KEYS = ("room", "objects", "nodes", "relations", *LISTS)
 
 
 def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "yaml"], source: str = "") -> SceneGraph:
-    """Read a graph of class `kind` from YAML or JSON text.
+    """Read a graph of class `kind` from YAML or JSON text; raises as `read_text`."""
+    found: SceneGraph = read_text(partial(graph_from_plain, kind), text, form, source)
+    return found
+
+
+def read_text(build: Callable[[Any], Any], text: str, form: Literal["json", "yaml"], source: str = "") -> Any:
+    """What `build` makes of the plain data in YAML or JSON text.
 
     Raises `GraphError` as `source:line: what was found, what is allowed`.
     """
@@ -39,11 +46,11 @@ def graph_from_text(kind: type[SceneGraph], text: str, form: Literal["json", "ya
         raise GraphError(_with_source(source, str(error))) from None
     wrong = list(located.faults)
     try:
-        graph = graph_from_plain(kind, located.data)
+        built = build(located.data)
     except GraphError as error:
         wrong += [error, *error.others]
     if not wrong:
-        return graph
+        return built
     said = [_with_source(source, _with_line(located, each)) for each in wrong[:MAX_ERRORS]]
     told = GraphError("\n".join(said), wrong[0].about)
     told.lines = tuple(said)
@@ -78,7 +85,7 @@ def graph_from_plain(kind: type[SceneGraph], data: Any) -> SceneGraph:
     """The graph in plain data (mappings, lists, texts, numbers) of either form; raises `GraphError`."""
     if not isinstance(data, Mapping):
         raise GraphError(f"found {shown(data)}, allowed: a mapping with {', '.join(TOP_KEYS)}")
-    _only(data, TOP_KEYS, ())
+    only_fields(data, TOP_KEYS, ())
     if "objects" in data and "nodes" in data:
         raise GraphError("both objects and nodes are given, allowed: one of them", ("nodes",))
     if "room" not in data:
@@ -209,7 +216,7 @@ def with_openings(room: RoomSpec, words: Iterable[tuple[str, Any]]) -> RoomSpec:
 
 def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
     needed = [name for name, info in model.model_fields.items() if info.is_required()]  # type: ignore[attr-defined]
-    _only(fields, tuple(model.model_fields), about)  # type: ignore[attr-defined]
+    only_fields(fields, tuple(model.model_fields), about)  # type: ignore[attr-defined]
     for name in needed:
         if name not in fields:
             first = next(iter(fields.values()), None)
@@ -221,7 +228,8 @@ def _built(model: type, fields: dict[str, Any], about: Path) -> Any:
         raise GraphError(str(error), (*about, *error.about)) from None
 
 
-def _only(fields: Mapping[str, Any], allowed: tuple[str, ...], about: Path) -> None:
+def only_fields(fields: Mapping[str, Any], allowed: tuple[str, ...], about: Path) -> None:
+    """Raise `GraphError` for a field that is not allowed."""
     for key in fields:
         if key not in allowed:
             near = difflib.get_close_matches(str(key), allowed, n=1)

@@ -108,9 +108,9 @@ def room_points(room: RoomData) -> np.ndarray:
     points = [np.insert(plan, 1, low, axis=1), np.insert(plan, 1, high, axis=1)]
     points += [np.insert(room.floor, 1, height, axis=1) for height in (-shell.THICKNESS, 0.0)]
     if room.options.walls:
-        points += [
-            np.insert(walls.outline(room.floor), 1, height, axis=1) for height in (-shell.THICKNESS, room.height)
-        ]
+        spec = room.graph.room
+        outer = walls.outline(room.floor if spec.corners is None else spec.corners, spec.walls)
+        points += [np.insert(outer, 1, height, axis=1) for height in (-shell.THICKNESS, room.height)]
     if room.options.ceiling:
         points.append(np.insert(room.floor, 1, room.height + shell.THICKNESS, axis=1))
     return np.concatenate(points)

@@ -75,7 +75,8 @@ def shell_prims(room: RoomData, bare: frozenset[str] = frozenset()) -> list[Shel
     parts = [ShellPart("Floor", "floor", (slab,))]
     if room.options.walls:
         outdoor = vocabulary().room_type(room.graph.room.type).use == "outdoor"
-        parts += walls(plan, room.height, room.graph.room.openings, bare, outdoor=outdoor)
+        spec = room.graph.room
+        parts += walls(plan, room.height, spec.openings, bare, outdoor=outdoor, thickness=spec.walls)
     if room.options.ceiling:
         parts.append(ceiling(plan, room.height))
     return [prim for part in parts for prim in _prims(part, SHELL, Kind.Tokens.component)]

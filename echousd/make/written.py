@@ -1,19 +1,13 @@
-"""A room, or all rooms of a house, on disk with their pictures, as the command line makes them."""
+"""A room on disk with its pictures, as the command line makes it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from echousd.folder.output import writing
 from echousd.make.finished import Room
 from echousd.make.save import save_layers, write_preview, write_sheet
 from echousd.progress import StageTimer
-
-if TYPE_CHECKING:
-    from echousd.layers.house import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,27 +40,3 @@ def write_room(
         preview = write_preview(root)
         preview = write_sheet(root) or preview
     return Written(room, root, preview)
-
-
-def write_rooms(
-    output: Path, house: Sequence[Place], make: Callable[[str, Path], Written], *, force: bool, wait: bool
-) -> tuple[Path, list[Written]]:
-    """Every room of a house in a folder of its own, and the layer that composes them.
-
-    Arguments:
-        output: folder of the house.
-        make: makes and writes the room at a prim path into a folder, which is locked meanwhile.
-        force, wait: as for `Room.save`.
-
-    Returns: the house's layer, and the rooms.
-    """
-    from echousd.layers.house import check_house, write_house
-
-    root = output / f"{output.name}.usda"
-    check_house(root, force=force)
-    made = []
-    for place in house:
-        with writing(output / place.name, flat=False, force=force, wait=wait):
-            made.append(make(place.path, output / place.name))
-    write_house(root, house, {place.name: each.root for place, each in zip(house, made, strict=True)}, force=force)
-    return root, made

@@ -30,26 +30,27 @@ def board(u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]
     return box
 
 
-def door_frame(opening: Opening) -> trimesh.Trimesh:
-    """Lining of the hole and the trim around it on both sides of the wall."""
+def door_frame(opening: Opening, wall: float = WALL, *, both: bool = True) -> trimesh.Trimesh:
+    """Lining of the hole in a wall of this thickness, and the trim around it, on both sides or on the inner one."""
+    far = wall + PROUD if both else wall
     start, end, top = opening.offset, opening.end, opening.height
     boards = [
-        board((start, start + LINING), (0, top), (-PROUD, WALL + PROUD)),
-        board((end - LINING, end), (0, top), (-PROUD, WALL + PROUD)),
-        board((start + LINING, end - LINING), (top - LINING, top), (-PROUD, WALL + PROUD)),
+        board((start, start + LINING), (0, top), (-PROUD, far)),
+        board((end - LINING, end), (0, top), (-PROUD, far)),
+        board((start + LINING, end - LINING), (top - LINING, top), (-PROUD, far)),
     ]
-    for w in ((-PROUD, 0.0), (WALL, WALL + PROUD)):
+    for w in ((-PROUD, 0.0), (wall, far))[: 1 + both]:
         boards.append(board((start - CASING, start), (0, top + CASING), w))
         boards.append(board((end, end + CASING), (0, top + CASING), w))
         boards.append(board((start, end), (top, top + CASING), w))
     return joined(boards)
 
 
-def door_leaf(opening: Opening) -> trimesh.Trimesh:
+def door_leaf(opening: Opening, wall: float = WALL) -> trimesh.Trimesh:
     """The closed leaf with two panels on each side, flush with the side that it opens to."""
     start, end = opening.offset + LINING + GAP, opening.end - LINING - GAP
     low, top = 0.008, opening.height - LINING - GAP
-    w = 0.0 if opening.swing == "in" else WALL - LEAF
+    w = 0.0 if opening.swing == "in" else wall - LEAF
     boards = [board((start, end), (low, top), (w, w + LEAF))]
     middle = low + 0.42 * (top - low)
     for below, above in ((low + 0.14, middle - 0.06), (middle + 0.06, top - 0.12)):
@@ -59,17 +60,18 @@ def door_leaf(opening: Opening) -> trimesh.Trimesh:
     return joined(boards)
 
 
-def door_handle(opening: Opening, left_first: bool) -> trimesh.Trimesh:
+def door_handle(opening: Opening, left_first: bool, wall: float = WALL) -> trimesh.Trimesh:
     """A lever on both sides of the leaf, away from the hinges.
 
     Arguments:
         opening: the door.
         left_first: whether someone inside who looks at the wall has its first corner on the left.
+        wall: its thickness, metres.
     """
     hinge_first = _hinge_first(opening, left_first)
     at = opening.end - LINING - 0.07 if hinge_first else opening.offset + LINING + 0.07
     toward = -0.11 if hinge_first else 0.11
-    w = 0.0 if opening.swing == "in" else WALL - LEAF
+    w = 0.0 if opening.swing == "in" else wall - LEAF
     level = min(1.03, 0.5 * opening.height)
     boards = []
     for near, far in ((w - 0.05, w), (w + LEAF, w + LEAF + 0.05)):
@@ -79,7 +81,9 @@ def door_handle(opening: Opening, left_first: bool) -> trimesh.Trimesh:
     return joined(boards)
 
 
-def hinge_line(opening: Opening, left_first: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def hinge_line(
+    opening: Opening, left_first: bool, wall: float = WALL
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(3,) each: foot of the line that a leaf turns about, and the unit vectors along it when closed and when open.
 
     Arguments: see `door_handle`.
@@ -88,7 +92,7 @@ def hinge_line(opening: Opening, left_first: bool) -> tuple[np.ndarray, np.ndarr
     u = opening.offset + LINING + GAP if first else opening.end - LINING - GAP
     inwards = opening.swing == "in"
     closed = np.array([1.0 if first else -1.0, 0.0, 0.0])
-    return np.array([u, 0.0, 0.0 if inwards else WALL]), closed, np.array([0.0, 0.0, -1.0 if inwards else 1.0])
+    return np.array([u, 0.0, 0.0 if inwards else wall]), closed, np.array([0.0, 0.0, -1.0 if inwards else 1.0])
 
 
 def _hinge_first(opening: Opening, left_first: bool) -> bool:

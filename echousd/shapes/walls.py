@@ -49,7 +49,7 @@ class ShellPart:
 
 def walls(
     polygon: np.ndarray, height: float, openings: Sequence[Opening] = (), bare: frozenset[str] = frozenset(),
-    *, outdoor: bool = False,
+    *, outdoor: bool = False, thickness: Sequence[float] = (),
 ) -> list[ShellPart]:  # fmt: skip
     """`Wall_1` ... for the edges of the floor, with skirting, and a part for every door and window in it.
 
@@ -58,17 +58,20 @@ def walls(
         height: of the room, metres.
         openings: in these walls. bare: names of the windows that have no curtain rail.
         outdoor: walls without an opening are parapets.
+        thickness: of the wall along each edge, metres; those of a home, which has other rooms behind them.
     """
     corners = np.ascontiguousarray(polygon, float)
-    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor))
+    return list(_walls(corners.tobytes(), height, tuple(openings), bare, outdoor, tuple(thickness)))
 
 
 @lru_cache(maxsize=4)  # furniture is moved away from them before they are written
 def _walls(
-    corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool
+    corners: bytes, height: float, openings: tuple[Opening, ...], bare: frozenset[str], outdoor: bool,
+    thickness: tuple[float, ...],
 ) -> tuple[ShellPart, ...]:
     polygon = np.frombuffer(corners).reshape(-1, 2)
     lengths = edge_lengths(polygon)
+    deep = np.array(thickness or [WALL] * len(polygon))
     parts = []
     for edge, length in enumerate(lengths):
         if length < 1e-3:
@@ -77,13 +80,16 @@ def _walls(
         here = [opening for opening in openings if opening.edge == edge]
         frame = wall_frame(polygon, edge)
         tall = min(height, PARAPET) if outdoor and not here else height
-        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here), frame))]
+        pieces = [Piece(piece_name(name, "mesh"), "wall", _placed(_wall(polygon, edge, tall, here, deep), frame))]
         boards = fittings.skirting(here, float(length))
         if boards is not None:
             pieces.append(Piece(piece_name(name, "skirting"), "trim", _placed(boards, frame), solid=False))
         left_first = signed_area(polygon) > 0
         inner = [
-            _filled(name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first)
+            _filled(
+                name, opening, frame, float(length), 0.0 if opening.name in bare else height, left_first,
+                float(deep[edge]), both=not thickness,
+            )
             for opening in here
         ]
         parts.append(ShellPart(name, "wall", tuple(pieces), tuple(part for part in inner if part.pieces)))
@@ -103,15 +109,18 @@ def ceiling(polygon: np.ndarray, height: float) -> ShellPart:
     return ShellPart("Ceiling", "ceiling", (Piece(piece_name("Ceiling", "mesh"), "ceiling", slab),))
 
 
-def outline(polygon: np.ndarray) -> np.ndarray:
-    """(k, 2) float, the outer corners of the walls: offsets of the edges by their thickness meet there."""
+def outline(polygon: np.ndarray, thickness: Sequence[float] | np.ndarray = ()) -> np.ndarray:
+    """(k, 2) float, the outer corners of the walls: offsets of the edges by their thickness (k, metres) meet there."""
     count = len(polygon)
+    deep = np.array(thickness if len(thickness) else [WALL] * count)[:, None]
     normals = np.array([-inward_normal(polygon, edge) for edge in range(count)])
     before = np.roll(normals, 1, axis=0)
     bisector = normals + before
     cosine = 1.0 + (normals * before).sum(1, keepdims=True)
     mitre = bisector / np.maximum(cosine, 0.35)  # very sharp corners are cut off
-    return np.asarray(polygon + WALL * mitre, float)
+    own, last = deep, np.roll(deep, 1, axis=0)
+    turn = np.maximum(2.0 - cosine, 0.35)  # walls of two thicknesses
+    return np.asarray(polygon + (own + last) / 2 * mitre + (own - last) / 2 * (normals - before) / turn, float)
 
 
 def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
@@ -124,7 +133,9 @@ def wall_frame(polygon: np.ndarray, edge: int) -> np.ndarray:
     return frame
 
 
-def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening]) -> trimesh.Trimesh:
+def _wall(
+    polygon: np.ndarray, edge: int, height: float, openings: Sequence[Opening], thickness: np.ndarray
+) -> trimesh.Trimesh:
     """The wall with its holes, in its own frame."""
     length = float(edge_lengths(polygon)[edge])
     face = shapely.box(0.0, -THICKNESS, length, height)
@@ -132,13 +143,13 @@ def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Open
         low = opening.sill if opening.sill > 0 else 0.0
         face = face.difference(shapely.box(opening.offset, low, opening.end, min(low + opening.height, height)))
     pieces = [p for p in getattr(face, "geoms", [face]) if p.area > 1e-6]
-    mesh = fittings.joined([trimesh.creation.extrude_polygon(p, WALL) for p in pieces])
-    outer = outline(polygon)
+    mesh = fittings.joined([trimesh.creation.extrude_polygon(p, thickness[edge]) for p in pieces])
+    outer = outline(polygon, thickness)
     along = direction(polygon, edge)
     first = float((outer[edge] - polygon[edge]) @ along)
     last = float((outer[(edge + 1) % len(polygon)] - polygon[edge]) @ along)
     vertices = np.array(mesh.vertices)
-    far = vertices[:, 2] > WALL / 2
+    far = vertices[:, 2] > thickness[edge] / 2
     vertices[far & (vertices[:, 0] < 1e-6), 0] = first
     vertices[far & (vertices[:, 0] > length - 1e-6), 0] = last
     mesh.vertices = vertices
@@ -146,9 +157,13 @@ def _wall(polygon: np.ndarray, edge: int, height: float, openings: Sequence[Open
 
 
 def _filled(
-    wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool
-) -> ShellPart:
-    """What stands in an opening; passages have a frame and nothing else. `height`: below which a rail must be."""
+    wall: str, opening: Opening, frame: np.ndarray, length: float, height: float, left_first: bool, deep: float,
+    *, both: bool,
+) -> ShellPart:  # fmt: skip
+    """What stands in an opening; passages have a frame and nothing else.
+
+    `height`: below which a rail must be. `deep`: thickness of the wall. `both`: trim on its far side, too.
+    """
     name = f"{wall}_{opening.name}"
 
     def made(what: str, look: str, mesh: trimesh.Trimesh | None, solid: bool = True) -> tuple[Piece, ...]:
@@ -163,16 +178,16 @@ def _filled(
         )
         return ShellPart(name, "window", pieces)
     if opening.kind != "door":
-        return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)))
-    leaf = made("leaf", "door_leaf", fittings.door_leaf(opening))
-    handle = made("handle", "rail", fittings.door_handle(opening, left_first), solid=False)
-    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first))
-    return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening)), (hinge,))
+        return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening, deep, both=both)))
+    leaf = made("leaf", "door_leaf", fittings.door_leaf(opening, deep))
+    handle = made("handle", "rail", fittings.door_handle(opening, left_first, deep), solid=False)
+    hinge = ShellPart(piece_name(name, "hinge"), "", (*leaf, *handle), joint=_hinge(opening, frame, left_first, deep))
+    return ShellPart(name, "door", made("frame", "trim", fittings.door_frame(opening, deep, both=both)), (hinge,))
 
 
-def _hinge(opening: Opening, frame: np.ndarray, left_first: bool) -> Joint:
+def _hinge(opening: Opening, frame: np.ndarray, left_first: bool, deep: float) -> Joint:
     """How a door's leaf turns about its edge, by a right angle to the side that it opens to."""
-    at, closed, opened = fittings.hinge_line(opening, left_first)
+    at, closed, opened = fittings.hinge_line(opening, left_first, deep)
     anchor = frame[:3, :3] @ at + frame[:3, 3]
     up = np.cross(frame[:3, :3] @ closed, frame[:3, :3] @ opened)  # from closed to open it turns about this
     return Joint("hinge", "revolute", (0.0, float(np.sign(up[1])), 0.0), tuple(anchor.round(6).tolist()), np.pi / 2)

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 GRAPH_TYPE = "EchoSceneGraph"
 RELATION_TYPE = "EchoRelation"
 OPENING_TYPE = "EchoOpening"
-TYPES = (GRAPH_TYPE, RELATION_TYPE, OPENING_TYPE)
+HOME_TYPE = "EchoHomeGraph"
+TYPES = (GRAPH_TYPE, RELATION_TYPE, OPENING_TYPE, HOME_TYPE)
+ROOM_API = "EchoRoomAPI"
 NODE_API = "EchoNodeAPI"
 LABELS_API = "SemanticsLabelsAPI:category"
 LABELS = "semantics:labels:category"
@@ -31,6 +33,9 @@ ROOM_TYPE = "echo:roomType"
 FLOOR_POLYGON = "echo:floorPolygon"
 FLOOR_SIZE = "echo:floorSize"
 HEIGHT = "echo:height"
+WALLS = "echo:wallThickness"
+
+AREA, RATIO, OUTLINE, ENTRANCE = "echo:area", "echo:ratio", "echo:outline", "echo:entrance"  # of homes
 
 KIND = "echo:kind"
 EDGE = "echo:edge"
@@ -87,6 +92,10 @@ VALUE_TYPES = {
     FLOOR_POLYGON: _TYPES.Double2Array,
     FLOOR_SIZE: _TYPES.Double2,
     HEIGHT: _TYPES.Double,
+    WALLS: _TYPES.DoubleArray,
+    AREA: _TYPES.Double,
+    RATIO: _TYPES.Double,
+    OUTLINE: _TYPES.Double2Array,
     KIND: _TYPES.Token,
     EDGE: _TYPES.Int,
     OFFSET: _TYPES.Double,
@@ -122,6 +131,8 @@ def room_values(room: RoomSpec) -> dict[str, Any]:
         values[FLOOR_SIZE] = Gf.Vec2d(*room.size)
     if room.height is not None:
         values[HEIGHT] = float(room.height)
+    if room.walls:
+        values[WALLS] = Vt.DoubleArray(room.walls)
     return values
 
 

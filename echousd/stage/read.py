@@ -199,10 +199,11 @@ def room_spec(prims: RoomPrims) -> RoomSpec:
     words = value(graph, usd.VOCABULARY)
     if words not in (None, usd.VOCABULARY_NAME):
         raise StageError(f"{place(graph)}: {usd.VOCABULARY} is {words!r}, allowed: {usd.VOCABULARY_NAME}")
-    corners, size, height = (value(graph, name) for name in (usd.FLOOR_POLYGON, usd.FLOOR_SIZE, usd.HEIGHT))
+    names = {"floor_polygon": usd.FLOOR_POLYGON, "size": usd.FLOOR_SIZE, "height": usd.HEIGHT, "walls": usd.WALLS}
+    said = {field: found for field, name in names.items() if (found := value(graph, name)) is not None}
     try:
         openings = tuple(map(read_opening, prims.openings))
-        return RoomSpec(value(graph, usd.ROOM_TYPE), floor_polygon=corners, size=size, height=height, openings=openings)
+        return RoomSpec(value(graph, usd.ROOM_TYPE), openings=openings, **said)
     except GraphError as error:
         raise StageError(f"{place(graph)}: {error}") from None
 

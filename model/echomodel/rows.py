@@ -168,6 +168,7 @@ class RoomType:
         share: of such rooms in a mixed set of generated rooms, 0 = none is drawn.
         zones: (room type, weight): what a large room of this type is besides.
         flooring: the material slot of a third of such floors, "" = all have boards.
+        daylight: whether it wants a window. hub: from the greatest, other rooms have their doors in a home; 0 = no.
         aliases: what people call it.
     """
 
@@ -189,7 +190,34 @@ class RoomType:
     share: float = 0.0
     zones: tuple[tuple[str, float], ...] = ()
     flooring: str = ""
+    daylight: bool = True
+    hub: int = 0
     aliases: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HomeRelation:
+    """Everything that the product knows of a relation between two rooms of a home.
+
+    Arguments:
+        symmetric: whether it says the same of the swapped pair; inverse: what does where it does not itself.
+        passes: whether one gets through. wall: metres of wall that the two share at least, 0 = they need not.
+        step: signs (x, z) of the way from the object to the subject, (0, 0) where it names no direction.
+        aliases: other words for it.
+    """
+
+    name: str
+    symmetric: bool = False
+    inverse: str = ""
+    passes: bool = False
+    wall: float = 0.0
+    step: tuple[int, int] = (0, 0)
+    aliases: tuple[str, ...] = ()
+
+    @property
+    def compares(self) -> bool:
+        """Whether it is about areas, and says nothing of where rooms lie."""
+        return not (self.wall or self.symmetric or any(self.step))
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from echomodel.rows import (
     UNITES,
     Category,
     Habit,
+    HomeRelation,
     Placement,
     Predicate,
     PredicateKind,
@@ -67,6 +68,7 @@ class Vocabulary:
     unsupported: tuple[str, ...]
     habits: tuple[Habit, ...] = ()
     placements: tuple[Placement, ...] = ()
+    home_relations: tuple[HomeRelation, ...] = ()
     meant: dict[str, dict[str, tuple[str, ...]]] = field(default_factory=dict, hash=False)
     hints: dict[str, str] = field(default_factory=dict, hash=False)
     _index: dict[str, dict[str, int]] = field(init=False, repr=False, compare=False, default_factory=dict)
@@ -80,13 +82,14 @@ class Vocabulary:
         self._check()
 
     @property
-    def _rows(self) -> dict[str, Sequence[Category | Predicate | RoomType | Placement]]:
+    def _rows(self) -> dict[str, Sequence[Category | Predicate | RoomType | Placement | HomeRelation]]:
         """The rows of every kind of word."""
         return {
             "category": self.categories,
             "predicate": self.predicates,
             "room type": self.room_types,
             "placement": self.placements,
+            "relation of rooms": self.home_relations,
         }
 
     def category(self, word: str) -> Category:
@@ -114,6 +117,10 @@ class Vocabulary:
     def placement(self, word: str) -> Placement:
         """The placement called `word` (name or alias); raises `UnknownWord`."""
         return self.placements[self._find("placement", word)]
+
+    def home_relation(self, word: str) -> HomeRelation:
+        """The relation of two rooms called `word` (name or alias); raises `UnknownWord`."""
+        return self.home_relations[self._find("relation of rooms", word)]
 
     @cached_property
     def sgfront_predicates(self) -> dict[int, str]:
@@ -266,6 +273,7 @@ def _shipped() -> Vocabulary:
         room_types=tuple(RoomType(**frozen(entry)) for entry in raw["room_types"]),
         habits=tuple(Habit(**frozen(entry)) for entry in raw["habits"]),
         placements=tuple(Placement(**frozen(entry)) for entry in raw["placements"]),
+        home_relations=tuple(HomeRelation(**frozen(entry)) for entry in raw["home_relations"]),
         unsupported=tuple(raw["unsupported"]),
         hints=raw["hints"],
         meant={kind: {word: tuple(near) for word, near in words.items()} for kind, words in raw["meant"].items()},

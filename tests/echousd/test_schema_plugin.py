@@ -46,7 +46,8 @@ def test_regenerating_gives_the_committed_bytes(tmp_path):
 def test_every_attribute_ends_its_documentation_with_range_and_unit():
     layer = Sdf.Layer.FindOrOpen(str(SCHEMAS / "schema.usda"))
     classes = [spec for spec in layer.rootPrims if spec.name != "GLOBAL"]
-    assert [spec.name for spec in classes] == ["EchoSceneGraph", "EchoOpening", "EchoRelation", "EchoNodeAPI"]
+    names = ["EchoSceneGraph", "EchoHomeGraph", "EchoRoomAPI", "EchoOpening", "EchoRelation", "EchoNodeAPI"]
+    assert [spec.name for spec in classes] == names
     for spec in classes:
         assert len(spec.documentation) > 80, spec.name
         for prop in spec.properties:
@@ -72,7 +73,9 @@ def test_the_schema_knows_the_words_of_the_vocabulary():
     relation = registry.FindConcretePrimDefinition("EchoRelation")
     graph = registry.FindConcretePrimDefinition("EchoSceneGraph")
     words = vocabulary()
-    assert list(relation.GetPropertyMetadata("echo:predicate", "allowedTokens")) == [p.name for p in words.predicates]
+    assert list(relation.GetPropertyMetadata("echo:predicate", "allowedTokens")) == [
+        row.name for row in (*words.predicates, *words.home_relations)
+    ]
     assert list(graph.GetPropertyMetadata("echo:roomType", "allowedTokens")) == [r.name for r in words.room_types]
     assert graph.GetAttributeFallbackValue("echo:vocabulary") == encoding.VOCABULARY_NAME
 
@@ -80,13 +83,13 @@ def test_the_schema_knows_the_words_of_the_vocabulary():
 def test_what_is_authored_is_what_the_schema_says():
     registry = Usd.SchemaRegistry()
     definitions = [registry.FindConcretePrimDefinition(n) for n in encoding.TYPES]
-    definitions.append(registry.FindAppliedAPIPrimDefinition(encoding.NODE_API))
+    definitions += [registry.FindAppliedAPIPrimDefinition(name) for name in (encoding.NODE_API, encoding.ROOM_API)]
     declared = {name: d.GetSchemaAttributeSpec(name) for d in definitions for name in d.GetPropertyNames()}
     for name, value_type in encoding.VALUE_TYPES.items():
         if name != encoding.LABELS:
             assert declared[name].typeName == value_type, name
             assert declared[name].variability == Sdf.VariabilityUniform, name
-    for name in (encoding.ROOM, encoding.SUBJECT, encoding.OBJECT):
+    for name in (encoding.ROOM, encoding.SUBJECT, encoding.OBJECT, encoding.ENTRANCE):
         assert name in declared
 
 

@@ -160,7 +160,8 @@ def scene_of(
     ]
     plan = floor if graph.room.corners is None else graph.room.corners
     height = graph.room.height or DEFAULT_HEIGHT
-    shell = list(shell_solids(walls_of(plan, height, graph.room.openings))) if walls else []
+    built = walls_of(plan, height, graph.room.openings, thickness=graph.room.walls) if walls else []
+    shell = list(shell_solids(built))
     everything = [*solids, *shell]
     return Scene(
         everything,

@@ -71,7 +71,7 @@ def test_new_does_not_overwrite_unless_told(echousd_command, tmp_path):
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        ([], "say where the graph comes from: either --from GRAPH or --room TYPE"),
+        ([], "say where the graph comes from: either --from GRAPH, --room TYPE or --rooms ROOMS"),
         (["--room", "study", "--from", "x.yaml"], "say where the graph comes from"),
         (["--from", "x.yaml", "--count", "desk=1"], "--count goes with --room"),
         (["--from", "gone.yaml"], "gone.yaml: no such file or directory"),

@@ -1,0 +1,215 @@
+"""A home on disk: every room furnished in its place by workers side by side, and the layers that compose them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
+
+import echousd
+from echousd.batches.batch import cores, weights_hash
+from echousd.batches.executor import Executor, LocalWorkers, Task
+from echousd.batches.options import BatchOptions
+from echousd.batches.run import MEMORY
+from echousd.batches.work import Job, room
+from echousd.folder.manifest import find_manifest
+from echousd.home.plan import Plan
+from echousd.home.stages import HOME, home_layer, room_path
+from echousd.naming import HOME as ROOT_FILE
+from echousd.naming import HOUSE as MARK
+from echousd.options import MAX_SEED, RoomOptions
+from echousd.shapes.looks import palette_of_room
+from echousd.shapes.shell import THICKNESS
+from echousd.stage.files import layer_bytes, open_stage, write_all
+from echousd.stage.turning import rescale, turn_up
+
+PLAN = "plan.usda"
+FOLDER = "rooms"
+ONCE = ("DomeLight", "DistantLight", "PhysicsScene")  # a home has one of each, its first room's
+THRESHOLD = (0.45, 0.36, 0.27)  # colour, linear
+
+
+@dataclass(frozen=True)
+class Made:
+    """A home that was written.
+
+    Arguments:
+        root: its layer. rooms: what became of each (rows as of a batch's manifest), of those that stayed nothing.
+        failed: why, of rooms that could not be made.
+    """
+
+    root: Path
+    rooms: Mapping[str, Mapping[str, Any] | None]
+    failed: Mapping[str, str]
+
+
+def jobs_of(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> dict[str, Job]:
+    """What workers need to make each room: its graph in the plan, a seed of its own, one palette for all."""
+    fields = options.model_dump(exclude={"like", "room_path"}) | {
+        "palette": options.palette or palette_of_room(options.seed),
+        "fit": "drop",  # no piece too many keeps a home from being made
+    }
+    jobs = {}
+    for each in plan.home.rooms:
+        seed = (options.seed + zlib.crc32(each.name.encode())) % MAX_SEED
+        asked = BatchOptions(**{**fields, "seed": seed})
+        folder = str(output / FOLDER / each.name)
+        jobs[each.name] = Job(each.name, folder, seed, asked, plan.graph(each.name).to_json(), outside=tuple(outside))
+    return jobs
+
+
+def digest_of(job: Job) -> str:
+    """Of all that decides a room's bytes."""
+    told = [job.text, job.seed, job.options.model_dump(), weights_hash(job.options.weights), echousd.__version__]
+    return hashlib.sha256(json.dumps(told, default=str, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def write_rooms(
+    plan: Plan,
+    output: Path,
+    options: RoomOptions,
+    *,
+    outside: Sequence[str] = (),
+    force: bool = False,
+    workers: int | None = None,
+    tell: Callable[[int, int], None] = lambda done, total: None,
+) -> Made:
+    """Make a home in a folder: rooms whose graph, place in the plan and options are as before keep their bytes.
+
+    Arguments:
+        tell: called with how many rooms are done, and of how many.
+
+    Raises ValueError for a folder that holds something else.
+    """
+    root = output / ROOT_FILE
+    check_root(root, force=force)
+    before = _digests(root)
+    jobs = jobs_of(plan, output, options, outside)
+    digests = {name: digest_of(job) for name, job in jobs.items()}
+    there = {name for name, job in jobs.items() if find_manifest(Path(job.folder)) is not None}
+    wanted = [job for name, job in jobs.items() if name not in there or before.get(name) != digests[name]]
+    done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(jobs)
+    failed: dict[str, str] = {}
+    for name, value, error in _run(wanted, workers):
+        done[name] = value
+        if error:
+            failed[name] = error
+        tell(sum(value is not None for value in done.values()) + len(failed), len(wanted))
+    made = [name for name in jobs if name not in failed]
+    if made:
+        marks = {name: digests[name] for name in made}
+        write_all(home_files(plan, output, made, marks, options))
+    return Made(root, done, failed)
+
+
+def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mapping[str, Any] | None, str]]:
+    """Name, row and error of every job, as they end; nothing is started for none."""
+    waiting = sorted(jobs, key=lambda job: -len(job.text))  # the fullest first
+    if not waiting:
+        return
+    pool: Executor = LocalWorkers(min(workers or cores(), len(waiting)), memory=MEMORY)
+    try:
+        running = 0
+        while waiting or running:
+            while waiting and pool.free():
+                job = waiting.pop(0)
+                pool.submit(Task(job.id, room, job))
+                running += 1
+            for outcome in pool.outcomes(60.0):
+                running -= 1
+                yield outcome.task.key, outcome.value if outcome.fate == "done" else None, outcome.error
+    finally:
+        pool.close()
+
+
+def earlier(output: Path, seed: int) -> Path | None:
+    """The home that is in a folder, None where there is none of this seed."""
+    root = output / ROOT_FILE
+    layer = Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
+    return root if layer and layer.customLayerData.get("seed") == seed else None
+
+
+def check_root(root: Path, *, force: bool = False) -> None:
+    """Raises ValueError where a home cannot be written for a file that is not ours."""
+    if force or not root.exists():
+        return
+    if not (root.is_file() and f"int {MARK}".encode() in root.read_bytes()):
+        raise ValueError(f"{root}: exists and is no home of echousd; choose another folder or use --force")
+
+
+def _digests(root: Path) -> dict[str, str]:
+    """Name of every room of a home that is there -> of what it was made."""
+    layer = Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
+    return dict(layer.customLayerData.get("rooms", {})) if layer else {}
+
+
+def home_files(
+    plan: Plan, output: Path, names: Sequence[str], digests: Mapping[str, str], options: RoomOptions
+) -> dict[Path, bytes]:
+    """The root layer, which has the rooms as payloads, and below it the layer of the graph and the plan."""
+    below = home_layer(plan.home, plan, rooms=False)
+    _thresholds(below, plan)
+    root = Sdf.Layer.CreateAnonymous(".usda")
+    root.subLayerPaths.append(f"./{PLAN}")
+    root.defaultPrim = HOME[1:]
+    about = {MARK: 1, "generator": f"echousd {echousd.__version__}", "seed": options.seed}
+    root.customLayerData = {**about, "rooms": dict(digests)}
+    for key in ("metersPerUnit", "upAxis"):
+        root.pseudoRoot.SetInfo(key, below.pseudoRoot.GetInfo(key))
+    for number, name in enumerate(names):
+        spec = Sdf.CreatePrimInLayer(root, room_path(name))
+        file = Path(FOLDER) / name / f"{(find_manifest(output / FOLDER / name) or {})['name']}.usda"
+        spec.payloadList.prependedItems.append(Sdf.Payload(f"./{file.as_posix()}"))
+        if number:
+            stage = open_stage(output / file)
+            for prim in stage.Traverse():
+                if prim.GetTypeName() in ONCE and prim.GetPath().HasPrefix(stage.GetDefaultPrim().GetPath()):
+                    inside = prim.GetPath().ReplacePrefix(stage.GetDefaultPrim().GetPath(), room_path(name))
+                    Sdf.CreatePrimInLayer(root, inside).active = False
+    for layer in (root, below):
+        rescale(layer, options.meters_per_unit)
+        if options.up_axis == "Z":
+            turn_up(layer)
+    return {output / ROOT_FILE: layer_bytes(root, ".usda"), output / PLAN: layer_bytes(below, ".usda")}
+
+
+def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
+    """Author floors in the doorways, where those of the rooms end: /House/Plan, one for each way through."""
+    from echousd.home.plan import doorways
+
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.Scope.Define(stage, f"{HOME}/Plan")
+    look = UsdShade.Material.Define(stage, f"{HOME}/Plan/Looks/threshold")
+    shader = UsdShade.Shader.Define(stage, f"{HOME}/Plan/Looks/threshold/surface")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(THRESHOLD)
+    look.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    for name, corners in doorways(plan):
+        path = f"{HOME}/Plan/{name}"
+        part = UsdGeom.Xform.Define(stage, path)
+        Usd.ModelAPI(part).SetKind("component")
+        UsdSemantics.LabelsAPI.Apply(part.GetPrim(), "category").CreateLabelsAttr(["floor"])
+        mesh = UsdGeom.Mesh.Define(stage, f"{path}/{name}_mesh")
+        low, high = corners
+        box = trimesh.creation.box(bounds=[(low[0], -THICKNESS, low[1]), (high[0], 0.0, high[1])])
+        points = [Gf.Vec3f(*map(float, point)) for point in np.round(box.vertices, 5)]
+        mesh.CreatePointsAttr(points)
+        mesh.CreateFaceVertexCountsAttr([3] * len(box.faces))
+        mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
+        mesh.CreateNormalsAttr([Gf.Vec3f(*map(float, n)) for n in np.repeat(box.face_normals, 3, 0)])
+        mesh.SetNormalsInterpolation("faceVarying")
+        mesh.CreateSubdivisionSchemeAttr("none")
+        mesh.CreateExtentAttr([points[0].__class__(*map(float, c)) for c in box.bounds])
+        flat = [Gf.Vec2f(float(x), float(-z)) for x, _, z in box.vertices[box.faces].reshape(-1, 3)]
+        st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying")
+        st.Set(flat)
+        UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(look)

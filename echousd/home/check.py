@@ -1,0 +1,176 @@
+"""A home judged as a whole: the plan against the graph, shared walls and doors, ways of a robot, then every room."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from pxr import Usd
+from scipy import ndimage
+
+from echomodel.openings import inward_normal, segment
+from echomodel.roomboxes import footprints
+from echousd.checks.report import CheckReport, check
+from echousd.home.given import plan_there
+from echousd.home.openings import Floor, counterpart
+from echousd.home.plan import Plan, doorways
+from echousd.stage.contents import read_contents
+from echousd.stage.files import open_stage
+from echousd.stage.read import find_rooms
+
+ROBOT = 0.15  # metres, radius of a robot that is 0.3 m wide
+CELL = 0.05
+REACHED = 0.5  # share of a room's free floor that it must get to
+LOW = 1.5  # metres below which things are in its way
+
+
+@dataclass(frozen=True)
+class HomeReport:
+    """What a check of a home found.
+
+    Arguments:
+        faults: (kind, sentence) of the home as a whole. reached: room -> share of its free floor that a robot gets to.
+        relations: how many were asked. rooms: the check of each.
+    """
+
+    faults: tuple[tuple[str, str], ...]
+    reached: dict[str, float]
+    relations: int
+    rooms: dict[str, CheckReport]
+
+    def good(self, *, strict: bool = False) -> bool:
+        """Whether the home is whole and every room passes its own check."""
+        return not self.faults and all(report.good(strict=strict) for report in self.rooms.values())
+
+    def to_json(self) -> dict[str, Any]:
+        """The report as plain data."""
+        return {
+            "ok": self.good(),
+            "relations": self.relations,
+            "faults": [{"kind": kind, "says": says} for kind, says in self.faults],
+            "reached": {name: round(share, 3) for name, share in self.reached.items()},
+            "rooms": {name: report.to_json() for name, report in self.rooms.items()},
+        }
+
+
+def is_home(path: Path) -> bool:
+    """Whether a stage composes the rooms of a home."""
+    return path.suffix in (".usda", ".usdc", ".usd", ".usdz") and path.is_file() and plan_there(path) is not None
+
+
+def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, settle: bool = False) -> HomeReport:
+    """Judge the home on a stage; arguments as `echousd.check`. Raises StageError where it holds no plan."""
+    plan = plan_there(path)
+    if plan is None:
+        raise ValueError(f"{path}: no home, allowed: a stage of rooms with floors side by side")
+    stage = open_stage(path)
+    reached = walked(plan, stage)
+    told = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
+    told += [("walls", says) for says in (*_overlaps(plan), *_openings(plan))]
+    told += [
+        ("ways", f"{name}: a robot of 0.3 m from {plan.home.entered_by} gets to {share:.0%} of its free floor")
+        for name, share in reached.items()
+        if share < REACHED
+    ]
+    rooms = {
+        prims.room.GetName(): check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
+        for prims in find_rooms(stage)
+    }
+    return HomeReport(tuple(told), reached, len(plan.home.relations), rooms)
+
+
+def _room_file(prim: Usd.Prim) -> Path:
+    """The root layer of the room that a prim has as its payload."""
+    for spec in prim.GetPrimStack():
+        for payload in spec.payloadList.GetAddedOrExplicitItems():
+            return Path(spec.layer.ComputeAbsolutePath(payload.assetPath))
+    raise ValueError(
+        f"<{prim.GetPath()}>: no payload, allowed: rooms in files of their own, as echousd generate has them"
+    )
+
+
+def _overlaps(plan: Plan) -> Iterator[str]:
+    """Rooms that stand in each other."""
+    names = list(plan.floors)
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            shared = shapely.Polygon(plan.floors[one]).intersection(shapely.Polygon(plan.floors[other])).area
+            if shared > 0.01:
+                yield f"{one} and {other} share {shared:.2f} m² of floor, allowed: none"
+
+
+def _openings(plan: Plan) -> Iterator[str]:
+    """Doors that lead into a wall, are there twice, or have no leaf or two."""
+    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    for name, openings in plan.openings.items():
+        for opening in openings:
+            behind = counterpart(floors[name], opening, floors.values())
+            if behind is None:
+                continue
+            other, wanted = behind
+            if opening.kind == "window":
+                yield f"{name}: {opening.name} looks into {other}, allowed: in an outer wall"
+            same = [o for o in plan.openings[other] if o.edge == wanted.edge and abs(o.offset - wanted.offset) < 5e-3]
+            if opening.kind != "window" and not same:
+                yield f"{name}: {opening.name} leads into the wall of {other}, allowed: the same hole on its side"
+            if opening.kind == "door" and same and same[0].kind == "door" and name < other:
+                yield f"{name} and {other}: two leaves in one door, allowed: one"
+
+
+def walked(plan: Plan, stage: Usd.Stage) -> dict[str, float]:
+    """Of every room the share of its free floor that a robot gets to which enters the home by its front door."""
+    shapes = [shapely.Polygon(floor) for floor in plan.floors.values()]
+    shapes += [shapely.box(*corners.ravel()).buffer(0.02) for _, corners in doorways(plan)]
+    whole = shapely.union_all(shapes)
+    low, high = np.array(whole.bounds).reshape(2, 2)
+    xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
+    points = np.stack(np.meshgrid(xs, zs, indexing="ij"), -1)
+    free = shapely.contains_xy(whole, points[..., 0], points[..., 1])
+    for corners in _things(plan, stage):
+        x, z = (
+            slice(*np.searchsorted(axis, (c.min() - CELL, c.max() + CELL)))
+            for axis, c in zip((xs, zs), corners.T, strict=True)
+        )
+        free[x, z] &= ~shapely.contains_xy(shapely.Polygon(corners), points[x, z, 0], points[x, z, 1])
+    room = (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5) * CELL >= ROBOT - CELL / 2
+    parts, _ = ndimage.label(room)
+    start = _start(plan)
+    near = np.hypot(points[..., 0] - start[0], points[..., 1] - start[1]) < 0.6
+    entered = np.bincount(parts[near], minlength=1)
+    entered[0] = 0
+    here = parts == int(entered.argmax()) if entered.any() else np.zeros_like(room)
+    out = {}
+    for name, floor in plan.floors.items():
+        mine = shapely.contains_xy(shapely.Polygon(floor), points[..., 0], points[..., 1]) & room
+        out[name] = float((here & mine).sum() / mine.sum()) if mine.any() else 0.0
+    return out
+
+
+def _start(plan: Plan) -> np.ndarray:
+    """(2,) float: behind the front door, or in the middle of the room that one enters by."""
+    name = plan.home.entered_by
+    floor = plan.floors[name]
+    floors = [Floor(each, corners, plan.walls[each]) for each, corners in plan.floors.items()]
+    mine = next(each for each in floors if each.name == name)
+    for opening in plan.openings[name]:
+        if opening.kind == "door" and counterpart(mine, opening, floors) is None:
+            return segment(floor, opening).mean(0) + inward_normal(floor, opening.edge) * (ROBOT + 2 * CELL)
+    return np.asarray(floor.mean(0))
+
+
+def _things(plan: Plan, stage: Usd.Stage) -> Iterator[np.ndarray]:
+    """(4, 2) float: footprints in the home's frame of what stands in a robot's way."""
+    from echomodel.vocabulary import vocabulary
+
+    for prims in find_rooms(stage):
+        pose = plan.pose(prims.room.GetName())
+        contents = read_contents(prims)
+        for thing in contents.objects:
+            if thing.position[1] > LOW or vocabulary().category(thing.node.category).support != "floor":
+                continue
+            corners = footprints(*(np.array([v], float) for v in (thing.size, thing.position, thing.yaw)))[0]
+            yield corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]

@@ -1,0 +1,42 @@
+"""Homes in files, told apart by extension as scene graphs are."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from echousd.graph.files import STAGE_FORMS, TEXT_FORMS, read_file, write_text
+from echousd.graph.text import read_text
+from echousd.home.graph import HomeGraph, home_of_plain
+
+
+def load_home(path: str | Path) -> HomeGraph | None:
+    """The home in a file (YAML, JSON, stage), None where the file holds a single room's graph or none.
+
+    Raises `GraphError` or StageError naming the file and the fault.
+    """
+    path = Path(path)
+    if path.suffix.lower() in STAGE_FORMS:
+        from echousd.home.stages import read_home
+
+        return read_home(path)
+    if path.suffix.lower() not in TEXT_FORMS:
+        return None
+
+    def read(text: str, *rest: Any) -> HomeGraph | None:
+        holds = re.search(r"""^[{\s]*["']?rooms["']?\s*:""", text, re.MULTILINE)
+        return read_text(home_of_plain, text, *rest) if holds else None
+
+    home: HomeGraph | None = read_file(path, read)
+    return home
+
+
+def save_home(home: HomeGraph, path: Path) -> None:
+    """Write a home to a file in the form of its extension; raises `GraphError` or StageError."""
+    if path.suffix.lower() in TEXT_FORMS:
+        write_text(path, home.to_json())
+        return
+    from echousd.home.stages import write_home
+
+    write_home(home, path)

@@ -1,0 +1,177 @@
+"""Plans that are there already: rooms whose floors are stated side by side, drawn by hand or planned before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from echomodel.openings import Opening, direction, edge_lengths, inward_normal, numbered
+from echousd.graph import SceneGraph
+from echousd.graph.files import STAGE_FORMS
+from echousd.home.graph import HomeGraph, HomeRelation
+from echousd.home.openings import Floor, counterpart, facings
+from echousd.home.plan import INNER, OUTER, Plan, plan_home, rectangles, with_openings
+from echousd.shapes.walls import outline as offset
+
+THICKEST = 0.6  # metres between two floors that have one wall between them
+APART = 0.05  # square metres that floors of different rooms may share by rounding
+Placed = Mapping[str, tuple[SceneGraph, np.ndarray]]  # graph of every room, and its pose in the home
+
+
+def plan_of(path: Path, home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> Plan:
+    """The plan of the home in a file: that which is there, else a new one; raises `GraphError`.
+
+    Arguments:
+        before: layer of the home that was made before: its plan stays where nothing is asked of rooms but what stands
+            in them, and else is begun with.
+    """
+    stated = plan_there(path, home)
+    if stated is not None:
+        return stated
+    old = plan_there(before) if before is not None and before.is_file() else None
+    home = home.connected()
+    if old is not None and _asks(old.home) == _asks(home):
+        return replace(old, home=home)
+    return plan_home(home, seed=seed, before=old)
+
+
+def _asks(home: HomeGraph) -> tuple[object, ...]:
+    """What a home asks of its plan."""
+    rooms = tuple((room.name, room.type, room.area, room.ratio) for room in home.rooms)
+    return rooms, home.relations, home.area, home.outline, home.entrance
+
+
+def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
+    """The plan on a stage, None where its rooms state no floors or floors in one place."""
+    if path.suffix.lower() not in STAGE_FORMS:
+        return _plan_of_graphs(home)
+    from echousd.home.stages import read_home, read_poses
+
+    home = home or read_home(path)
+    return None if home is None else given_plan(home, read_poses(path))
+
+
+def _plan_of_graphs(home: HomeGraph | None) -> Plan | None:
+    """Floors of a text: corners in the frame of the home."""
+    if home is None or any(room.graph.room.floor_polygon is None for room in home.rooms):
+        return None
+    return given_plan(home, {room.name: (room.graph, np.eye(4)) for room in home.rooms})
+
+
+def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
+    """The plan that rooms with floors and poses make together, None where a floor is missing or stands in another's.
+
+    Floors that meet are taken to end in the middle of their wall and lose half of it; a door in one of them is a hole
+    in the other.
+    """
+    corners = {}
+    for name, (graph, pose) in rooms.items():
+        if graph.room.corners is None:
+            return None
+        corners[name] = graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
+    shapes = {name: shapely.Polygon(floor) for name, floor in corners.items()}
+    if any(shapes[a].intersection(shapes[b]).area > APART for a, b in combinations(shapes, 2)):
+        return None
+    if all(graph.room.walls for graph, _ in rooms.values()):
+        walls = {name: graph.room.walls for name, (graph, _) in rooms.items()}
+        floors, insets = corners, {name: np.zeros(len(floor)) for name, floor in corners.items()}
+    else:
+        insets, walls = {}, {}
+        for name, floor in corners.items():
+            gaps = [
+                _gap(floor, edge, [corners[other] for other in corners if other != name]) for edge in range(len(floor))
+            ]
+            insets[name] = np.array([INNER / 2 if gap is not None and gap < INNER / 2 else 0.0 for gap in gaps])
+            walls[name] = tuple(
+                OUTER if gap is None else INNER / 2 if gap < INNER / 2 else round(gap / 2, 4) for gap in gaps
+            )
+        floors = {name: offset(floor, -insets[name]).round(4) for name, floor in corners.items()}
+    cells = {name: offset(floor, walls[name]).round(4) for name, floor in floors.items()}
+    low = np.concatenate([*cells.values()]).min(0)
+    lie = {
+        name: tuple(rectangles(shapely.Polygon(cell - low)))[:2] if len(cell) in (4, 6) else ()
+        for name, cell in cells.items()
+    }
+    plan = Plan(
+        home, cells, walls, {name: () for name in cells}, lie, {name: pose for name, (_, pose) in rooms.items()}
+    )
+    stated = {name: _moved(graph.room.openings, corners[name], floors[name]) for name, (graph, _) in rooms.items()}
+    if not any(stated.values()):
+        return with_openings(replace(plan, home=_reached(plan)))
+    return replace(plan, openings=_shared(plan, stated))
+
+
+def _gap(floor: np.ndarray, edge: int, others: list[np.ndarray]) -> float | None:
+    """Metres from an edge to the nearest floor that faces it, None where none does within a wall's thickness."""
+    outward, along = -inward_normal(floor, edge), direction(floor, edge)
+    length, found = float(edge_lengths(floor)[edge]), []
+    for other in others:
+        for behind in range(len(other)):
+            start = other[behind] - floor[edge]
+            if outward @ inward_normal(other, behind) < 0.999 or not -0.02 < start @ outward < THICKEST:
+                continue
+            ends = np.array([start, other[(behind + 1) % len(other)] - floor[edge]]) @ along
+            if min(ends.max(), length) - max(ends.min(), 0.0) > 0.05:
+                found.append(max(float(start @ outward), 0.0))
+    return min(found, default=None)
+
+
+def _moved(openings: tuple[Opening, ...], before: np.ndarray, after: np.ndarray) -> tuple[Opening, ...]:
+    """Openings of a floor whose edges were moved inwards, where they were in the home."""
+
+    def offset_of(one: Opening) -> float:
+        shift = (before[one.edge] - after[one.edge]) @ direction(before, one.edge)
+        return max(round(one.offset + float(shift), 4), 0.0)
+
+    return tuple(replace(one, offset=offset_of(one)) for one in openings)
+
+
+def _shared(plan: Plan, stated: Mapping[str, tuple[Opening, ...]]) -> dict[str, tuple[Opening, ...]]:
+    """The openings of all rooms with both sides of each: the leaf in the room that states the door first."""
+    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    found = {name: list(openings) for name, openings in stated.items()}
+    for name in list(found):
+        for opening in list(found[name]):
+            behind = counterpart(floors[name], opening, floors.values()) if opening in found[name] else None
+            if behind is None or opening.kind == "window":
+                continue
+            other, hole = behind
+            same = [
+                o
+                for o in found[other]
+                if o.edge == hole.edge and min(o.end, hole.end) - max(o.offset, hole.offset) > hole.width / 2
+            ]
+            keeps = same and same[0].kind == "door" and opening.kind != "door"
+            if keeps:
+                continue
+            taken = [o.name for o in found[other] if o not in same]
+            kept = replace(hole, name=same[0].name if same else numbered(opening.kind, taken))
+            found[other] = [kept if same and o is same[0] else o for o in found[other]] + ([] if same else [kept])
+    return {name: tuple(openings) for name, openings in found.items()}
+
+
+def _reached(plan: Plan) -> HomeGraph:
+    """The graph with doors to rooms that share a wall with those one gets to, where it leads nowhere."""
+    home = plan.home
+    floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
+    order = sorted(floors, key=home.serves, reverse=True)
+    reached = [home.entered_by]
+    while len(reached) < len(floors):
+        passages = home.passages
+        near = [(a, b) for a in order if a in reached for b in order if b not in reached]
+        way = next((pair for pair in near if passages.has_edge(*pair)), None)
+        way = way or next(
+            (pair for pair in near if any(f.high - f.low > 1.2 for f in facings(floors[pair[0]], floors[pair[1]]))),
+            None,
+        )
+        if way is None:
+            break
+        if not passages.has_edge(*way):
+            home = home.replaced(relations=(*home.relations, HomeRelation(way[0], "door", way[1])))
+        reached.append(way[1])
+    return home

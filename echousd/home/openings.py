@@ -1,0 +1,223 @@
+"""Doors, passages and windows of a plan: each once, with a leaf in one room, swinging free, clear of all others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from echomodel.openings import (
+    Opening,
+    direction,
+    edge_lengths,
+    free_area,
+    inward_normal,
+    numbered,
+    overlap,
+    signed_area,
+)
+from echomodel.vocabulary import vocabulary
+from echousd.home.graph import HomeGraph
+
+DOOR, FRONT_DOOR = (0.9, 2.0), (1.0, 2.1)  # metres, width and height
+PASSAGE = (3.0, 2.3)  # at most
+JAMB = 0.12  # metres from a corner to a hole
+PIER = 0.3  # metres from a corner, or a door, to a window
+WINDOWS = {"": (0.9, 1.3, 2.0), "wet": (1.2, 1.0, 1.2), "outdoor": ()}  # by use: sill, height, width at most
+STEP = 0.1  # metres between the places that are tried
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """A floor in the home's frame: corners (k, 2) in metres, and the thickness of the wall along each edge."""
+
+    name: str
+    corners: np.ndarray
+    walls: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Facing:
+    """A stretch of wall that two rooms share, from `low` to `high` metres along an edge of the one."""
+
+    one: str
+    other: str
+    edge: int
+    other_edge: int
+    low: float
+    high: float
+    length: float  # from the other's corner to where `low` is, against its own direction
+
+    def across(self, opening: Opening) -> Opening:
+        """The hole on the other side of the wall."""
+        return replace(
+            opening, kind="passage", edge=self.other_edge, offset=round(self.length - opening.end, 4), swing="in",
+            hinge="left",
+        )  # fmt: skip
+
+
+def facings(one: Floor, other: Floor) -> Iterator[Facing]:
+    """The stretches of wall that two rooms share, however they are turned."""
+    for edge, length in enumerate(edge_lengths(one.corners)):
+        along, outward = direction(one.corners, edge), -inward_normal(one.corners, edge)
+        for other_edge, other_length in enumerate(edge_lengths(other.corners)):
+            if outward @ inward_normal(other.corners, other_edge) < 0.999:
+                continue
+            start = other.corners[other_edge] - one.corners[edge]
+            if abs(start @ outward - one.walls[edge] - other.walls[other_edge]) > 0.02:
+                continue
+            turned = float(direction(other.corners, other_edge) @ along)
+            at = float(start @ along)
+            low, high = sorted((at, at + turned * float(other_length)))
+            low, high = max(low, 0.0), min(high, float(length))
+            if high - low > 0.05:
+                yield Facing(one.name, other.name, edge, other_edge, low, high, at)
+
+
+def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tuple[str, Opening] | None:
+    """The room behind an opening and the hole that must be on its side; None for one that leads outside."""
+    for other in floors:
+        for facing in facings(floor, other) if other is not floor and other.name != floor.name else ():
+            if (
+                facing.edge == opening.edge
+                and facing.low - 0.01 <= opening.offset
+                and opening.end <= facing.high + 0.01
+            ):
+                return other.name, facing.across(opening)
+    return None
+
+
+def openings_of(home: HomeGraph, floors: Sequence[Floor]) -> dict[str, tuple[Opening, ...]]:
+    """The openings of every room: doors and passages of the graph, a front door, windows in outer walls."""
+    by_name = {floor.name: floor for floor in floors}
+    options = [_passage_options(home, by_name, *r.pair, r.predicate) for r in home.relations if r.row.passes]
+    options.append(_front_doors(home, by_name[home.entered_by], floors))
+    order = sorted(range(len(options)), key=lambda number: len(options[number]))
+    picked: dict[int, _Hole] = {}
+    for _ in range(2):  # the second time, each knows where all the others are
+        for number in order:
+            others = [hole for which, hole in picked.items() if which != number]
+            costs = [hole.cost + sum(hole.meets(other, by_name) for other in others) for hole in options[number]]
+            if costs:
+                picked[number] = options[number][int(np.argmin(costs))]
+    found: dict[str, list[Opening]] = {floor.name: [] for floor in floors}
+    for number in sorted(picked):
+        for room, opening in picked[number].sides:
+            name = numbered(opening.kind, [one.name for one in found[room]])
+            found[room].append(replace(opening, name=name))
+    for floor in floors:
+        found[floor.name] += _windows(home, floor, floors, found[floor.name])
+    return {name: tuple(own) for name, own in found.items()}
+
+
+@dataclass(frozen=True)
+class _Hole:
+    """A hole in a wall as the one or two rooms have it, and what speaks against it."""
+
+    sides: tuple[tuple[str, Opening], ...]
+    cost: float
+
+    def meets(self, other: _Hole, floors: dict[str, Floor]) -> float:
+        """What speaks against two holes together: swings that cross, holes in one place."""
+        out = 0.0
+        for room, mine in self.sides:
+            for same, theirs in other.sides:
+                if room == same:
+                    if overlap(mine, theirs) > -2 * JAMB:
+                        out += 100.0
+                    corners = floors[room].corners
+                    areas = [shapely.Polygon(free_area(corners, one)) for one in (mine, theirs)]
+                    out += 30.0 * areas[0].intersection(areas[1]).area
+        return out
+
+
+def _places(low: float, high: float, width: float) -> np.ndarray:
+    """Offsets of a hole in a stretch of wall, both ends and the middle among them."""
+    first, last = low + JAMB, high - JAMB - width
+    if last < first - 1e-6:
+        return np.zeros(0)
+    return np.unique(np.round([*np.arange(first, last, STEP), last, (first + last) / 2], 3))
+
+
+def _passage_options(home: HomeGraph, floors: dict[str, Floor], one: str, other: str, predicate: str) -> list[_Hole]:
+    """All holes that a relation could be kept by."""
+    out: list[_Hole] = []
+    for facing in facings(floors[one], floors[other]):
+        if predicate == "open_to":
+            width = min(facing.high - facing.low - 2 * JAMB, PASSAGE[0])
+            if width > 0.8:
+                middle = (facing.low + facing.high - width) / 2
+                mine = Opening("passage", "passage", facing.edge, round(middle, 3), round(width, 3), PASSAGE[1])
+                out.append(_Hole(((one, mine), (other, facing.across(mine))), -width))
+            continue
+        for into in facings(floors[one], floors[other]), facings(floors[other], floors[one]):
+            for side in into:
+                if {side.edge, side.other_edge} == {facing.edge, facing.other_edge}:
+                    out += _leaves(home, floors, side)
+    return out
+
+
+def _leaves(home: HomeGraph, floors: dict[str, Floor], side: Facing) -> Iterator[_Hole]:
+    """Doors in a stretch of wall whose leaf opens into the first of its rooms."""
+    floor = floors[side.one]
+    width, height = DOOR
+    length = float(edge_lengths(floor.corners)[side.edge])
+    hub = vocabulary().room_type(home.room(side.one).type).hub
+    room = shapely.Polygon(floor.corners).buffer(1e-3)
+    for offset in _places(side.low, side.high, width):
+        near, far = float(offset), float(length - width - offset)
+        hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
+        mine = Opening("door", "door", side.edge, near, width, height, hinge=hinge)
+        outside = shapely.Polygon(free_area(floor.corners, mine)).difference(room).area
+        cost = 0.3 * hub + 0.25 * min(near, far) + 50.0 * outside
+        yield _Hole(((side.one, mine), (side.other, side.across(mine))), cost)
+
+
+def _front_doors(home: HomeGraph, floor: Floor, floors: Sequence[Floor]) -> list[_Hole]:
+    width, height = FRONT_DOOR
+    out = []
+    for edge, low, high in outer_spans(floor, floors):
+        length = float(edge_lengths(floor.corners)[edge])
+        for offset in _places(low, high, width):
+            near, far = float(offset), float(length - width - offset)
+            hinge = "left" if (near <= far) == (signed_area(floor.corners) > 0) else "right"
+            door = Opening("door", "door", edge, near, width, height, hinge=hinge)
+            out.append(_Hole(((floor.name, door),), 0.1 * min(near, far) + 0.05 * length))
+    return out
+
+
+def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[tuple[int, float, float]]:
+    """(edge, from, to) in metres of the stretches of a room's walls that have no other room behind them."""
+    met = [facing for other in floors if other.name != floor.name for facing in facings(floor, other)]
+    for edge, length in enumerate(edge_lengths(floor.corners)):
+        inner = sorted((one.low, one.high) for one in met if one.edge == edge)
+        at = 0.0
+        for low, high in [*inner, (float(length), float(length))]:
+            if low - at > 0.5:
+                yield edge, at, low
+            at = max(at, high)
+
+
+def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequence[Opening]) -> Iterator[Opening]:
+    """A window, two in a large room, in the middle of the longest outer walls."""
+    row = vocabulary().room_type(home.room(floor.name).type)
+    how = WINDOWS[row.use]
+    if not how or not (row.daylight or row.use == "wet"):
+        return
+    spans = []
+    for edge, low, high in outer_spans(floor, floors):
+        for opening in there:
+            if opening.edge == edge:  # the longer side of it
+                left, right = (low, opening.offset - PIER), (opening.end + PIER, high)
+                low, high = max(left, right, key=lambda span: span[1] - span[0])
+        spans.append((high - low, edge, low, high))
+    names = [opening.name for opening in there]
+    for count, (span, edge, low, high) in enumerate(sorted(spans, reverse=True)[:2]):
+        width = round(min(0.5 * span, how[2]), 1)
+        if width < 0.5 or span - width < 2 * PIER or (count and abs(signed_area(floor.corners)) < 14.0):
+            return
+        name = numbered("window", names)
+        names.append(name)
+        yield Opening(name, "window", edge, round((low + high - width) / 2, 3), width, how[1], how[0])

@@ -1,0 +1,376 @@
+"""Rectangles for rooms: a constraint solver finds how they lie, then wall lines are moved until the areas are right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import networkx
+import numpy as np
+
+from echousd.graph import GraphError
+from echousd.home.graph import HomeRelation
+
+Rect = tuple[float, float, float, float]  # low x, low z, high x, high z, metres
+Cells = dict[str, tuple[Rect, ...]]  # of every room the parts of its cell: floor and half of its walls
+
+FACADE = 1.4  # metres of outer wall that a window needs
+CORNERS = 0.35  # metres of a shared wall that corners and casings take
+ELL = 1.4  # metres of either arm of an L
+FINE = 0.05  # metres that wall lines are moved by
+EFFORT = 1.2  # of the solver's own clock, which counts work and is the same on every machine; about seconds
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A room as the solver sees it.
+
+    Arguments:
+        area: square metres of its cell. least, most: what it may be as a share of that.
+        ratio: long over short side at most.
+        short: metres that its short side has at least.
+        outer: metres of outer wall that it wants. parts: rectangles, two of an L.
+    """
+
+    name: str
+    area: float
+    least: float
+    most: float
+    ratio: float
+    short: float
+    outer: float = 0.0
+    parts: int = 1
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is asked of a plan.
+
+    Arguments:
+        wishes: of the rooms. relations: that must hold.
+        extents: (x, z) of the outline's box, metres. voids: parts of that box outside of the outline.
+        free: whether the outline may move. gaps: whether cells may leave some of the box free.
+        together: rooms of which each shall touch another. seed: of the solver. before: cells to begin from.
+    """
+
+    wishes: tuple[Wish, ...]
+    relations: tuple[HomeRelation, ...]
+    extents: tuple[float, float]
+    voids: tuple[Rect, ...] = ()
+    free: bool = True
+    gaps: bool = False
+    together: tuple[str, ...] = ()
+    seed: int = 0
+    before: Mapping[str, Sequence[Rect]] | None = None
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(2,) float: metres of a step of the grid that cells are first laid out on, along x and z."""
+        extents = np.array(self.extents)
+        step = np.clip(np.sqrt(extents.prod()) / 30, 0.2, 0.4)
+        return extents / np.maximum((extents / step).round(), 1)
+
+
+def solver_module() -> Any:
+    """OR-tools' CP-SAT; raises `GraphError` that says how to install it."""
+    try:
+        from ortools.sat.python import cp_model
+    except ImportError:
+        raise GraphError('plans need a constraint solver: pip install "echousd[home]"') from None
+    return cp_model
+
+
+def solved(problem: Problem) -> tuple[str, Cells]:
+    """`solved`, `impossible` (proven) or `unknown` (not within its effort), and the cells."""
+    cp = solver_module()
+    model, parts = _model(cp, problem)
+    solver = cp.CpSolver()
+    solver.parameters.num_workers = 1
+    solver.parameters.random_seed = problem.seed
+    solver.parameters.linearization_level = 0  # plans of ten rooms four times as fast
+    solver.parameters.max_deterministic_time = EFFORT
+    status = solver.Solve(model)
+    if status not in (cp.OPTIMAL, cp.FEASIBLE):
+        return ("impossible" if status == cp.INFEASIBLE else "unknown"), {}
+    steps = np.tile(problem.steps, 2)
+    lie: Cells = {
+        name: tuple(tuple((np.array([solver.Value(v) for v in part]) * steps).tolist()) for part in own)
+        for name, own in parts.items()
+    }
+    return "solved", _tuned(problem, lie)
+
+
+def scaled(problem: Problem, lie: Cells, factor: float) -> Cells:
+    """The cells with all areas and the outline that many times as large."""
+    side = float(np.sqrt(factor))
+    wishes = tuple(replace(wish, area=wish.area * factor) for wish in problem.wishes)
+    larger = replace(problem, wishes=wishes, extents=(problem.extents[0] * side, problem.extents[1] * side))
+    grown: Cells = {name: tuple((side * a, side * b, side * c, side * d) for a, b, c, d in lie[name]) for name in lie}
+    return _tuned(larger, grown, grid=False)
+
+
+def _model(cp: Any, problem: Problem) -> tuple[Any, dict[str, list[tuple[Any, Any, Any, Any]]]]:
+    """The constraints, and (low x, low z, high x, high z) of every part of every cell, in steps."""
+    model, steps = cp.CpModel(), problem.steps
+    limits = [round(side / step) for side, step in zip(problem.extents, steps, strict=True)]
+    cell = float(steps.prod())
+    parts: dict[str, list[tuple[Any, Any, Any, Any]]] = {}
+    spans: tuple[list[Any], list[Any]] = ([], [])
+    covered = []
+
+    def least(metres: float, axis: int) -> int:
+        return int(np.ceil(metres / steps[axis] - 1e-6))
+
+    def rectangle(short: float) -> tuple[tuple[Any, Any, Any, Any], Any, Any]:
+        ends, sides = [], []
+        for axis in (0, 1):
+            low, high = (model.NewIntVar(0, limits[axis], "") for _ in range(2))
+            side = model.NewIntVar(least(short, axis), limits[axis], "")
+            spans[axis].append(model.NewIntervalVar(low, side, high, ""))
+            ends.append((low, high))
+            sides.append(side)
+        return (ends[0][0], ends[1][0], ends[0][1], ends[1][1]), sides[0], sides[1]
+
+    def area_of(w: Any, h: Any) -> Any:
+        area = model.NewIntVar(0, limits[0] * limits[1], "")
+        model.AddMultiplicationEquality(area, [w, h])
+        return area
+
+    for wish in problem.wishes:
+        made = [rectangle(ELL if wish.parts > 1 else wish.short) for _ in range(wish.parts)]
+        parts[wish.name] = [part for part, _, _ in made]
+        areas = [area_of(w, h) for _, w, h in made]
+        covered += areas
+        low, high = (round(wish.area * share / cell) for share in (wish.least, wish.most))
+        model.AddLinearConstraint(sum(areas), low, high)
+        if wish.parts == 1:
+            _, w, h = made[0]
+            across, deep = (round(1000 * step) for step in steps)
+            model.Add(across * 10 * w <= int(wish.ratio * 10) * deep * h)
+            model.Add(deep * 10 * h <= int(wish.ratio * 10) * across * w)
+        else:
+            _as_ell(model, *parts[wish.name][:2], least=[least(ELL, axis) for axis in (0, 1)])
+        if problem.before and len(problem.before.get(wish.name, ())) == wish.parts:
+            for part, rect in zip(parts[wish.name], problem.before[wish.name], strict=True):
+                for variable, at, step in zip(part, rect, (*steps, *steps), strict=True):
+                    model.AddHint(variable, round(at / step))
+    voids = [[round(at / step) for at, step in zip(void, (*steps, *steps), strict=True)] for void in problem.voids]
+    for low_x, low_z, high_x, high_z in voids:
+        spans[0].append(model.NewFixedSizeIntervalVar(low_x, high_x - low_x, ""))
+        spans[1].append(model.NewFixedSizeIntervalVar(low_z, high_z - low_z, ""))
+    model.AddNoOverlap2D(*spans)
+    if not problem.gaps:
+        model.Add(sum(covered) == limits[0] * limits[1] - sum((v[2] - v[0]) * (v[3] - v[1]) for v in voids))
+
+    def touches(one: Sequence[Any], other: Sequence[Any], metres: float) -> list[Any]:
+        """A literal each for the four sides on which two rectangles share so much wall."""
+        found = []
+        for axis in (0, 1):
+            across, shared = 1 - axis, least(metres, 1 - axis)
+            for a, b in ((one, other), (other, one)):
+                side = model.NewBoolVar("")
+                model.Add(a[2 + axis] == b[axis]).OnlyEnforceIf(side)
+                model.Add(a[2 + across] >= b[across] + shared).OnlyEnforceIf(side)
+                model.Add(b[2 + across] >= a[across] + shared).OnlyEnforceIf(side)
+                found.append(side)
+        return found
+
+    def near(one: str, other: str, metres: float) -> list[Any]:
+        return [side for a in parts[one] for b in parts[other] for side in touches(a, b, metres)]
+
+    for relation in problem.relations:
+        row, (subject, object_) = relation.row, relation.pair
+        if row.wall:
+            model.AddBoolOr(near(subject, object_, row.wall + CORNERS))
+        elif any(row.step):
+            axis = 0 if row.step[0] else 1
+            for a in parts[subject]:
+                for b in parts[object_]:
+                    if row.step[axis] > 0:
+                        model.Add(a[axis] + a[2 + axis] >= 2 * b[2 + axis])
+                    else:
+                        model.Add(a[axis] + a[2 + axis] <= 2 * b[axis])
+        elif row.symmetric:
+            for a in parts[subject]:
+                for b in parts[object_]:
+                    apart = [model.NewBoolVar("") for _ in range(4)]
+                    ways = ((a, b, 0), (b, a, 0), (a, b, 1), (b, a, 1))
+                    for literal, (first, second, axis) in zip(apart, ways, strict=True):
+                        model.Add(first[2 + axis] + 1 <= second[axis]).OnlyEnforceIf(literal)
+                    model.AddBoolOr(apart)
+    sizes = dict(zip([w.name for w in problem.wishes], _sums(problem.wishes, covered), strict=True))
+    for relation in problem.relations:
+        if relation.row.compares:
+            model.Add(sizes[relation.subject] >= sizes[relation.object] + max(int(0.5 / cell), 1))
+    for wish in problem.wishes:
+        if wish.outer:
+            sides = []
+            for part in parts[wish.name]:
+                for axis in (0, 1):
+                    for end, border in ((part[axis], 0), (part[2 + axis], limits[axis])):
+                        literal = model.NewBoolVar("")
+                        model.Add(end == border).OnlyEnforceIf(literal)
+                        sides.append(literal)
+                sides += [side for void in voids for side in touches(part, void, wish.outer)]
+            model.AddBoolOr(sides)
+    for name in problem.together if len(problem.together) > 1 else ():
+        model.AddBoolOr([side for other in problem.together if other != name for side in near(name, other, 1.0)])
+    return model, parts
+
+
+def _sums(wishes: Sequence[Wish], covered: list[Any]) -> list[Any]:
+    """The area of every room from those of all parts in turn."""
+    each = iter(covered)
+    return [sum(next(each) for _ in range(wish.parts)) for wish in wishes]
+
+
+def _as_ell(model: Any, one: Sequence[Any], other: Sequence[Any], *, least: Sequence[int]) -> None:
+    """The second rectangle stands flush at a corner of the first, on one of its four sides."""
+    ways = []
+    for axis in (0, 1):
+        across = 1 - axis
+        for a, _b in ((one, other), (other, one)):
+            for flush in (across, 2 + across):
+                way = model.NewBoolVar("")
+                model.Add(one[2 + axis] == other[axis] if a is one else other[2 + axis] == one[axis]).OnlyEnforceIf(way)
+                model.Add(one[flush] == other[flush]).OnlyEnforceIf(way)
+                inner = one[2 + across] - one[across] - (other[2 + across] - other[across])
+                model.Add(inner >= least[across]).OnlyEnforceIf(way)
+                ways.append(way)
+    model.AddBoolOr(ways)
+
+
+def _tuned(problem: Problem, lie: Cells, *, grid: bool = True) -> Cells:
+    """The cells with their wall lines moved, on 5 cm, until areas and proportions are as near as they get.
+
+    Arguments:
+        grid: whether they lie on the solver's grid, on which their outline was rounded.
+    """
+    rects = np.array([rect for own in lie.values() for rect in own])
+    line, at, pinned = _lines(problem, rects, grid=grid)
+    owner = np.repeat(np.arange(len(lie)), [len(own) for own in lie.values()])
+    cost, solved_at = _cost(problem, line, owner, rects), at
+    at = np.where(pinned, at, (at / FINE).round() * FINE)
+    best = cost(at)
+    for move in (8 * FINE, 4 * FINE, 2 * FINE, FINE):
+        for _ in range(12):
+            before = best
+            for number in np.flatnonzero(~pinned):
+                for step in (move, -move):
+                    tried = at.copy()
+                    tried[number] += step
+                    value = cost(tried)
+                    if value < best - 1e-9:
+                        at, best = tried, value
+                        break
+            if best > before - 1e-9:
+                break
+    at = at if best < cost(solved_at) else solved_at
+    placed = iter(at[line].round(4).tolist())
+    return {name: tuple(tuple(next(placed)) for _ in own) for name, own in lie.items()}
+
+
+def _lines(problem: Problem, rects: np.ndarray, *, grid: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(r, 4) int which wall line every side of every rectangle lies on, (l,) where lines are, (l,) which are fixed."""
+    steps, border = np.tile(problem.steps, 2), np.array([*problem.voids, (0.0, 0.0, *problem.extents)])
+    everything = np.concatenate([rects, (border / steps).round() * steps if grid else border])
+    exact = np.concatenate([rects, border])
+    joined = networkx.Graph()
+    sides = [(r, s) for r in range(len(everything)) for s in range(4)]
+    joined.add_nodes_from(sides)
+    for (r, s), (q, t) in combinations(sides, 2):
+        across = 1 - s % 2
+        if s % 2 == t % 2 and abs(everything[r, s] - everything[q, t]) < 1e-6:
+            low = max(everything[r, across], everything[q, across])
+            if low < min(everything[r, 2 + across], everything[q, 2 + across]) + 1e-6:
+                joined.add_edge((r, s), (q, t))
+    line, at, pinned = np.zeros((len(everything), 4), int), [], []
+    for number, group in enumerate(networkx.connected_components(joined)):
+        for r, s in group:
+            line[r, s] = number
+        at.append(float(exact[max(group)]))
+        outer = [side for r, side in group if r >= len(rects)]
+        pinned.append(bool(outer) and not (problem.free and min(outer) > 1))
+    return line[: len(rects)], np.array(at), np.array(pinned)
+
+
+def _cost(problem: Problem, line: np.ndarray, owner: np.ndarray, rects: np.ndarray) -> Callable[[np.ndarray], float]:
+    """How far lines at some places are from what is asked; what the solver has seen to costs thousands if it breaks."""
+    wishes = problem.wishes
+    target, least, most = np.array([(w.area, w.least, w.most) for w in wishes]).T
+    ratio = np.array([w.ratio for w in wishes])
+    single = np.array([w.parts == 1 for w in wishes])[owner]
+    short = np.array([w.short if w.parts == 1 else ELL for w in wishes])[owner]
+    index = {wish.name: number for number, wish in enumerate(wishes)}
+    low, high = rects[:, :2], rects[:, 2:]
+    pairs = [  # (rectangle, rectangle, axis across, metres) of walls that must stay shared
+        (i, j, 1 - axis, need)
+        for need, i, j in _needs(problem, index, owner)
+        for axis in (0, 1)
+        if min(abs(high[i, axis] - low[j, axis]), abs(high[j, axis] - low[i, axis])) < 1e-6
+        and min(high[i, 1 - axis], high[j, 1 - axis]) - max(low[i, 1 - axis], low[j, 1 - axis]) >= need - 2 * FINE
+    ]
+    order = [(index[r.subject], index[r.object]) for r in problem.relations if r.row.compares]
+    beyond = [
+        (i, j, 0 if r.row.step[0] else 1, sum(r.row.step))
+        for r in problem.relations
+        if any(r.row.step)
+        for i in np.flatnonzero(owner == index[r.subject])
+        for j in np.flatnonzero(owner == index[r.object])
+    ]
+    apart = [
+        (i, j)
+        for r in problem.relations
+        if r.row.symmetric and not r.row.wall
+        for i in np.flatnonzero(owner == index[r.subject])
+        for j in np.flatnonzero(owner == index[r.object])
+    ]
+    divided = [  # pairs of rectangles, and the axis along which one ends before the other begins
+        (i, j, axis)
+        for i in range(len(rects))
+        for j in range(len(rects))
+        for axis in (0, 1)
+        if i != j and high[i, axis] <= low[j, axis] + 1e-6
+    ]
+    first, second, along = np.array(divided, int).reshape(-1, 3).T
+
+    def cost(at: np.ndarray) -> float:
+        here = at[line]
+        sides = here[:, 2:] - here[:, :2]
+        areas = np.bincount(owner, sides.prod(1), minlength=len(wishes))
+        share = areas / target
+        shape = np.maximum(sides.max(1) / np.maximum(sides.min(1), 0.1), 1.0)
+        wrong = np.maximum(short[:, None] - sides, 0).sum()
+        wrong += np.maximum(shape - ratio[owner], 0)[single].sum()
+        wrong += np.maximum(least - share, 0).sum() + np.maximum(share - most, 0).sum()
+        wrong += np.maximum(here[first, 2 + along] - here[second, along], 0).sum()
+        for i, j, across, need in pairs:
+            shared = min(here[i, 2 + across], here[j, 2 + across]) - max(here[i, across], here[j, across])
+            wrong += max(need - shared, 0.0)
+        for larger, smaller in order:
+            wrong += max(areas[smaller] + 0.4 - areas[larger], 0.0)
+        for one, other, axis, sign in beyond:
+            middle, edge = here[one, [axis, 2 + axis]].mean(), here[other, 2 + axis if sign > 0 else axis]
+            wrong += max(sign * (edge - middle), 0.0)
+        for one, other in apart:
+            gaps = np.maximum(here[one, :2] - here[other, 2:], here[other, :2] - here[one, 2:])
+            wrong += max(0.1 - float(gaps.max()), 0.0)
+        tidy = 0.02 * np.maximum(shape - 1.5, 0)[single].sum()
+        return float((np.square(share - 1) / np.maximum(1 - least, 0.05)).sum() + tidy + 1e4 * wrong)
+
+    return cost
+
+
+def _needs(problem: Problem, index: Mapping[str, int], owner: np.ndarray) -> list[tuple[float, int, int]]:
+    """(metres, rectangle, rectangle) of all walls that could serve a relation, and those between the arms of an L."""
+    found = [
+        (r.row.wall + CORNERS, int(i), int(j))
+        for r in problem.relations
+        if r.row.wall
+        for i in np.flatnonzero(owner == index[r.subject])
+        for j in np.flatnonzero(owner == index[r.object])
+    ]
+    both = [np.flatnonzero(owner == number) for number in range(len(problem.wishes))]
+    return found + [(ELL, int(own[0]), int(own[1])) for own in both if len(own) > 1]

@@ -1,0 +1,173 @@
+"""Homes on stages: /House/Graph, and below /House/Rooms the rooms, each with its own graph and, if planned, place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, Vt
+
+from echousd.graph import GraphError, SceneGraph
+from echousd.home.graph import RATIO, HomeGraph, HomeRelation, HomeRoom
+from echousd.home.plan import Plan
+from echousd.stage import encoding as usd
+from echousd.stage import values
+from echousd.stage.encoding import StageError
+from echousd.stage.files import open_stage, save_layer, source
+from echousd.stage.read import find_rooms, place, room_graph, value
+from echousd.stage.units import metres_per_unit, up_axis
+from echousd.stage.write import author, define, put, relate
+
+Z_TO_Y = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+HOME, GRAPH, ROOMS = "/House", "/House/Graph", "/House/Rooms"
+DOC = """A home: /House/Graph says how its rooms lie to each other, each room's own graph what stands in it.
+North is +X, east +Z, up +Y. Lengths are metres in the graphs."""
+
+
+def home_layer(home: HomeGraph, plan: Plan | None = None, *, rooms: bool = True) -> Sdf.Layer:
+    """A new anonymous layer with a home's graph, and where there is a plan, with the rooms in their places.
+
+    Arguments:
+        rooms: with each room's own graph; else only prims for what else says it.
+    """
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.documentation = DOC
+    layer.defaultPrim = HOME[1:]
+    layer.pseudoRoot.SetInfo("metersPerUnit", 1.0)
+    layer.pseudoRoot.SetInfo("upAxis", "Y")
+    with Sdf.ChangeBlock():
+        for path, kind in ((HOME, "assembly"), (ROOMS, "group")):
+            define(layer, Sdf.Path(path), "Xform").kind = kind
+        graph = define(layer, Sdf.Path(GRAPH), usd.HOME_TYPE)
+        for name, number in ((usd.AREA, home.area),):
+            if number is not None:
+                put(graph, name, number)
+        if home.outline is not None:
+            put(graph, usd.OUTLINE, Vt.Vec2dArray([Gf.Vec2d(*corner) for corner in home.outline]))
+        if home.entrance is not None:
+            relate(graph, usd.ENTRANCE, room_path(home.entrance))
+        for relation in home.relations:
+            taken = {spec.name for spec in graph.nameChildren}
+            spec = Sdf.PrimSpec(
+                graph, usd.relation_name(*(relation.subject, relation.predicate, relation.object), taken),
+                Sdf.SpecifierDef, usd.RELATION_TYPE,
+            )  # fmt: skip
+            relate(spec, usd.SUBJECT, room_path(relation.subject))
+            relate(spec, usd.OBJECT, room_path(relation.object))
+            put(spec, usd.PREDICATE, relation.predicate)
+        for room in home.rooms:
+            spec = define(layer, room_path(room.name), "Xform")
+            spec.SetInfo("apiSchemas", Sdf.TokenListOp.Create(prependedItems=[usd.ROOM_API]))
+            if room.area is not None:
+                put(spec, usd.AREA, room.area)
+            if room.ratio != RATIO:
+                put(spec, usd.RATIO, room.ratio)
+            if plan is not None:
+                _placed(spec, plan.pose(room.name))
+            if rooms:
+                author(layer, room.graph if plan is None else plan.graph(room.name), spec.path)
+    return layer
+
+
+def room_path(name: str) -> Sdf.Path:
+    """Prim path of a room of a home."""
+    return Sdf.Path(ROOMS).AppendChild(name)
+
+
+def _placed(spec: Sdf.PrimSpec, pose: np.ndarray) -> None:
+    """Author a room's pose in the home, (4, 4) float, metres, column vectors."""
+    name = "xformOp:transform:home"
+    matrix = Gf.Matrix4d(*(np.round(pose.T, 6) + 0.0).ravel().tolist())
+    Sdf.AttributeSpec(spec, name, Sdf.ValueTypeNames.Matrix4d).default = matrix
+    order = Sdf.AttributeSpec(spec, "xformOpOrder", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+    order.default = Vt.TokenArray([name])
+
+
+def write_home(home: HomeGraph, path: Path, plan: Plan | None = None) -> None:
+    """Write a home's stage, with its plan where there is one; raises StageError."""
+    save_layer(home_layer(home, plan), path)
+
+
+def read_home(path: Path) -> HomeGraph | None:
+    """The graph of the home on a stage, None where it holds at most one room; raises StageError.
+
+    What a plan says of a room (floor, walls, openings) is no part of what was asked of it.
+    """
+    stage = open_stage(path)
+    with values.reading(stage):
+        found = find_rooms(stage)
+        graph = next((prim for prim in stage.Traverse() if prim.GetTypeName() == usd.HOME_TYPE), None)
+        if len(found) < 2 and graph is None:
+            return None
+        names = _names([prims.room.GetPath() for prims in found])
+        try:
+            rooms = []
+            for prims in found:
+                fields = {"area": value(prims.room, usd.AREA), "ratio": value(prims.room, usd.RATIO)}
+                given = {key: number for key, number in fields.items() if number is not None}
+                rooms.append(HomeRoom(names[prims.room.GetPath()], asked(room_graph(prims)), **given))
+            if graph is None:
+                return HomeGraph(rooms)
+            ways = [_relation(prim, names) for prim in graph.GetChildren() if prim.GetTypeName() == usd.RELATION_TYPE]
+            entrance = values.targets(graph, usd.ENTRANCE)
+            return HomeGraph(
+                rooms, ways, area=value(graph, usd.AREA), outline=value(graph, usd.OUTLINE),
+                entrance=names.get(entrance[0], str(entrance[0])) if entrance else None,
+            )  # fmt: skip
+        except GraphError as error:
+            raise StageError(f"{source(stage)}: {error}") from None
+
+
+def asked(graph: SceneGraph) -> SceneGraph:
+    """The graph of a room without what a plan says of it."""
+    if not graph.room.walls:
+        return graph
+    found: SceneGraph = graph.replaced(room=graph.room.replaced(floor_polygon=None, size=None, walls=(), openings=()))
+    return found
+
+
+def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
+    """Of every room of a stage its graph as it stands there, and (4, 4) float, its pose in metres, +Y up."""
+    stage = open_stage(path)
+    with values.reading(stage):
+        found = find_rooms(stage)
+        names = _names([prims.room.GetPath() for prims in found])
+        cache, metres = UsdGeom.XformCache(), metres_per_unit(stage)
+        turn = Z_TO_Y if up_axis(stage) == "Z" else np.eye(4)
+        out = {}
+        for prims in found:
+            pose = turn @ values.matrix(cache.GetLocalToWorldTransform(prims.room), prims.room)
+            pose[:3, 3] *= metres
+            pose[:3, :3] = _upright(pose[:3, :3])  # rooms are made upright and in metres
+            out[names[prims.room.GetPath()]] = (room_graph(prims), pose)
+        return out
+
+
+def _upright(rotation: np.ndarray) -> np.ndarray:
+    """The turn about +Y nearest to a rotation: rooms stand on their floor."""
+    angle = np.arctan2(rotation[0, 2] - rotation[2, 0], rotation[0, 0] + rotation[2, 2])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+
+
+def _names(paths: list[Sdf.Path]) -> dict[Sdf.Path, str]:
+    """A name for every room: its prim's where it is the only one so called."""
+    often = [path.name for path in paths]
+    return {
+        path: path.name if often.count(path.name) == 1 else str(path).strip("/").replace("/", "_") for path in paths
+    }
+
+
+def _relation(prim: Usd.Prim, names: Mapping[Sdf.Path, str]) -> HomeRelation:
+    ends = []
+    for end in (usd.SUBJECT, usd.OBJECT):
+        targets = values.targets(prim, end)
+        if len(targets) != 1 or targets[0] not in names:
+            told = ", ".join(map(str, targets)) or "nothing"
+            raise StageError(f"{place(prim)}: {end} points to {told}, allowed: one room of the home")
+        ends.append(names[targets[0]])
+    try:
+        return HomeRelation(ends[0], str(value(prim, usd.PREDICATE)), ends[1])
+    except ValueError as error:
+        raise StageError(f"{place(prim)}: {error}") from None

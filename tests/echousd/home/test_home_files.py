@@ -1,0 +1,107 @@
+"""Homes on disk: rooms in their places, doors once, one palette; a room is made anew and the others stay."""
+
+import json
+
+import pytest
+from homes import QUICK, inline
+from pxr import Usd, UsdGeom
+
+import echousd
+from echousd.batches.journal import room_digest
+from echousd.folder.manifest import find_manifest
+
+FLAT = """home: {area: 34}
+rooms:
+  living: {type: living_room, objects: {sofa: sofa, table: coffee_table}}
+  bedroom: {type: bedroom, objects: {bed: double_bed}}
+relations: [living door bedroom]
+"""
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch, echousd_command):
+    inline(monkeypatch)
+    (tmp_path / "flat.yaml").write_text(FLAT)
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK, "--json")
+    assert done.code == 0, done.err
+    return tmp_path / "out", json.loads(done.out)
+
+
+def digests(folder):
+    return {path.name: room_digest(path) for path in (folder / "rooms").iterdir()}
+
+
+def test_a_home_is_whole(made, echousd_command, tmp_path):
+    folder, told = made
+    assert told["written"] == [str(folder / "home.usda")]
+    assert {name: row["objects"] for name, row in told["rooms"].items()} == {"living": 2, "bedroom": 1}
+    stage = Usd.Stage.Open(str(folder / "home.usda"))
+    assert stage.GetCompositionErrors() == []
+    assert list(echousd.read_rooms(stage)) == ["/House/Rooms/living", "/House/Rooms/bedroom"]
+    assert stage.GetPrimAtPath("/House/Rooms/living").HasPayload()
+    lights = [prim for prim in stage.Traverse() if prim.GetTypeName() == "DomeLight"]
+    assert len(lights) == 1
+    leaves = [
+        prim for prim in stage.Traverse() if prim.GetTypeName() == "Mesh" and prim.GetName().endswith("door_leaf")
+    ]
+    assert len(leaves) == 2  # the front door, and the one between the rooms
+    palettes = {find_manifest(folder / "rooms" / name)["palette"] for name in ("living", "bedroom")}
+    assert len(palettes) == 1
+    done = echousd_command("check", folder)
+    assert done.code == 0, done.out + done.err
+    assert "ok  plan     1 of 1 relations of rooms kept" in done.out
+    assert "ok  ways     2 of 2 rooms reached from the entrance" in done.out
+    assert "ok  room     bedroom" in done.out
+    done = echousd_command("check", folder, "--json")
+    assert json.loads(done.out)["reached"]["bedroom"] > 0.5
+    assert echousd_command("render", folder, "-o", tmp_path / "top.png", "--view", "top", "--size", "32").code == 0
+
+
+def test_floors_meet_in_the_doorway(made):
+    stage = Usd.Stage.Open(str(made[0] / "home.usda"))
+    cache = UsdGeom.BBoxCache(0, ["default"])
+
+    def box(path):
+        return cache.ComputeWorldBound(stage.GetPrimAtPath(path)).ComputeAlignedRange()
+
+    (threshold,) = (p for p in stage.GetPrimAtPath("/House/Plan").GetChildren() if p.GetTypeName() == "Xform")
+    between = box(threshold.GetPath())
+    floors = [box(f"/House/Rooms/{name}/Shell/Floor") for name in ("living", "bedroom")]
+    assert all(abs(between.GetMax()[1] - floor.GetMax()[1]) < 1e-6 for floor in floors)
+    gaps = [
+        max(max(between.GetMin()[i] - f.GetMax()[i], f.GetMin()[i] - between.GetMax()[i]) for i in (0, 2))
+        for f in floors
+    ]
+    assert gaps == pytest.approx([0, 0], abs=2e-3)
+
+
+def test_a_room_that_changes_leaves_the_others_as_they_are(made, tmp_path, echousd_command):
+    folder, _ = made
+    before = digests(folder)
+    (tmp_path / "flat.yaml").write_text(FLAT.replace("bed: double_bed", "bed: single_bed"))
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", folder, *QUICK)
+    assert done.code == 0, done.err
+    assert "kept     living" in done.out
+    after = digests(folder)
+    assert after["living"] == before["living"]
+    assert after["bedroom"] != before["bedroom"]
+
+
+def test_somebody_elses_file_stays(tmp_path, echousd_command):
+    (tmp_path / "flat.yaml").write_text(FLAT)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "home.usda").write_text("#usda 1.0\n")
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK)
+    assert done.code == 2
+    assert "home.usda: exists and is no home of echousd; choose another folder or use --force" in done.err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["home.usda"]
+
+
+def test_a_room_that_cannot_be_made_is_named(tmp_path, monkeypatch, echousd_command):
+    inline(monkeypatch)
+    text = FLAT.replace("bed: double_bed", "bed: {category: double_bed, size: [9, 1, 9], position: [0, 0, 0]}")
+    (tmp_path / "flat.yaml").write_text(text)
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", tmp_path / "out", *QUICK)
+    assert done.code == 1
+    assert "failed   bedroom: " in done.out
+    assert "room     living" in done.out

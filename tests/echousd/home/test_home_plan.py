@@ -1,0 +1,137 @@
+"""Plans: the graph is kept or the conflict is named, cells meet, doors swing free, and the same seed gives the same."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import shapely
+from homes import homes
+from hypothesis import assume, given, settings
+
+from echomodel.openings import segment, signed_area, swing_area
+from echousd.graph import GraphError
+from echousd.home.graph import home_of_words
+from echousd.home.plan import INNER, OUTER, conflicts, plan_home, plans, ways
+
+FLAT = "kitchen open_to living, hall door living, hall door bedroom*2, hall door bathroom"
+
+
+@pytest.fixture(scope="module")
+def flat():
+    return plan_home(home_of_words(FLAT, area=75))
+
+
+@settings(max_examples=12)
+@given(homes())
+def test_a_plan_keeps_the_graph_or_the_conflict_is_named(home):
+    try:
+        plan = plan_home(home)
+    except GraphError as error:
+        told = str(error)
+        assume("all of" not in told and "no plan found" not in told)  # named
+        raise
+    assert plan.broken() == ()
+    cells = [shapely.Polygon(cell) for cell in plan.cells.values()]
+    assert all(one.intersection(other).area < 1e-3 for one, other in combinations(cells, 2))
+    for name, openings in plan.openings.items():
+        floor, swings = plan.floors[name], []
+        inside = shapely.Polygon(floor).buffer(0.01)
+        for opening in openings:
+            swing = swing_area(floor, opening)
+            if len(swing):
+                swings.append(shapely.Polygon(swing))
+                assert inside.covers(swings[-1]), f"{name}: {opening} opens into a wall"
+        assert all(one.intersection(other).area < 0.02 for one, other in combinations(swings, 2)), name
+
+
+def test_cells_meet_and_walls_have_a_thickness(flat):
+    whole = shapely.union_all([shapely.Polygon(cell) for cell in flat.cells.values()])
+    assert whole.geom_type == "Polygon"
+    assert len(whole.interiors) == 0
+    assert whole.area == pytest.approx(sum(abs(signed_area(cell)) for cell in flat.cells.values()), abs=1e-2)
+    assert {thick for walls in flat.walls.values() for thick in walls} == {INNER / 2, OUTER}
+    assert flat.area == pytest.approx(75, rel=0.05)
+
+
+def test_a_door_is_there_once(flat):
+    through = {frozenset(pair): opening.kind for pair, opening in ways(flat)}
+    assert through == {
+        frozenset(("kitchen", "living")): "passage",
+        **{frozenset(("hall", room)): "door" for room in ("living", "bedroom_1", "bedroom_2", "bathroom")},
+    }
+    leaves = sum(opening.kind == "door" for openings in flat.openings.values() for opening in openings)
+    assert leaves == 4 + 1  # and the front door
+    front = [opening for opening in flat.openings["hall"] if opening.kind == "door" and opening.width == 1.0]
+    outer = shapely.union_all([shapely.Polygon(cell) for cell in flat.cells.values()]).boundary
+    middle = shapely.Point(segment(flat.floors["hall"], front[0]).mean(0))
+    assert shapely.distance(outer, middle) == pytest.approx(OUTER)
+
+
+def test_windows_look_outside(flat):
+    outer = shapely.union_all([shapely.Polygon(cell) for cell in flat.cells.values()]).boundary
+    for name, openings in flat.openings.items():
+        windows = [opening for opening in openings if opening.kind == "window"]
+        assert name in ("hall", "bathroom") or windows, name
+        for window in windows:
+            middle = shapely.Point(segment(flat.floors[name], window).mean(0))
+            assert shapely.distance(outer, middle) == pytest.approx(OUTER, abs=1e-3)
+
+
+def test_the_same_seed_gives_the_same_plan(flat):
+    again = plan_home(home_of_words(FLAT, area=75))
+    assert all(np.array_equal(flat.cells[name], again.cells[name]) for name in flat.cells)
+    assert flat.openings == again.openings
+
+
+def test_plans_differ(flat):
+    found = plans(home_of_words(FLAT, area=75), 3)
+    assert len(found) == 3
+    assert all(np.array_equal(found[0].cells[name], flat.cells[name]) for name in flat.cells)
+
+
+def test_a_given_outline_is_filled():
+    outline = ((0.0, 0.0), (9.0, 0.0), (9.0, 5.0), (6.0, 5.0), (6.0, 8.4), (0.0, 8.4))
+    plan = plan_home(home_of_words("hall door living, hall door bedroom, hall door kitchen", outline=outline))
+    whole = shapely.union_all([shapely.Polygon(cell) for cell in plan.cells.values()])
+    assert whole.symmetric_difference(shapely.Polygon(outline)).area < 0.01
+    assert plan.broken() == ()
+
+
+def test_an_edit_begins_with_the_plan_of_before(flat):
+    home = home_of_words(FLAT, area=75)
+    after = plan_home(home.relate("kitchen adjacent hall"), before=flat)
+    assert after.broken() == ()
+    moved = sum(not np.array_equal(flat.cells[name], after.cells[name]) for name in flat.cells)
+    assert moved <= len(flat.cells)
+
+
+@pytest.mark.parametrize(
+    ("words", "fields", "said"),
+    [
+        ("hall door bedroom, hall not_adjacent bedroom", {}, "'hall not_adjacent bedroom' cannot both"),
+        ("hall north_of bedroom, bedroom north_of hall", {}, "cannot all hold"),
+        ("hall larger_than bedroom, bedroom larger_than hall", {}, "cannot all hold"),
+        ("hall door bedroom*3, hall door living", {"area": 12}, "m² at least"),
+        ("hall door bedroom", {"outline": ((0, 0), (6, 0), (7, 5), (0, 5))}, "slanted wall"),
+        ("hall door bedroom", {"outline": ((0, 0), (9, 0), (9, 5), (0, 5)), "area": 90}, "state one of them"),
+    ],
+)  # fmt: skip
+def test_conflicts_are_named_before_solving(words, fields, said):
+    told = conflicts(home_of_words(words, **fields))
+    assert said in told[0]
+    with pytest.raises(GraphError) as raised:
+        plan_home(home_of_words(words, **fields))
+    assert str(raised.value) == told[0]
+
+
+def test_ways_that_would_cross_are_named():
+    rooms = ["bedroom_1", "bedroom_2", "bedroom_3", "study_1", "study_2"]
+    words = ", ".join(f"{one} door {other}" for one, other in combinations(rooms, 2))
+    (told,) = conflicts(home_of_words(words))
+    assert told.startswith("no flat plan has all of 'bedroom_1 door bedroom_2'")
+
+
+def test_without_the_solver_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "ortools.sat.python", None)
+    with pytest.raises(GraphError, match=r'pip install "echousd\[home\]"'):
+        plan_home(home_of_words("hall door bedroom"))
