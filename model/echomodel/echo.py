@@ -32,6 +32,7 @@ from echomodel.vocabulary import vocabulary
 
 TOGETHER = 256  # objects that are denoised at a time when several draws are made: larger products, bounded memory
 # Steps of what one stage hands to the next, coarser than the noise of sums in another order: equal bytes follow.
+CHECKPOINT = "checkpoint.safetensors"  # beside the weights in the folder of a training
 LATER = ("autoencoder", "shape")  # shipped parts that few rooms need: three quarters of the bytes
 CODE, DISTANCE = 1e-3, 1e-4
 
@@ -60,7 +61,7 @@ class EchoModel:
     def load(
         cls, path: str | Path | None = None, *, device: torch.device | str = "cpu", half_decode: bool = False
     ) -> EchoModel:
-        """Load the weights that ship with the package, a weights file, or a folder of weights files.
+        """Load the weights that ship with the package, a weights file, a folder of such, or that of a training.
 
         Arguments:
             path: file or folder, None = the shipped weights. device: where to. half_decode: as in the class.
@@ -69,7 +70,9 @@ class EchoModel:
             WeightsError: there are none, or they are damaged or do not belong together.
         """
         source = Path(str(resources.files("echomodel") / "weights")) if path is None else Path(path)
-        files = sorted(source.glob("*.safetensors")) if source.is_dir() else [source]
+        files = [source]
+        if source.is_dir():
+            files = sorted(file for file in source.glob("*.safetensors") if file.name != CHECKPOINT)
         if path is not None and not files:
             raise WeightsError(f"{source}: holds no weights files (.safetensors)")
         return cls(*load_weights(files, device, LATER if path is None else ()), half_decode=half_decode)

@@ -264,6 +264,7 @@ def test_a_checkpoint_of_another_recipe_is_refused_and_the_fields_are_named(data
     told = rf"another recipe \(model.layout.width was {width}, is {2 * width}; seed was {recipe.seed}, is 8\)"
     with pytest.raises(ValueError, match=told):
         open_run(other, tmp_path, resume=True)
+    assert EchoModel.load(tmp_path).branches == {"layout"}  # the folder of the run serves as weights
     path = tmp_path / "checkpoint.safetensors"
     whole = path.read_bytes()
     renamed = whole.replace(b'"average.', b'"averaga.', 1)
