@@ -75,10 +75,8 @@ def _one(
     """
     from echousd.checks import check as checked
     from echousd.home.check import check_home, is_home
-    from echousd.stage.apart import check_apart
 
     try:
-        check_apart(room)
         if is_home(room):
             home = check_home(room, rules=rules, layout=layout, settle=settle)
             if not json:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import UsdGeom
-from scipy.spatial import ConvexHull
 
 from echousd.draw.scenery import Scenery
 from echousd.draw.sight import ASPECT
@@ -96,5 +95,7 @@ def turning_views(scenery: Scenery, count: int) -> list[View]:
 
 def _outermost(scenery: Scenery) -> np.ndarray:
     """(n, 3) float corners of the scene; nothing else reaches the border of a picture of all of it."""
+    from scipy.spatial import ConvexHull  # a fifth of a second that a picture from inside does without
+
     points = scenery.triangles.reshape(-1, 3).astype(float)
     return np.asarray(points[ConvexHull(points, qhull_options="QJ").vertices])

@@ -40,22 +40,24 @@ FRONTS = 0.5  # hidden objects that seeing the furniture's fronts rather than th
 
 
 class Shot(NamedTuple):
-    """A camera inside: what it costs at first sight, camera to world (4, 4), mm, metres down for a metre ahead."""
+    """A camera inside: what it costs at first sight, camera to world (4, 4), mm; and what `Furniture.blocked` says."""
 
     cost: float
     view: np.ndarray
     lens: float
-    slope: float
+    points: np.ndarray
+    blocked: np.ndarray
 
 
 def view_matrix(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """(4, 4) float camera to world, column vectors; the camera looks along its -Z with +Y up."""
+    """(..., 4, 4) float camera to world, column vectors; the camera at (..., 3) looks along its -Z with +Y up."""
     back = eye - target
-    back = back / np.linalg.norm(back)
-    right = cross(np.array([0.0, 1.0, 0.0]), back)
-    right /= np.linalg.norm(right)
-    matrix = np.eye(4)
-    matrix[:3, 0], matrix[:3, 1], matrix[:3, 2], matrix[:3, 3] = right, cross(back, right), back, eye
+    back = back / np.linalg.norm(back, axis=-1, keepdims=True)
+    right = cross(np.broadcast_to((0.0, 1.0, 0.0), back.shape), back)
+    right /= np.linalg.norm(right, axis=-1, keepdims=True)
+    matrix = np.broadcast_to(np.eye(4), (*back.shape[:-1], 4, 4)).copy()
+    for column, axis in enumerate((right, cross(back, right), back, eye)):
+        matrix[..., :3, column] = axis
     return matrix
 
 
@@ -131,54 +133,46 @@ def inside_view(
     room = shapely.Polygon(floor)
     middle = np.asarray(room.representative_point().coords[0])
     things = [some for some in (furniture, hung) if some is not None and len(some.size)]
-    walls = _walls(floor, height)
-    near = [*((some, BEFORE) for some in things), (walls, WALLED)]
+    near = [*((some, BEFORE) for some in things), (_walls(floor, height), WALLED)]
     at_walls = [*things, *([openings] if openings is not None and len(openings.size) else [])]
     main = _main(furniture) if main is None else main
     aim = middle if main is None else furniture.position[main, [0, 2]]
     around = 0.5 * aim + 0.5 * (furniture.centre if len(furniture.size) else middle)
+    corners = np.empty((0, 3)) if main is None else furniture.corners[main]
     best, most = (_view(middle + 0.1, middle, EYES[0] * height, SLOPES[-1]), LENSES[0]), -np.inf
+    wider = room.buffer(0.05)
     shots: list[Shot] = []
-    seen: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # eye -> points of the furniture, and which are hidden
-    for spot in _spots(floor, middle):
-        for level in EYES:
-            eye = np.array([spot[0], level * height, spot[1]])
-            if any(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things):
-                continue
-            points, blocked = seen[eye.tobytes()] = furniture.blocked(eye)
-            hidden = 0.0 if main is None else _hidden(room, points[main], blocked[main], eye)
-            corners = np.empty((0, 3)) if main is None else furniture.corners[main]
-            for way in (aim - spot, around - spot):
-                for pan, slope in product(PANS, SLOPES):
-                    turned = np.array([[np.cos(pan), -np.sin(pan)], [np.sin(pan), np.cos(pan)]]) @ way
-                    view = _view(spot, spot + turned, eye[1], slope)
-                    off = _aside(corners, view)
-                    for number, lens in enumerate(LENSES):
-                        cut = float((off > APERTURE / 2 / lens / MARGIN).mean()) if len(off) else 0.0
-                        shots.append(Shot(WHOLE * cut + CLEAR * hidden + abs(pan) + 0.1 * number, view, lens, slope))
-    shots.sort(key=lambda shot: shot.cost)
-    for first, view, lens, _ in _varied(shots)[:TRIED]:
+    for spot, level in product(_spots(floor, middle), EYES):
+        eye = np.array([spot[0], level * height, spot[1]])
+        if any(bool((some.nearness(eye, BEFORE) > TOUCHED).any()) for some in things):
+            continue
+        points, blocked = furniture.blocked(eye)
+        hidden = 0.0 if main is None else _hidden(wider, points[main], blocked[main], eye)
+        views = _turned(eye, np.stack([aim - spot, around - spot]))
+        half = APERTURE / 2 / np.array(LENSES)
+        cut = (_aside(corners, views)[..., None] > half / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
+        cost = WHOLE * cut + CLEAR * hidden + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))
+        cost = cost.transpose(0, 1, 3, 2).reshape(-1, len(SLOPES))  # of each slope the first that costs least
+        for slope, row in sorted(enumerate(cost.argmin(0)), key=lambda found: (found[1] // len(LENSES), found[0])):
+            heading, lens = divmod(int(row), len(LENSES))
+            view = views.reshape(-1, len(SLOPES), 4, 4)[heading, slope]
+            shots.append(Shot(float(cost[row, slope]), view, LENSES[lens], points, blocked))
+    for first, view, lens, points, blocked in sorted(shots, key=lambda shot: shot.cost)[:TRIED]:
         eye, half = view[:3, 3], APERTURE / 2 / lens
-        way = -view[[0, 2], 2]
-        merit = min(_depth(room, eye[[0, 2]], way), FAR) - first
-        merit -= FILLED * sum(some.filled(view, half, reach) for some, reach in near)
-        merit -= BARE * max(0.0, bare_share(floor, height, at_walls, view, half) - BAREST)
+        merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
         if len(furniture.size):
-            points, blocked = seen[eye.tobytes()]
             unseen = blocked | (_aside(points, view) > half)
             merit += float((eye[[0, 2]] - middle) @ furniture.facing - unseen.mean(1).sum())
+        if merit + SHOWN <= most:  # the rest only takes away
+            continue
+        if len(furniture.size):
             merit += SHOWN * np.isfinite(furniture.away(view, half)).mean()
+        merit -= FILLED * sum(some.filled(view, half, reach) for some, reach in near)
+        if merit > most:
+            merit -= BARE * max(0.0, bare_share(floor, height, at_walls, view, half) - BAREST)
         if merit > most:
             best, most = (view, lens), merit
     return best
-
-
-def _varied(shots: list[Shot]) -> list[Shot]:
-    """The shots in their order, of each eye the first for each slope."""
-    out: dict[tuple[bytes, float], Shot] = {}
-    for shot in shots:
-        out.setdefault((shot.view[:3, 3].tobytes(), shot.slope), shot)
-    return list(out.values())
 
 
 def bare_share(floor: np.ndarray, height: float, things: Sequence[Furniture], view: np.ndarray, half: float) -> float:
@@ -205,18 +199,20 @@ def _main(furniture: Furniture) -> int | None:
     return int(area.argmax())
 
 
-def _hidden(room: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye: np.ndarray) -> float:
-    """Share of the points (p, 3) of a piece that furniture (`blocked`) or a corner of the room hides from an eye."""
+def _hidden(wider: shapely.Polygon, points: np.ndarray, blocked: np.ndarray, eye: np.ndarray) -> float:
+    """Share of the points (p, 3) of a piece that furniture (`blocked`) or a corner of the room, made a little wider,
+    hides from an eye.
+    """
     lines = shapely.linestrings([[eye[[0, 2]], point] for point in points[:, [0, 2]]])
-    return float((blocked | ~shapely.covers(room.buffer(0.05), lines)).mean())
+    return float((blocked | ~shapely.covers(wider, lines)).mean())
 
 
 def _aside(points: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """(...) float: how far points (..., 3) are from the middle of a picture, at distance 1; inf behind the camera.
+    """(..., p) float: how far points (..., p, 3) are from the middle of pictures, at distance 1; inf behind the camera.
 
     What is up or down counts as in the picture's width, whose half is `ASPECT` times that of its height.
     """
-    x, y, z = np.moveaxis((points - view[:3, 3]) @ view[:3, :3], -1, 0)
+    x, y, z = np.moveaxis((points - view[..., None, :3, 3]) @ view[..., :3, :3], -1, 0)
     return np.asarray(np.where(z < 0, np.maximum(np.abs(x), ASPECT * np.abs(y)) / np.maximum(-z, 1e-9), np.inf))
 
 
@@ -245,6 +241,16 @@ def _view(spot: np.ndarray, aim: np.ndarray, level: float, slope: float) -> np.n
     """(4, 4) float camera to world over `spot` at a level towards `aim`, `slope` metres down for a metre ahead."""
     away = float(np.linalg.norm(aim - spot))
     return view_matrix(np.array([spot[0], level, spot[1]]), np.array([aim[0], level - slope * away, aim[1]]))
+
+
+def _turned(eye: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """(w, `PANS`, `SLOPES`, 4, 4) float camera to world of an eye that looks along ways (w, 2), turned and down."""
+    cos, sin = np.cos(PANS), np.sin(PANS)
+    turned = np.einsum("pij,wj->wpi", np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1), ways)[:, :, None]
+    down = -np.array(SLOPES) * np.linalg.norm(turned, axis=-1)
+    flat = np.broadcast_to(turned, (*down.shape, 2))
+    target = eye + np.stack([flat[..., 0], down, flat[..., 1]], -1)
+    return view_matrix(np.broadcast_to(eye, target.shape), target)
 
 
 def _depth(room: shapely.Polygon, spot: np.ndarray, way: np.ndarray) -> float:
