@@ -15,6 +15,7 @@ from echousd.cli.report import report, say_done, telling_faults
 
 if TYPE_CHECKING:
     from echousd.graph import SceneGraph
+    from echousd.options import EditRequest
 
 
 def register(app: typer.Typer) -> None:
@@ -45,16 +46,19 @@ def edit(
 
     Every option may be given several times.
     """
-    from echousd.folder.found import refuse_house, room_at
+    from echousd.folder.found import is_home, refuse_house, room_at
     from echousd.make.reading import read_room
     from echousd.make.wishes import wished
     from echousd.options import EditRequest
 
-    if not recover:
-        refuse_house(room)
-        room = room_at(room)
     asked = {kind: given.pop(kind, None) for kind in EditRequest.__dataclass_fields__}
     wishes = EditRequest(**{kind: words for kind, words in asked.items() if words})
+    if not recover:
+        if wishes == EditRequest(relate=wishes.relate, unrelate=wishes.unrelate) != EditRequest() and is_home(room):
+            edit_home(room_at(room), wishes, output, dry_run=dry_run, force=force, json=json)
+            return
+        refuse_house(room)
+        room = room_at(room)
     if undo or redo or recover:
         if wishes != EditRequest() or dry_run or output is not None or undo + redo + recover > 1:
             does = "--undo takes the last edit back" if undo else "--redo makes it again"
@@ -71,6 +75,21 @@ def edit(
         f"edit {_name_of(wishes, given)}", lambda: (room, wished(read_room(room), wishes)), output or room.parent,
         given, nothing, dry_run=dry_run, force=force, wait=wait, json=json,
     )  # fmt: skip
+
+
+def edit_home(
+    root: Path, wishes: EditRequest, output: Path | None, *, dry_run: bool, force: bool, json: bool
+) -> None:
+    """Change how the rooms of a home lie to each other: its plan follows, and the rooms that it moves or opens."""
+    from echousd.cli.generate import generate_home
+    from echousd.home.assemble import remembered
+
+    home, options = remembered(root)
+    for sentence in wishes.unrelate:
+        home = home.unrelate(sentence)
+    for sentence in wishes.relate:
+        home = home.relate(sentence)
+    generate_home(root, home, output or root.parent, options, (), force=force, json=json, dry_run=dry_run)
 
 
 def update(

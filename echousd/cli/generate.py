@@ -12,7 +12,7 @@ import typer
 
 from echousd.cli.options import Force, Made, Outside, Wait, add_room_command
 from echousd.cli.output import say
-from echousd.cli.report import report, say_written, telling_faults
+from echousd.cli.report import report, say_done, say_written, telling_faults
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
@@ -123,13 +123,26 @@ def generate_home(
     *,
     force: bool,
     json: bool,
+    dry_run: bool = False,
 ) -> None:
-    """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults."""
-    started = time.perf_counter()
-    from echousd.home.assemble import earlier, write_rooms
-    from echousd.home.given import plan_of
+    """Plan a home, make its rooms side by side, and say what became of each; exit code 1 for faults.
 
-    plan = plan_of(graph, home, seed=options.seed, before=earlier(output, options.seed))
+    Arguments:
+        graph: the file that it comes from; a home that was made is planned anew, from the plan that it has.
+        dry_run: say what would be made, and make nothing.
+    """
+    started = time.perf_counter()
+    from echousd.folder.found import is_home
+    from echousd.home.assemble import earlier, stale, write_rooms
+    from echousd.home.given import next_plan, plan_there
+
+    stated = None if is_home(graph) else plan_there(graph, home)
+    before = graph if is_home(graph) else earlier(output, options.seed)
+    plan = stated or next_plan(home, seed=options.seed, before=before)
+    if dry_run:
+        again = stale(plan, output, options)
+        say_done(json, [], started, [f"new      {name}" for name in again], {"new": again})
+        return
     with progress_bar() as listen:
         made = write_rooms(
             plan, output, options, outside=[str(path) for path in outside], force=force,

@@ -23,6 +23,7 @@ from echousd.cli.quiet import add_help_all, add_quiet
 TOPICS = {
     "new": "graph",
     "graph": "graph",
+    "plan": "plan",
     "generate": "generate",
     "batch": "batch",
     "store": "store",

@@ -46,9 +46,16 @@ def room_at(place: Path) -> Path:
     return rooms[0]
 
 
+def is_home(place: Path) -> bool:
+    """Whether a path is a layer of ours that composes rooms, or the folder of one."""
+    file = place / HOME if place.is_dir() else place
+    return file.suffix == ".usda" and file.is_file() and f"int {HOUSE} ".encode() in file.read_bytes()[:HEAD]
+
+
 def refuse_house(place: Path) -> None:
     """Raises ValueError that names its rooms for a layer of ours that composes several."""
-    if place.suffix == ".usda" and place.is_file() and f"int {HOUSE} ".encode() in place.read_bytes()[:HEAD]:
+    if is_home(place):
+        place = room_at(place)
         rooms = ", ".join(str(path.relative_to(place.parent)) for path in _rooms_below(place.parent)[:8])
         raise ValueError(f"{place}: a home, which composes rooms; name one of them: {rooms}")
 

@@ -21,6 +21,7 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.run import MEMORY
 from echousd.batches.work import Job, room
 from echousd.folder.manifest import find_manifest
+from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import Plan
 from echousd.home.stages import HOME, home_layer, room_path
 from echousd.naming import HOME as ROOT_FILE
@@ -91,11 +92,9 @@ def write_rooms(
     """
     root = output / ROOT_FILE
     check_root(root, force=force)
-    before = _digests(root)
     jobs = jobs_of(plan, output, options, outside)
     digests = {name: digest_of(job) for name, job in jobs.items()}
-    there = {name for name, job in jobs.items() if find_manifest(Path(job.folder)) is not None}
-    wanted = [job for name, job in jobs.items() if name not in there or before.get(name) != digests[name]]
+    wanted = [jobs[name] for name in stale(plan, output, options, outside)]
     done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(jobs)
     failed: dict[str, str] = {}
     for name, value, error in _run(wanted, workers):
@@ -108,6 +107,28 @@ def write_rooms(
         marks = {name: digests[name] for name in made}
         write_all(home_files(plan, output, made, marks, options))
     return Made(root, done, failed)
+
+
+def stale(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> list[str]:
+    """The rooms of a plan that a folder does not hold as they would be made."""
+    layer = _layer(output / ROOT_FILE)
+    before = dict(layer.customLayerData.get("rooms", {})) if layer else {}
+    jobs = jobs_of(plan, output, options, outside)
+    there = [name for name, job in jobs.items() if find_manifest(Path(job.folder)) is not None]
+    return [name for name, job in jobs.items() if name not in there or before.get(name) != digest_of(job)]
+
+
+def remembered(root: Path) -> tuple[HomeGraph, RoomOptions]:
+    """What was asked of a home that was made: its graph and the options of its rooms."""
+    layer = _layer(root)
+    data = dict(layer.customLayerData) if layer else {}
+    if "asked" not in data:
+        raise ValueError(f"{root}: says nothing of what was asked of it, allowed: a home that echousd generate made")
+    return home_of_plain(json.loads(data["asked"])), RoomOptions(**json.loads(data["options"]))
+
+
+def _layer(root: Path) -> Sdf.Layer | None:
+    return Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
 
 
 def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mapping[str, Any] | None, str]]:
@@ -133,7 +154,7 @@ def _run(jobs: Sequence[Job], workers: int | None) -> Iterator[tuple[str, Mappin
 def earlier(output: Path, seed: int) -> Path | None:
     """The home that is in a folder, None where there is none of this seed."""
     root = output / ROOT_FILE
-    layer = Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
+    layer = _layer(root)
     return root if layer and layer.customLayerData.get("seed") == seed else None
 
 
@@ -143,12 +164,6 @@ def check_root(root: Path, *, force: bool = False) -> None:
         return
     if not (root.is_file() and f"int {MARK}".encode() in root.read_bytes()):
         raise ValueError(f"{root}: exists and is no home of echousd; choose another folder or use --force")
-
-
-def _digests(root: Path) -> dict[str, str]:
-    """Name of every room of a home that is there -> of what it was made."""
-    layer = Sdf.Layer.FindOrOpen(str(root)) if root.is_file() else None
-    return dict(layer.customLayerData.get("rooms", {})) if layer else {}
 
 
 def home_files(
@@ -161,7 +176,8 @@ def home_files(
     root.subLayerPaths.append(f"./{PLAN}")
     root.defaultPrim = HOME[1:]
     about = {MARK: 1, "generator": f"echousd {echousd.__version__}", "seed": options.seed}
-    root.customLayerData = {**about, "rooms": dict(digests)}
+    asked = {"asked": plan.home.to_json(), "options": json.dumps(options.model_dump(exclude_defaults=True))}
+    root.customLayerData = {**about, **asked, "rooms": dict(digests)}
     for key in ("metersPerUnit", "upAxis"):
         root.pseudoRoot.SetInfo(key, below.pseudoRoot.GetInfo(key))
     for number, name in enumerate(names):

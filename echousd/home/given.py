@@ -23,16 +23,19 @@ APART = 0.05  # square metres that floors of different rooms may share by roundi
 Placed = Mapping[str, tuple[SceneGraph, np.ndarray]]  # graph of every room, and its pose in the home
 
 
-def plan_of(path: Path, home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> Plan:
-    """The plan of the home in a file: that which is there, else a new one; raises `GraphError`.
+def plan_of(path: Path, home: HomeGraph, *, seed: int = 0) -> Plan:
+    """The plan of the home in a file: that which is there, else a new one; raises `GraphError`."""
+    stated = plan_there(path, home)
+    return stated or plan_home(home, seed=seed)
+
+
+def next_plan(home: HomeGraph, *, seed: int = 0, before: Path | None = None) -> Plan:
+    """The plan of a home of which one may be there already; raises `GraphError`.
 
     Arguments:
-        before: layer of the home that was made before: its plan stays where nothing is asked of rooms but what stands
-            in them, and else is begun with.
+        before: layer of that home: its plan stays where nothing is asked but what stands in its rooms, and else is
+            begun with.
     """
-    stated = plan_there(path, home)
-    if stated is not None:
-        return stated
     old = plan_there(before) if before is not None and before.is_file() else None
     home = home.connected()
     if old is not None and _asks(old.home) == _asks(home):

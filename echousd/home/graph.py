@@ -172,6 +172,15 @@ class HomeGraph(PlainModel):
         home: HomeGraph = self.replaced(relations=(*(one for one in kept if one != new), new))
         return home
 
+    def unrelate(self, sentence: str) -> HomeGraph:
+        """Without a relation; raises `GraphError` where it is not stated."""
+        gone = relation_of(sentence)
+        if gone not in self.relations:
+            told = ", ".join(f"'{relation}'" for relation in self.relations)
+            raise GraphError(f"no relation '{gone}' in this home, allowed: {told}")
+        home: HomeGraph = self.replaced(relations=tuple(one for one in self.relations if one != gone))
+        return home
+
     def to_json(self) -> str:
         """JSON (and YAML) that `echousd.home.files.load_home` reads."""
         about = {"area": self.area, "outline": self.outline, "entrance": self.entrance}

@@ -66,9 +66,14 @@ class Plan:
         return {name: floor_of(cell, self.walls[name]) for name, cell in self.cells.items()}
 
     @property
+    def areas(self) -> dict[str, float]:
+        """Square metres of every floor."""
+        return {name: abs(signed_area(floor)) for name, floor in self.floors.items()}
+
+    @property
     def area(self) -> float:
         """Square metres of all floors."""
-        return sum(abs(signed_area(floor)) for floor in self.floors.values())
+        return sum(self.areas.values())
 
     def origin(self, name: str) -> np.ndarray:
         """(2,) float, metres: where the middle of a room's own frame lies in the home's."""
@@ -171,7 +176,7 @@ def plans(home: HomeGraph, count: int, seed: int = 0) -> list[Plan]:
     if not 1 <= count <= MOST_PLANS:
         raise GraphError(f"plans is {count}, allowed: 1 to {MOST_PLANS}")
     found: list[Plan] = []
-    for number in range(2 * count):
+    for number in range(3 * count):
         made = plan_home(home, seed=seed + number)
         if not any(_alike(made, other) for other in found):
             found.append(made)
@@ -185,7 +190,7 @@ def _alike(one: Plan, other: Plan) -> bool:
         shapely.intersection(shapely.Polygon(one.cells[name]), shapely.Polygon(other.cells[name])).area
         for name in one.cells
     )
-    return shared > 0.8 * sum(abs(signed_area(cell)) for cell in one.cells.values())
+    return shared > 0.9 * sum(abs(signed_area(cell)) for cell in one.cells.values())
 
 
 # -- before solving ----------------------------------------------------------------------------------------------------
@@ -300,6 +305,8 @@ def _problem(home: HomeGraph, seed: int, before: Plan | None) -> Problem:
         )
         for room in home.rooms
     )  # fmt: skip
+    order = np.random.default_rng(seed).permutation(len(wishes)) if seed else range(len(wishes))
+    wishes = tuple(wishes[number] for number in order)  # another order, another plan
     wet = tuple(room.name for room in home.rooms if vocabulary().room_type(room.type).use == "wet")
     lie = None if before is None else before.rects
     sides = (float(extents[0]), float(extents[1]))

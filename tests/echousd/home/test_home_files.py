@@ -105,3 +105,21 @@ def test_a_room_that_cannot_be_made_is_named(tmp_path, monkeypatch, echousd_comm
     assert done.code == 1
     assert "failed   bedroom: " in done.out
     assert "room     living" in done.out
+
+
+def test_an_edit_follows_through(made, echousd_command):
+    folder, _ = made
+    before = digests(folder)
+    done = echousd_command("edit", folder, "--relate", "living open to bedroom", "--dry-run")
+    assert (done.code, sorted(done.out.split())) == (0, ["bedroom", "living", "new", "new"])
+    assert digests(folder) == before
+    done = echousd_command("edit", folder / "home.usda", "--relate", "living open to bedroom", "--json")
+    assert done.code == 0, done.err
+    stage = Usd.Stage.Open(str(folder / "home.usda"))
+    assert stage.GetPrimAtPath("/House/Graph/living__open_to__bedroom")
+    assert not stage.GetPrimAtPath("/House/Graph/living__door__bedroom")
+    assert echousd_command("check", folder).code == 0
+    done = echousd_command("edit", folder, "--unrelate", "living door bedroom")
+    assert "no relation 'living door bedroom' in this home, allowed: 'living open_to bedroom'" in done.err
+    done = echousd_command("edit", folder, "--add", "fern:plant")
+    assert "home.usda: a home, which composes rooms; name one of them: rooms/bedroom/bedroom.usda" in done.err

@@ -1,0 +1,118 @@
+"""Plans as drawings: walls, doors with their swings, windows, names and areas; PNG, SVG and PDF, or DXF for CAD."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from echomodel.files import whole_file
+from echomodel.openings import Opening, hinge_point, inward_normal, segment, signed_area, swing_area
+from echomodel.vocabulary import vocabulary
+from echousd.graph import GraphError
+from echousd.home.plan import Plan
+
+PICTURES = (".png", ".svg", ".pdf")
+TINTS = {"": "#f4efe4", "wet": "#e3eef4", "outdoor": "#e6f0df"}
+LAYERS = {"wall": 7, "door": 3, "window": 5, "room": 8}  # of a DXF, with their colours
+ACROSS = 5.0  # inches of one plan
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A polyline of a drawing in metres: (k, 2) float, z to the right and x upwards, as maps have east and north."""
+
+    layer: str
+    points: np.ndarray
+    closed: bool = False
+
+
+def on_paper(points: np.ndarray) -> np.ndarray:
+    """(k, 2) float from (x, z) of the home: north (+X) is up, east (+Z) right."""
+    return np.asarray(points, float)[..., ::-1]
+
+
+def lines_of(plan: Plan) -> Iterator[Line]:
+    """What a plan consists of: pieces of wall, leaves with their swings, panes, floors."""
+    holes = []
+    for name, floor in plan.floors.items():
+        yield Line("room", on_paper(floor), closed=True)
+        for opening in plan.openings[name]:
+            near = segment(floor, opening)
+            out = -inward_normal(floor, opening.edge) * (plan.walls[name][opening.edge] + 0.005)
+            holes.append(shapely.Polygon([*near, *(near[::-1] + out)]).buffer(0.005))
+            yield from _filled(floor, opening, near, out)
+    cells = shapely.union_all([shapely.Polygon(cell) for cell in plan.cells.values()])
+    floors = shapely.union_all([shapely.Polygon(floor) for floor in plan.floors.values()])
+    solid = cells.difference(floors).difference(shapely.union_all(holes))
+    for part in getattr(solid, "geoms", [solid]):
+        for ring in (part.exterior, *part.interiors):
+            yield Line("wall", on_paper(np.array(ring.coords)[:-1]), closed=True)
+
+
+def _filled(floor: np.ndarray, opening: Opening, near: np.ndarray, out: np.ndarray) -> Iterator[Line]:
+    """A leaf and its arc, or a pane; a passage holds nothing."""
+    if opening.kind == "window":
+        for share in (0.35, 0.65):
+            yield Line("window", on_paper(near + share * out))
+    swing = swing_area(floor, opening)
+    if len(swing):
+        hinge, _ = hinge_point(floor, opening)
+        yield Line("door", on_paper(np.array([hinge, swing[-1]])))
+        yield Line("door", on_paper(swing[1:]))
+
+
+def draw_plans(plans: Sequence[Plan], path: Path) -> None:
+    """Write a picture of plans side by side; the extension (.png, .svg, .pdf) chooses its form. Raises OSError."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    wide = min(len(plans), 3)
+    high = -(-len(plans) // wide)
+    figure = Figure(figsize=(ACROSS * wide, ACROSS * high), dpi=140, layout="tight")
+    FigureCanvasAgg(figure)
+    for number, plan in enumerate(plans):
+        axes = figure.add_subplot(high, wide, number + 1)
+        axes.set_aspect("equal")
+        axes.axis("off")
+        for name, floor in plan.floors.items():
+            row = vocabulary().room_type(plan.home.room(name).type)
+            axes.fill(*on_paper(floor).T, color=TINTS[row.use])
+            middle = shapely.Polygon(on_paper(floor)).representative_point()
+            told = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²"
+            axes.text(middle.x, middle.y, told, ha="center", va="center", fontsize=7)
+        for line in lines_of(plan):
+            points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
+            if line.layer == "wall":
+                axes.fill(*line.points.T, color="#3a3a3a")
+            elif line.layer != "room":
+                axes.plot(*points.T, color="#3a6ea5" if line.layer == "window" else "#8a5a2b", linewidth=0.8)
+        axes.set_title(f"{plan.area:.1f} m²", fontsize=8)
+    form = path.suffix.lower().removeprefix(".")
+    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": "echousd"}}[form]
+    with whole_file(path) as beside, rc_context({"svg.hashsalt": "echousd"}):
+        figure.savefig(beside, format=form, metadata=dated)
+
+
+def write_dxf(plan: Plan, path: Path) -> None:
+    """Write a plan as DXF in metres, a layer for each kind of line; raises `GraphError` without ezdxf."""
+    try:
+        import ezdxf
+    except ImportError:
+        raise GraphError('DXF needs ezdxf: pip install "echousd[dxf]"') from None
+    drawing = ezdxf.new(units=6)  # metres
+    for name, colour in LAYERS.items():
+        drawing.layers.add(name, color=colour)
+    space = drawing.modelspace()
+    for line in lines_of(plan):
+        space.add_lwpolyline(line.points.round(4).tolist(), close=line.closed, dxfattribs={"layer": line.layer})
+    for name, floor in plan.floors.items():
+        at = shapely.Polygon(on_paper(floor)).representative_point()
+        text = space.add_text(name, height=0.25, dxfattribs={"layer": "room"})
+        text.set_placement((at.x, at.y))
+    with whole_file(path) as beside:
+        drawing.saveas(beside)

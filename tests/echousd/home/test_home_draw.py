@@ -1,0 +1,68 @@
+"""Plans as pictures, drawings and stages: what is drawn is what is there, and bad input is one line."""
+
+import json
+
+import ezdxf
+import pytest
+import shapely
+
+from echousd.home.draw import lines_of
+from echousd.home.files import load_home
+from echousd.home.given import plan_there
+from echousd.home.graph import home_of_words
+from echousd.home.plan import plan_home
+
+WORDS = "hall door bedroom, hall open_to kitchen"
+
+
+@pytest.fixture
+def file(tmp_path, echousd_command):
+    assert echousd_command("new", tmp_path / "flat.yaml", "--rooms", WORDS, "--area", 30).code == 0
+    return tmp_path / "flat.yaml"
+
+
+def test_walls_are_what_cells_have_beside_floors_and_holes():
+    plan = plan_home(home_of_words(WORDS, area=30))
+    lines = list(lines_of(plan))
+    walls = [shapely.Polygon(line.points) for line in lines if line.layer == "wall"]
+    floors = shapely.union_all([shapely.Polygon(line.points) for line in lines if line.layer == "room"])
+    assert floors.area == pytest.approx(plan.area)
+    assert all(wall.buffer(-0.01).intersection(floors).area < 1e-6 for wall in walls)
+    assert len([line for line in lines if line.layer == "door"]) == 2 * 2  # a leaf and its arc, inside and at the front
+
+
+def test_a_plan_becomes_a_picture_a_drawing_and_a_stage(file, tmp_path, echousd_command):
+    for name in ("plan.png", "plan.svg", "plan.dxf", "plan.usda"):
+        done = echousd_command("plan", file, "-o", tmp_path / name, "--json")
+        assert done.code == 0, done.err
+        areas = json.loads(done.out)["areas"]
+    assert (tmp_path / "plan.svg").read_text().count("<path") > 20
+    drawing = ezdxf.readfile(tmp_path / "plan.dxf")
+    assert drawing.units == 6
+    assert {text.dxf.text for text in drawing.modelspace().query("TEXT")} == set(areas)
+    plan = plan_there(tmp_path / "plan.usda", load_home(tmp_path / "plan.usda"))
+    assert {name: round(area, 3) for name, area in plan.areas.items()} == pytest.approx(areas, abs=5e-3)
+    assert plan.broken() == ()
+
+
+def test_plans_side_by_side(file, tmp_path, echousd_command):
+    done = echousd_command("plan", file, "-o", tmp_path / "plans.png", "--plans", 2)
+    assert done.out.count("plan     3 rooms") == 2, done.err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("flat.yaml", "-o", "plan.txt"), "plan.txt: extension '.txt', allowed: .png, .svg, .pdf, .dxf, .usda"),
+        (("flat.yaml", "-o", "plan.dxf", "--plans", "2"), "--plans is 2, allowed with a picture"),
+        (("flat.yaml", "-o", "flat.yaml.png", "--plans", "99"), "less than or equal to 12"),
+        (("room.yaml", "-o", "plan.png"), "room.yaml: no home, allowed: a file with rooms"),
+    ],
+)
+def test_what_cannot_be_planned_is_one_line(file, tmp_path, monkeypatch, echousd_command, words, said):
+    (tmp_path / "room.yaml").write_text("room: bedroom\nobjects: [bed]\n")
+    monkeypatch.chdir(tmp_path)
+    done = echousd_command("plan", *words)
+    assert done.code == 2
+    assert said in done.err
+    assert done.err.count("\n") == 1
