@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 AUDIT := .audit
 
-.PHONY: help room test lint types clients hashes audit benchmarks schema clean
+.PHONY: help room test lint types clients hashes audit benchmarks benchmark eval schema clean
 
 help:
 	@grep -E '^# ' Makefile | cut -c3-
@@ -47,6 +47,15 @@ audit:
 # make benchmarks: ratios, each printed with what was asked; wants an idle machine and some minutes.
 benchmarks: $(STAMP)
 	cd benchmarks && for script in compact_budget graph_stage rooms; do ../$(BIN)/python $$script.py; done
+
+# make eval: the shipped weights beside chance and plain baselines, report.md, .json and .html in out/eval.
+SET ?= generated
+eval: $(STAMP)
+	$(BIN)/echousd eval suite --against $(SET) --samples 24 --workers 2 -o out/eval/report
+
+# make benchmark: what everything takes, as one table of ratios to the machine's matrix products and memory.
+benchmark: $(STAMP)
+	cd benchmarks && OMP_NUM_THREADS=1 ../$(BIN)/python summary.py
 
 # make schema: the plugin's files, made anew from schemas/schema.usda.
 schema: $(STAMP)

@@ -14,8 +14,6 @@ import argparse
 import json
 import time
 from collections import Counter
-from functools import partial
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -23,31 +21,26 @@ import torch
 from PIL import Image, ImageDraw, ImageFont
 
 from echomodel.data.roomset import load_rooms
-from echomodel.metrics.layout_evaluation import EditedGraph, LayoutEvaluation, told_graphs
-from echomodel.metrics.layout_sources import model_layouts
-from echomodel.metrics.room_figures import with_known_words
-from echomodel.objective import KINDS, TERMS, faults_of, plan_of, unreached
+from echomodel.metrics.tasks import Task, tasks_of, with_known_words
+from echomodel.objective import KINDS, faults_of, plan_of, unreached
 from echomodel.openings import segment
 from echomodel.roomboxes import RoomBoxes, footprints
 from echomodel.rooms.generator import generate_rooms
 from echomodel.vocabulary import vocabulary
+from echousd.evaluation.systems import BASES
 from echousd.place import PlaceConfig, place_boxes
-from echousd.place.search import Search
 
 SEED = 770_000  # of the generated rooms
 CELL = 420  # pixels
 
 
-def drawn(rooms: list[RoomBoxes], triplets: list[np.ndarray], cache: Path) -> list[tuple[np.ndarray, ...]]:
+def drawn(tasks: list[Task], cache: Path) -> list[tuple[np.ndarray, ...]]:
     """Size, position and yaw of a draft of every room, from the cache or drawn by the network."""
     if not cache.exists():
-        graphs = told_graphs(rooms, LayoutEvaluation(told=1.0), np.random.default_rng(0))
-        sample = model_layouts(None, 0, "strict", None)
         out = []
-        for graph in graphs:
-            none = torch.zeros(graph.num_nodes, dtype=torch.bool)
-            boxes = sample(EditedGraph(graph, None, none, none))
-            out.append([value.tolist() for value in (boxes.size, boxes.position, boxes.yaw)])
+        for room in BASES["network"](tasks, 0):
+            middle = np.insert((room.floor_polygon.max(0) + room.floor_polygon.min(0)) / 2, 1, 0.0)
+            out.append([value.tolist() for value in (room.size, room.position - middle, room.yaw)])
         cache.parent.mkdir(parents=True, exist_ok=True)
         cache.write_text(json.dumps(out))
     return [tuple(np.array(value) for value in row) for row in json.loads(cache.read_text())]
@@ -117,17 +110,15 @@ def main() -> None:
     parser.add_argument("--only", type=int, nargs="*")
     parser.add_argument("--off", nargs="*", default=[], help="terms that the search does without")
     options = parser.parse_args()
-    placing = import_module("echousd.place.placing")  # the package has a function of that name
-    placing.Search = partial(Search, terms=tuple(term for term in TERMS if term.name not in options.off))
     torch.set_num_threads(1)
     every = generate_rooms(options.count, SEED) if options.rooms is None else load_rooms(options.rooms)
     rooms = [room for room in with_known_words(every) if len(room) > 1]
     rooms = [rooms[number * len(rooms) // options.count] for number in range(min(options.count, len(rooms)))]
-    graphs = told_graphs(rooms, LayoutEvaluation(told=1.0), np.random.default_rng(0))
-    told = [graph.triplets.numpy() for graph in graphs]
+    tasks = tasks_of(rooms, 0, told=1.0)
+    told = [task.told for task in tasks]
     name = "generated" if options.rooms is None else options.rooms.stem
-    drafts = drawn(rooms, told, options.cache / f"{name}_{options.count}.json")
-    ways = {"drawn": None, "placed": PlaceConfig()}
+    drafts = drawn(tasks, options.cache / f"{name}_{options.count}.json")
+    ways = {"drawn": None, "placed": PlaceConfig(without=frozenset(options.off))}
     objects = sum(len(room) for room in rooms)
     for way in options.ways:
         found, pictures, seconds, kept, free = Counter[str](), [], [], 0, 0

@@ -16,8 +16,8 @@ from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
 from echomodel.metrics.pointsets import chamfer_matrix
-from echomodel.metrics.room_figures import with_known_words
 from echomodel.metrics.shapes import surface_points
+from echomodel.metrics.tasks import with_known_words
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS

@@ -284,7 +284,7 @@ def to_usd(
     Example: echousd data to-usd rooms.json -o stages --limit 10
     """
     from echomodel.data.roomset import load_rooms
-    from echomodel.metrics.room_figures import with_known_words
+    from echomodel.metrics.tasks import with_known_words
     from echousd.stage.boxes import write_stages
 
     found = load_rooms(rooms, limit)
@@ -320,7 +320,7 @@ def import_rooms(
     """
     from echomodel.data.roomset import kept_out, load_rooms, pack_rooms
     from echomodel.data.sgfront import SGFront
-    from echomodel.metrics.room_figures import with_known_words
+    from echomodel.metrics.tasks import with_known_words
     from echomodel.roomboxes import write_rooms
     from echousd.cli.terminal import Terminal
     from echousd.stage.boxes import read_stages
@@ -360,6 +360,6 @@ def to_sgfront(
     """
     from echomodel.data.roomset import load_rooms
     from echomodel.data.sgfront_writer import write_sgfront
-    from echomodel.metrics.room_figures import with_known_words
+    from echomodel.metrics.tasks import with_known_words
 
     write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)

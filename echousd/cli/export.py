@@ -19,7 +19,13 @@ def register(app: typer.Typer) -> None:
 
 def export(
     room: Room,
-    output: Annotated[Path, typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc.", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.", show_default=False),
+    ],
+    for_: Annotated[
+        str | None, typer.Option("--for", help="sceneeval: its sceneState, and a glb of every object, in its folders.")
+    ] = None,
     arkit: Annotated[
         bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
     ] = False,
@@ -46,10 +52,17 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting import export as write
+    from echousd.exporting.sceneeval import export_sceneeval
     from echousd.folder.found import room_at
 
     started = time.perf_counter()
     room = room_at(room)
+    if for_ is not None:
+        if for_ != "sceneeval":
+            raise ValueError(f"--for is {for_!r}, allowed: sceneeval")
+        written = export_sceneeval(room, output)
+        say_done(json, written, started, [str(written[0])])
+        return
     path = write(
         room, output, arkit=arkit, force=force, search=search or (), layout=layout, physics=physics, pictures=pictures
     )

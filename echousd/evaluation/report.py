@@ -18,7 +18,8 @@ import numpy as np
 from echomodel.data.sheet import plot_rooms
 from echomodel.files import write_json, write_text
 from echomodel.metrics.statistics import Figure
-from echousd.evaluation.suite import Run, Table
+from echomodel.roomboxes import RoomBoxes
+from echousd.evaluation.runs import Run, Table
 
 FORMS = (".md", ".json", ".html")
 SHOWN = 6  # rooms of each system in the contact sheet
@@ -121,10 +122,11 @@ def pictures(run: Run) -> dict[str, str]:
     rows: list = []
     for number in np.linspace(0, len(run.tasks) - 1, min(SHOWN, len(run.tasks))).astype(int):
         rows += [replace(run.made[name][number], id=f"{name} {number}") for name in names]
-    return {"The same rooms by every system": _sheet(rows, len(names))} if rows else {}
+    return {"The same rooms by every system": sheet(rows, len(names))} if rows else {}
 
 
-def _sheet(rooms: Sequence, columns: int) -> str:
+def sheet(rooms: Sequence[RoomBoxes], columns: int) -> str:
+    """Plans of rooms beside one another, PNG as base64."""
     with tempfile.TemporaryDirectory(prefix="echousd-") as folder:
         path = Path(folder) / "sheet.png"
         plot_rooms(rooms, path, columns=columns, labels=False)

@@ -28,6 +28,7 @@ from echousd.stage.labels import (
     room_word,
     spaced,
 )
+from echousd.stage.read import RoomPrims, node_names, room_graph
 from echousd.stage.units import metres_per_unit, up_axis
 
 TAKEN_FOR = "cabinet"  # what the networks take a fixed thing of an unknown class for
@@ -279,6 +280,21 @@ def object_box(prim: Usd.Prim) -> Box | None:
     """The upright box around a prim of a stage, turned as the prim is; None where it has no bounds."""
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_, UsdGeom.Tokens.render], True)
     return StageFrame.of(prim.GetStage()).box(_object_bound(cache, prim))
+
+
+def boxed_graph(prims: RoomPrims) -> SceneGraph:
+    """The graph of a room whose nodes all have boxes: as stated, else as their prims stand there; raises StageError."""
+    graph = room_graph(prims)
+    paths = {name: path for path, name in node_names(prims).items()}
+    nodes = []
+    for node in graph.nodes:
+        if None in (node.size, node.position, node.yaw):
+            box = object_box(prims.room.GetStage().GetPrimAtPath(paths[node.name]))
+            if box is None:
+                raise StageError(f"{paths[node.name]}: has no bounds, allowed: a box or geometry for every object")
+            node = node.replaced(size=box.size, position=box.position, yaw=box.yaw)
+        nodes.append(node)
+    return graph.replaced(nodes=tuple(nodes))
 
 
 def _object_bound(cache: UsdGeom.BBoxCache, prim: Usd.Prim) -> Gf.BBox3d:

@@ -1,26 +1,41 @@
 """Layout metrics: true boxes score full marks, wrong ones do not, and edits change what they say."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
-from echomodel.boxes import Boxes
-from echomodel.metrics.layout_evaluation import (
-    OPPOSITE,
-    LayoutEvaluation,
-    evaluate_layout,
-    kolmogorov_smirnov,
-    relation_scores,
-    size_rows,
-    touched_triplets,
-)
+from echomodel.metrics.bodies import bodies, body_scores, collisions, out_of_bounds
+from echomodel.metrics.layouts import HALVES, clearance, fullness, layout_scores, navigability
 from echomodel.metrics.report import compare, section_means
-from echomodel.metrics.room_figures import ray_lengths, room_figures, with_known_words
+from echomodel.metrics.room_figures import ray_lengths, room_figures
+from echomodel.metrics.sets import (
+    category_divergence,
+    frechet_distance,
+    kernel_distance,
+    layout_distance,
+    neighbours,
+    object_features,
+    set_figures,
+    size_distances,
+    told_apart,
+)
+from echomodel.metrics.statistics import Counts, figure, paired_p
+from echomodel.metrics.tasks import (
+    GROUPS,
+    OPPOSITE,
+    Task,
+    changed,
+    extended,
+    kept_relations,
+    tasks_of,
+    with_known_words,
+)
+from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
+
+FLOOR = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]], float)
 
 
 @pytest.fixture(scope="module")
@@ -28,169 +43,164 @@ def rooms():
     return generate_rooms(40, 11)
 
 
-def truth(rooms):
-    boxes = [Boxes.from_room(room) for room in rooms]
-    calls = []
+def room_with(*objects, openings=()):
+    """A room of 4 x 4 m; objects are (word, size, position, yaw)."""
+    words, size, position, yaw = zip(*objects, strict=True)
+    floats = (np.array(size, float), np.array(position, float), np.array(yaw, float))
+    return RoomBoxes("one", "living_room", FLOOR, 2.6, words, *floats, openings=tuple(openings))
 
-    def sample(edited):
-        start = sum(calls) % len(boxes)
-        calls.append(edited.graph.num_scenes)
-        return Boxes.cat(boxes[start : start + edited.graph.num_scenes])
 
-    return sample
+def share(pair):
+    return np.sum(pair[0]) / np.sum(pair[1])
 
 
 @pytest.mark.parametrize("rules", ["strict", "sgfront"])
-def test_true_boxes_keep_every_relation(rooms, rules):
-    result = evaluate_layout(rooms, truth(rooms), LayoutEvaluation(rules=rules, scenes=16))
-    assert result["generation"]["total"] == 1.0
-    assert set(result["generation"]["groups"].values()) == {1.0}
-    assert result["generation"]["n"] > 1000
-    assert all(row["median_ratio"] == pytest.approx(1, abs=1e-3) for row in result["sizes"])
-    assert all(row["ks"] in (None, 0.0) for row in result["sizes"])
-    overlap, real = result["figures"]["overlap"], result["real_figures"]["overlap"]
-    assert overlap == pytest.approx(real, abs=0.005)
-    assert json.loads(json.dumps(result))["rooms"] == len(rooms)
+def test_true_boxes_keep_every_relation_and_mirrored_ones_lose_theirs(rooms, rules):
+    tasks = tasks_of(rooms, 0, rules=rules)
+    assert sum(len(task.told) for task in tasks) > 1000
+    mirrored = [replace(r, position=r.position * [1, 1, -1], yaw=-r.yaw) for r in rooms]
+    for task, room, other in zip(tasks, rooms, mirrored, strict=True):
+        assert share(kept_relations(task, room)["all"]) == 1.0
+        found = kept_relations(task, other)
+        assert set(found) == {*GROUPS, "all"}
+        assert sum(found["left/right"][0]) == 0.0
+        assert found["front/behind"][0] == found["front/behind"][1]
 
 
-def test_wrong_boxes_lose_what_they_break(rooms):
-    right = truth(rooms)
-
-    def mirrored(edited):
-        boxes = right(edited)
-        return Boxes(boxes.size, boxes.position * torch.tensor([1.0, 1.0, -1.0]), -boxes.yaw)
-
-    scores = evaluate_layout(rooms, mirrored, LayoutEvaluation(scenes=16))["generation"]
-    assert scores["groups"]["left/right"] == 0.0
-    assert scores["groups"]["front/behind"] == 1.0
-    assert scores["groups"]["close_by"] == 1.0
-    assert scores["relations"]["left"]["kept"] == 0.0
+def test_people_tell_few_relations_of_near_pairs(rooms):
+    few = tasks_of(rooms, 0, told=1.0)
+    assert all(0 < len(task.told) <= len(task.room) for task in few)
+    assert [task.told.tolist() for task in tasks_of(rooms, 0, told=1.0)] == [task.told.tolist() for task in few]
 
 
-def test_edits_are_scored_apart(rooms):
-    seen = []
-    right = truth(rooms)
-
-    def sample(edited):
-        seen.append(edited)
-        return right(edited)
-
-    settings = LayoutEvaluation(change=True, add=True, scenes=40, seed=3)
-    result = evaluate_layout(rooms, sample, settings)
-    plain, change, add = seen
-    assert plain.before is None
-    assert not plain.touched.any()
-    # the true boxes break exactly what was turned round
-    after = {tuple(t) for t in change.graph.triplets.tolist()}
-    before = {tuple(t) for t in change.before.tolist()}
-    turned = after - before
-    assert len(turned) == len(rooms) or len(turned) == len([r for r in rooms if len(r) > 2])
-    assert all((s, OPPOSITE[p], o) in before and (s, OPPOSITE[p], o) not in after for s, p, o in turned)
-    assert all((o, OPPOSITE[OPPOSITE[p]], s) not in after - turned for s, p, o in turned if (s, p, o) not in before)
-    assert result["change"]["total"] < 1.0
-    assert result["change"]["untouched"]["total"] == 1.0
-    broken = result["change"]["n"] * (1 - result["change"]["total"])
-    assert round(broken) == len(turned)
-    # the added node had no relation before, and everything else is as it was
-    assert int(add.added.sum()) == len(rooms)
-    assert not touched_triplets(add.before, add.added).any()
-    kept = add.graph.triplets[~touched_triplets(add.graph.triplets, add.added)]
-    assert torch.equal(kept, add.before)
-    assert result["add"]["total"] == 1.0
-    again = []
-    evaluate_layout(rooms, lambda e: again.append(e) or right(e), settings)
-    assert torch.equal(again[1].graph.triplets, change.graph.triplets)
+def test_edits_turn_one_relation_or_bring_one_object(rooms):
+    rng = np.random.default_rng(3)
+    for task in tasks_of(rooms, 0, rules="sgfront"):
+        turned = changed(task, rng)
+        new = {tuple(t) for t in turned.told.tolist()} - {tuple(t) for t in task.told.tolist()}
+        assert len(new) <= 1
+        assert all((s, OPPOSITE[p], o) in {tuple(t) for t in turned.before.tolist()} for s, p, o in new)
+        broken = kept_relations(turned, task.room)
+        assert broken["rest"][0] == broken["rest"][1]
+        assert broken["all"][1][0] - broken["all"][0][0] == (1 if len(new) else 0) or len(turned.told) < len(task.told)
+        clean = changed(task, np.random.default_rng(1), contradictions=False)
+        assert len(clean.told) in (len(task.told), len(task.told) - 1)
+        added = extended(task, rng)
+        assert added.added.sum() == 1
+        assert not added.added[added.before[:, [0, 2]]].any()
+        assert np.array_equal(added.told, task.told)
 
 
-def test_rooms_without_a_fault_are_drafted_no_further(rooms):
-    some, sampled, finished = rooms[:6], [], []
-
-    def sample(edited):
-        sampled.append(edited.graph.num_scenes)
-        return truth(some)(edited) if len(sampled) == 1 else Boxes.cat([Boxes.from_room(some[0])] * sampled[-1])
-
-    def finish(room, triplets):
-        finished.append(len(triplets))
-        return room, (0 if len(finished) in (1, 2, 3, 5, 6, 8) else 9 - len(finished),)
-
-    some = [some[0]] * 6  # so that the draft of any is that of all
-    evaluate_layout(some, sample, LayoutEvaluation(told=1.0, drafts=4, scenes=6), finish=finish)
-    assert sampled == [6, 1, 1]  # the fourth had a fault, then one again, then none
-    assert len(finished) == 8
-    assert len(set(finished)) == 1
+def test_faults_are_counted_once_in_either_half(rooms):
+    assert not HALVES[0] & HALVES[1]
+    assert min(map(len, HALVES)) > 15
+    total = 0.0
+    for task in tasks_of(rooms[:10], 0, told=1.0):
+        wild = replace(task.room, position=np.roll(task.room.position, 1, axis=0))
+        scores = layout_scores(task, wild)
+        parts = sum(pair[0] for name, pair in scores.items() if name.startswith("term "))
+        assert scores["faults"][0] == scores["faults A"][0] + scores["faults B"][0] == parts
+        assert scores["faultless"][0] == (scores["faults"][0] == 0)
+        total += parts
+    assert total > 20
 
 
-def test_variety_looks_at_rooms_from_all_over_the_set(rooms, monkeypatch):
-    seen = []
-    monkeypatch.setattr("echomodel.metrics.layout_evaluation.VARIED", 4)
-    monkeypatch.setattr(
-        "echomodel.metrics.layout_evaluation.variety_scores", lambda graphs, *_: seen.extend(graphs) or {"rooms": 4}
-    )
-    evaluate_layout(rooms, truth(rooms), LayoutEvaluation(seeds=2, scenes=40))
-    counts = [graph.num_nodes for graph in seen]
-    assert counts == [len([room for room in rooms if len(room) > 1][number]) for number in (0, 10, 20, 30)]
+def test_ways_and_openings_by_hand():
+    wall = ("cabinet", (0.2, 1.0, 4.0), (0.0, 0.0, 0.0), 0.0)
+    halved = room_with(wall)
+    assert navigability(halved)[0] == pytest.approx(0.5, abs=0.01)
+    assert navigability(room_with(("pendant_lamp", (4, 0.3, 4), (0, 2.2, 0), 0.0)))[0] == 1.0  # over one's head
+    assert fullness(halved) == (pytest.approx(0.8), pytest.approx(16.0))
+    window = Opening("window", "window", 0, 1.0, 2.0, 1.0, sill=1.0)  # in the wall at z = -2
+    before = ("cabinet", (1.0, 1.5, 0.4), (0.0, 0.0, -1.75), 0.0)  # covers half of its width and of its height
+    assert clearance(room_with(before, openings=[window])) == (pytest.approx(0.75), 1.0)
+    assert clearance(room_with(wall)) == (0.0, 0.0)
+    bare = replace(halved, floor_polygon=np.zeros((0, 2)))
+    assert navigability(bare) == clearance(bare) == fullness(bare) == (0.0, 0.0)
+    assert layout_scores(Task(bare, np.zeros((0, 3), int)), bare)["walkable"] == (0.0, 0.0)
 
 
-def test_completion_gives_half_of_the_true_boxes(rooms):
-    seen = []
-
-    def sample(edited):
-        seen.append(edited)
-        if edited.known is None:
-            return truth(rooms)(edited)
-        position = torch.where(edited.known_mask[:, None], edited.known.position, 0 * edited.known.position)
-        return replace(edited.known, position=position)
-
-    result = evaluate_layout(rooms, sample, LayoutEvaluation(complete=True, scenes=40))
-    given = seen[-1].known_mask
-    assert 0.4 < given.float().mean() < 0.6
-    assert torch.equal(seen[-1].touched, ~given)
-    assert result["complete"]["untouched"]["total"] == 1.0  # relations between given boxes
-    assert result["complete"]["edited"]["total"] < 0.8
-
-
-def test_contradictions_stay_when_asked_for(rooms):
-    counts = []
-    for keep in (False, True):
-        edges = []
-        right = truth(rooms)
-        settings = LayoutEvaluation(change=True, drop=0.0, scenes=40, contradictions=keep)
-
-        def sample(edited, edges=edges, right=right):
-            edges.append(len(edited.graph.triplets))
-            return right(edited)
-
-        evaluate_layout(rooms, sample, settings)
-        counts.append(edges)
-    assert counts[1][1] == counts[1][0]
-    assert counts[0][0] - len(rooms) <= counts[0][1] < counts[0][0]
+def test_bodies_that_touch_do_not_collide_and_those_that_cross_do():
+    cabinet = ("cabinet", (1.0, 1.0, 0.5), (0.0, 0.0, 0.0), 0.0)
+    for shift, hits in ((0.5, 0), (0.498, 0), (0.4, 2), (3.0, 0)):
+        other = ("cabinet", (1.0, 1.0, 0.5), (0.0, 0.0, shift), 0.0)
+        scores = body_scores(room_with(cabinet, other), 0)
+        assert scores["colliding"] == (hits, 2.0), shift
+        assert scores["rooms colliding"][0] == (hits > 0)
+    one, two = (bodies(room_with(cabinet), seed)[0] for seed in (0, 1))
+    assert len(one.faces) != len(two.faces) or not np.allclose(one.vertices, two.vertices)
+    again = bodies(room_with(cabinet), 0)[0]
+    assert np.array_equal(one.vertices, again.vertices)
+    assert one.extents == pytest.approx([1.0, 1.0, 0.5], abs=1e-6)
+    assert collisions([one]) == []
+    inside = bodies(room_with(cabinet, ("cabinet", (1, 1, 0.5), (1.6, 0, 0), 0.0)), 0)
+    assert out_of_bounds(inside, FLOOR) == [False, True]
 
 
-def test_scores_by_hand():
-    boxes = Boxes(torch.ones(3, 3), torch.tensor([[0.0, 0, 0], [0, 0, 2], [3, 0, 0]]), torch.zeros(3))
-    triplets = torch.tensor([[0, 1, 1], [1, 1, 0], [1, 2, 0], [2, 3, 0], [0, 13, 1]])
-    scores = relation_scores(boxes, triplets)
-    assert scores.share("left") == 0.5
-    assert scores.group("left/right") == 0.75  # mean of left (1 of 2) and right (1 of 1)
-    assert scores.group("close_by") is None
-    told = scores.to_json()
-    assert told["n"] == 4
-    assert told["total"] == 0.75
-    assert told["mean"] == pytest.approx((0.75 + 1.0) / 2)
-    half = relation_scores(boxes, triplets, subset=torch.tensor([True, False, False, False, True])).to_json()
-    assert half["n"] == 1
-
-
-def test_size_rows_and_distances():
+def test_sets_on_closed_forms():
     rng = np.random.default_rng(0)
-    a, b = rng.lognormal(0, 0.2, (50, 3)), rng.lognormal(0, 0.2, (60, 3)) * [1.5, 1, 1]
-    rows = {row.axis: row for row in size_rows(["chair"] * 50, a, ["chair"] * 60, b)}
-    assert rows["x"].median_ratio == pytest.approx(1 / 1.5, rel=0.15)
-    assert rows["x"].ks > 0.5 > 0.3 > rows["y"].ks
-    assert size_rows(["chair"] * 9, a[:9], ["chair"] * 60, b)[0].ks is None
-    assert size_rows(["chair"], a[:1], ["plant"], b[:1]) == []
-    assert kolmogorov_smirnov(np.array([0.0, 1.0]), np.array([2.0, 3.0])) == 1.0
-    assert kolmogorov_smirnov(a[:, 0], a[:, 0]) == 0.0
+    a, b = rng.normal(0, 1, (20000, 3)), rng.normal(2, 3, (20000, 3))
+    assert frechet_distance(a, b) == pytest.approx(3 * (2**2 + (3 - 1) ** 2), rel=0.05)  # of two normal distributions
+    assert frechet_distance(a, a) == pytest.approx(0, abs=1e-6)
+    one, zero = np.ones((50, 4)), np.zeros((50, 4))
+    assert kernel_distance(one, zero) == pytest.approx((1 + 1) ** 3 + 1 - 2 * 1)  # kernels 8, 1 and 1
+    same = rng.normal(0, 1, (800, 4))
+    assert abs(kernel_distance(same[:400], same[400:])) < 0.1
+    line = np.arange(10.0)[:, None]
+    assert neighbours(line, line + 100) == {"1-NNA": 1.0, "COV": 0.1, "MMD": pytest.approx(95.5 - 0.0, abs=1)}
+    assert category_divergence([["bed"] * 9], [["bed"] * 9]) == 0.0
+    p, q = np.array([1.5, 9.5]) / 11, np.array([9.5, 1.5]) / 11
+    found = category_divergence([["bed"] * 9 + ["sofa"]], [["bed"] + ["sofa"] * 9])
+    assert found == pytest.approx(float((p * np.log(p / q)).sum()))
+
+
+def test_a_forest_tells_what_differs_and_nothing_else(rooms):
+    wild = [replace(r, position=np.roll(r.position, 1, axis=0)) for r in rooms[:20]]
+    assert told_apart(wild, rooms[:20], 0, paired=True).value > 0.85
+    nothing = told_apart(rooms[:20], rooms[20:], 0)
+    assert nothing.low < 0.5 < nothing.high
+    digits = [replace(r, position=r.position + 1e-4, yaw=r.yaw + 1e-4) for r in rooms[:20]]
+    features = [np.concatenate([object_features(r) for r in part]) for part in (digits, rooms[:20])]
+    assert np.mean(features[0] != features[1]) < 0.02  # what differs are files, not rooms
+    assert told_apart(wild, rooms[:20], 0) == told_apart(wild, rooms[:20], 0)
+
+
+def test_set_figures_have_intervals_and_see_scrambled_rooms(rooms):
+    wild = [replace(r, position=np.roll(r.position, 1, axis=0)) for r in rooms[:20]]
+    near, far = (set_figures(part, rooms[20:], 0) for part in (rooms[:20], wild))
+    assert far["Frechet on layout features"].value > near["Frechet on layout features"].value
+    assert all(f.low <= f.high for f in near.values())
+    assert "FID" not in " ".join(near)
+    large = [replace(r, size=r.size * 1.5) for r in rooms[:20]]
+    assert min(size_distances(large, rooms[:20]).values()) > 0.3
+    assert max(size_distances(rooms[:20], rooms[:20]).values()) == 0.0
+
+
+def test_layouts_of_equal_pieces_may_swap():
+    chair = (0.5, 1.0, 0.5)
+    one = room_with(("chair", chair, (0, 0, 0), 0), ("chair", chair, (1, 0, 0), 0), ("desk", (1, 1, 1), (0, 0, 1), 0))
+    swapped = replace(one, position=one.position[[1, 0, 2]])
+    assert layout_distance(one, swapped) == 0.0
+    moved = replace(one, position=one.position + np.array([0, 0, 0.3]))
+    assert layout_distance(one, moved) == pytest.approx(0.3)
+
+
+def test_intervals_tests_and_power():
+    rng = np.random.default_rng(1)
+    whole = np.full(200, 10.0)
+    a, b = (Counts.of(list(zip(rng.binomial(10, p, 200), whole, strict=True))) for p in (0.3, 0.5))
+    found = figure(a, 0, b)
+    assert found.value == pytest.approx(0.3, abs=0.03)
+    assert found.low < 0.3 < found.high
+    assert found.high - found.low == pytest.approx(4 * np.sqrt(0.3 * 0.7 / 2000), rel=0.3)
+    assert found.p < 0.01
+    assert found.detects == pytest.approx(2.8 * np.sqrt((0.21 + 0.25) / 2000), rel=0.3)
+    assert figure(a, 0, a).p == 1.0
+    assert figure(Counts.of([(0.0, 0.0)] * 3), 0).value is None
+    pairs = Counts.of([([1.0, 0.0], [1.0, 4.0]), ([1.0, 2.0], [3.0, 4.0])])
+    assert pairs.value == pytest.approx((2 / 4 + 2 / 8) / 2)  # the mean of two shares, not the share of all
+    null = [paired_p(*(Counts.of([(v, 1.0) for v in rng.random(20)]) for _ in range(2)), k) for k in range(60)]
+    assert 0 <= np.mean(np.array(null) < 0.05) < 0.15
 
 
 def test_rays_meet_the_nearest_wall():
@@ -201,9 +211,8 @@ def test_rays_meet_the_nearest_wall():
 
 
 def test_figures_of_a_room_by_hand():
-    floor = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]], float)
     room = RoomBoxes(
-        "one", "living", floor, 2.6, ("sofa_3", "coffee_table", "sculpture"),
+        "one", "living", FLOOR, 2.6, ("sofa_3", "coffee_table", "sculpture"),
         np.array([[2.0, 0.8, 1.0], [1.0, 0.4, 0.6], [1, 1, 1]]), np.array([[0, 0, -1.4], [0.2, 0, -0.2], [0, 0, 1.0]]),
         np.array([0.0, np.pi, 0.0]),
     )  # fmt: skip
@@ -228,11 +237,7 @@ def test_report_is_near_for_our_rooms_and_far_for_scrambled_ones():
     near = section_means(compare(rooms))
     assert near["all"] < 0.1
     rng = np.random.default_rng(0)
-    wild = [
-        RoomBoxes(r.id, r.room_type, r.floor_polygon, r.height, r.categories, r.size * 1.4,
-                  r.position[rng.permutation(len(r))], r.yaw, r.models, r.styles)
-        for r in rooms
-    ]  # fmt: skip
+    wild = [replace(r, size=r.size * 1.4, position=r.position[rng.permutation(len(r))]) for r in rooms]
     assert section_means(compare(wild))["all"] > 2 * near["all"]
     assert section_means(compare(rooms[:140], rooms[60:]))["all"] < 0.06
 
@@ -240,10 +245,3 @@ def test_report_is_near_for_our_rooms_and_far_for_scrambled_ones():
 def test_report_leaves_no_room_type_out():
     rows = compare(generate_rooms(30, 5, room_type="study"))
     assert {row.section for row in rows} >= {"room study", "presence study"}
-
-
-def test_a_sampler_that_miscounts_and_empty_files_are_told(rooms):
-    with pytest.raises(ValueError, match=r"the sampler gave 1 boxes for \d+ nodes"):
-        evaluate_layout(rooms[:3], lambda edited: Boxes(torch.ones(1, 3), torch.ones(1, 3), torch.ones(1)))
-    with pytest.raises(ValueError, match="no room with two or more known objects"):
-        evaluate_layout([], truth(rooms))

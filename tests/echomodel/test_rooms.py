@@ -1,12 +1,15 @@
 """The room generator: deterministic, inside its floor, without accidental collisions, like real rooms in numbers."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
-from echomodel.metrics.layout_evaluation import living_scores
+from echomodel.metrics.layouts import layout_scores
 from echomodel.metrics.room_figures import room_figures
+from echomodel.metrics.tasks import Task
 from echomodel.rooms.builder import Item, overlaps
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.generator import generate_room, generate_rooms
@@ -164,13 +167,16 @@ def test_halls_hold_several_zones_and_stay_tidy():
     assert np.percentile(count, 80) >= 20
     assert max(sum(word in SOFA_KINDS for word in room.categories) for room in halls) >= 2
     assert max(room.categories.count("dining_table") for room in halls) >= 2
-    told = [np.zeros((0, 3), int)] * len(halls)
-    scores = living_scores(halls, told)["rules"]
+    scores: Counter = Counter()
+    for hall in halls:
+        found = layout_scores(Task(hall, np.zeros((0, 3), int)), hall)
+        scores.update({name.removeprefix("term "): v[0] for name, v in found.items() if name.startswith("term ")})
     spacious = {"groups_apart", "chairs_even", "bed_foot_free", "chair_pulls_out", "knees_free", "view_free"}
     spacious |= {"screen_in_view", "sofa_ahead", "table_amid", "floor_used"}
     spacious |= {"floor_served", "elbow_room", "wardrobe_opens", "each_served"}  # nor are a hall's distances a room's
-    assert sum(share for rule, share in scores.items() if rule not in spacious) < 0.03
-    assert sum(scores.values()) < 0.12  # zones of a full hall stand closer than the rules of crowding would have them
+    objects = int(count.sum())
+    assert sum(number for rule, number in scores.items() if rule not in spacious) < 0.03 * objects
+    assert scores.total() < 0.12 * objects  # a full hall's zones stand closer than the rules have them
     assert halls[3].to_json() == generate_rooms(1, 4, start=3, halls=1.0)[0].to_json()
 
 

@@ -1,6 +1,8 @@
-"""Distances between sets of shapes: MMD, COV and 1-NNA with the Chamfer distance (EchoScene, table 3)."""
+"""Sets of shapes beside each other: MMD, COV and 1-NNA by Chamfer and earth mover's distance (EchoScene, table 3)."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import torch
 from torch import Tensor
@@ -32,6 +34,29 @@ def chamfer_matrix(first: Tensor, second: Tensor, chunk: int = 16) -> Tensor:
             parts.append(squares.amin(2).mean(1) + squares.amin(1).mean(1))
         rows.append(torch.cat(parts))
     return torch.stack(rows)
+
+
+def earth_mover_matrix(first: Tensor, second: Tensor) -> Tensor:
+    """Earth mover's distances between point sets: mean distance under the best assignment of points to points.
+
+    Arguments:
+        first: (A, P, 3), second: (B, P, 3) float32, as many points each.
+
+    Returns:
+        (A, B) float32.
+
+    Raises ValueError as `chamfer_matrix`, and for different numbers of points.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    _check(first, second)
+    if first.shape[1] != second.shape[1]:
+        raise ValueError(f"point sets hold {first.shape[1]} and {second.shape[1]} points, expected as many in both")
+    rows = []
+    for one in first:
+        costs = [torch.cdist(one, other).numpy() for other in second]
+        rows.append([float(cost[linear_sum_assignment(cost)].mean()) for cost in costs])
+    return torch.tensor(rows)
 
 
 def coverage(sample_to_reference: Tensor) -> dict[str, float]:
@@ -76,10 +101,12 @@ def one_nearest_neighbour(within_first: Tensor, between: Tensor, within_second: 
     return {"acc": float(right.mean()), "acc_t": float(right[:a].mean()), "acc_f": float(right[a:].mean())}
 
 
-def compare_sets(samples: Tensor, references: Tensor) -> dict[str, float]:
+def compare_sets(
+    samples: Tensor, references: Tensor, matrix: Callable[[Tensor, Tensor], Tensor] = chamfer_matrix
+) -> dict[str, float]:
     """All of the above for two lists of point sets, samples (S, P, 3) and references (R, P, 3) float32."""
-    between = chamfer_matrix(samples, references)
-    within = chamfer_matrix(references, references), chamfer_matrix(samples, samples)
+    between = matrix(samples, references)
+    within = matrix(references, references), matrix(samples, samples)
     return coverage(between) | one_nearest_neighbour(within[0], between.t(), within[1])
 
 

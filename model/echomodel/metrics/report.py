@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echomodel.metrics.room_figures import room_figures, with_known_words
+from echomodel.metrics.room_figures import room_figures
+from echomodel.metrics.tasks import with_known_words
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.statistics import room_statistics
 

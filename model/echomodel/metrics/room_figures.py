@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,30 +17,6 @@ from echomodel.rules import label_rooms
 from echomodel.vocabulary import vocabulary
 
 FIVE, THREE, QUARTERS = (5, 25, 50, 75, 95), (5, 50, 95), (25, 50, 75)
-
-
-def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
-    """The rooms in the vocabulary's words, without the objects that it does not hold."""
-    out = []
-    for room in rooms:
-        rows = [vocabulary().known_category(word) for word in room.categories]
-        keep = [k for k, row in enumerate(rows) if row is not None]
-        styles = room.styles or (-1,) * len(room)
-        models = room.models or ("",) * len(room)
-        out.append(
-            replace(
-                room,
-                room_type=vocabulary().room_type(room.room_type).name,
-                categories=tuple(row.name for row in rows if row is not None),
-                size=room.size[keep],
-                position=room.position[keep],
-                yaw=room.yaw[keep],
-                models=tuple(models[k] for k in keep),
-                styles=tuple(styles[k] for k in keep),
-                relations=None,
-            )
-        )
-    return out
 
 
 def room_figures(rooms: Sequence[RoomBoxes]) -> dict:

@@ -132,25 +132,28 @@ def style_likeness(points: np.ndarray, groups: Sequence[tuple[str, object]]) -> 
 
 
 def set_scores(
-    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4
+    generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4, *, points: int = 0
 ) -> dict[str, dict[str, float]]:
-    """MMD, COV and 1-NNA (Chamfer) of generated against reference shapes, per class and averaged over classes ("mean").
+    """MMD, COV and 1-NNA of generated against reference shapes, per class and averaged over classes ("mean").
 
     Arguments:
         generated, references: class -> (n, p, 3) float32 surface points; both are cut to the smaller number.
         least: classes with fewer shapes on either side are left out.
+        points: by the earth mover's distance of so many points each; 0 = by the Chamfer distance of all.
     """
     import torch
 
-    from echomodel.metrics.pointsets import compare_sets
+    from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, earth_mover_matrix
+
+    matrix = earth_mover_matrix if points else chamfer_matrix
 
     scores: dict[str, dict[str, float]] = {}
     for label in sorted(set(generated) & set(references)):
         count = min(len(generated[label]), len(references[label]))
         if count < least:
             continue
-        ours, real = (torch.as_tensor(side[label][:count]) for side in (generated, references))
-        scores[label] = {**compare_sets(ours, real), "n": float(count)}
+        ours, real = (torch.as_tensor(side[label][:count, : points or None]) for side in (generated, references))
+        scores[label] = {**compare_sets(ours, real, matrix), "n": float(count)}
     if scores:
         scores["mean"] = _means(list(scores.values()))
     return scores

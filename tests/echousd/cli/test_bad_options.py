@@ -17,9 +17,7 @@ ROOM = "room: bedroom\nobjects: {bed: double_bed}\n"
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("eval", "layout", "--rooms", "x", "--relation-guidance", "nan"), "--relation-guidance is nan, allowed:"),
         (("new", "OUT.yaml", "--room", "bedroom", "--size", "3", "inf"), "--size is inf, allowed: a finite number"),
-        (("eval", "layout", "--rooms", "x", "--steps", "-1"), "--steps"),
         (("data", "plot", "x", "-o", "y.png", "--columns", "0"), "--columns"),
         (
             ("generate", "x.yaml", "-o", "OUT", "--dress", "none", "--dress-graph"),

@@ -15,13 +15,15 @@ from small_room import ball_tsdf, small_graph
 
 import echousd
 from echomodel.loading import load_model
-from echomodel.roomboxes import RoomBoxes, write_rooms
+from echomodel.metrics.tasks import extended, kept_relations, tasks_of
+from echomodel.roomboxes import RoomBoxes
 from echomodel.text import ClipTextEncoder
 from echoscene.checkpoint import convert, statistics_from_bounds
 from echoscene.config import EncoderConfig, ReleasedConfig, UNetConfig, VQConfig, shape_unet
 from echoscene.model import ReleasedModel
 from echoscene.tables import LayoutTables
 from echoscene.vqvae import VQVAE
+from echousd.evaluation.systems import System, drawn
 
 SMALL = {"hidden": 16, "layers": 2, "code": 8, "predicate": 8, "context": 32}
 ENCODER = EncoderConfig(learned=8, flag=4, hidden=16, layers=2, separated=False)
@@ -65,23 +67,20 @@ def test_room_from_a_converted_checkpoint(weights, tmp_path, echousd_command):
     assert len(bed.GetFaceVertexCountsAttr().Get()) > 12  # a shape, not a box
 
 
-def test_scored_like_any_other_model(weights, tmp_path, echousd_command):
+def test_scored_like_any_other_model(weights):
     size, x = np.full((3, 3), 0.5), np.array([-1.0, 0.0, 1.0])
     room = RoomBoxes(
         "room", "bedroom", np.array([(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)]), 2.6,
         ("double_bed", "nightstand", "wardrobe"), size, np.stack([x, 0 * x, 0.5 * x], 1), 0 * x,
     )  # fmt: skip
-    write_rooms(tmp_path / "rooms.json", [room])
-    asked = ("eval", "layout", "--rooms", tmp_path / "rooms.json", "--model", weights)
-    done = echousd_command(*asked, "--steps", 2, "--rules", "sgfront", "--json")
-    assert done.code == 0, done.err
-    scores = json.loads(done.out)["generation"]
-    assert scores["n"] >= 4
-    assert 0 <= scores["total"] <= 1
-    done = echousd_command(*asked, "--steps", 11)
-    assert (done.code, "layout steps is 11, allowed: 1..10" in done.err) == (2, True), done.err
-    done = echousd_command(*asked, "--relation-guidance", 0.2)
-    assert (done.code, "is for compact weights, found: released" in done.err) == (2, True), done.err
+    system = System.parse(str(weights))
+    assert system.weights == weights
+    tasks = tasks_of([room], 0, rules="sgfront", drop=0.0)
+    for task in (*tasks, extended(tasks[0], np.random.default_rng(0))):
+        (made,) = drawn(system, [task], 0)
+        kept, measured = kept_relations(task, made)["all"]
+        assert measured[0] >= 4
+        assert 0 <= kept[0] <= measured[0]
 
 
 def test_what_does_not_fit_is_named(weights, tmp_path, echousd_command, monkeypatch):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from echomodel.furniture import Choices, Style
+from echomodel.furniture import Choices, Style, solids
 from echomodel.furniture.description import described
-from echomodel.metrics.parts_evaluation import PartsEvaluation, style_scores, usual_size
+from echomodel.metrics.furniture import piece_scores, style_scores, usual_size
 from echomodel.objective.sizes import size_range
 
 
@@ -28,7 +28,15 @@ def test_style_scores_tell_suites_of_one_style_from_others():
         drawn = [Style.draw(np.random.default_rng(int(number))) for number in style]
         return torch.from_numpy(np.stack([described(one, Choices(np.zeros(18))) for one in drawn]))
 
-    scores = style_scores(by_suite, 7, PartsEvaluation(suites=5, seed=2))
+    scores = style_scores(by_suite, 7, 5, 2)
     assert scores["told"] == scores["ratio"] == 0
     assert scores["untold"] > 0.1
     assert scores["other"] > 0.1
+
+
+def test_a_piece_is_closed_whole_and_fills_its_box():
+    size = np.array([0.5, 0.9, 0.5])
+    parts = solids("chair", Style.draw(np.random.default_rng(0)), Choices(np.zeros(18)), size)
+    mesh, scores = piece_scores(parts, size)
+    assert scores == {"closed": 1.0, "loose": 0.0, "box_error": pytest.approx(0, abs=1e-6)}
+    assert mesh.extents == pytest.approx(size)

@@ -1,0 +1,204 @@
+"""Runs of an evaluation: which rooms are asked, what every system made of them, and figures over rooms."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from echomodel.data.roomset import load_rooms
+from echomodel.data.sgfront import SGFront
+from echomodel.metrics.statistics import Counts, Figure, Pair, figure
+from echomodel.metrics.tasks import Task, with_known_words
+from echomodel.progress import StageListener
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms.generator import generate_rooms
+from echomodel.vocabulary import vocabulary
+from echousd.evaluation.foreign import foreign_rooms
+from echousd.evaluation.systems import System, drawn, finished
+
+HELD_OUT = 770_000  # seed of generated rooms that no training used
+UNTRAINED = ("random", "generator", "shuffled")
+HONEST = (*UNTRAINED, *(f"{name}+search" for name in UNTRAINED), "retrieval", "real")
+SYSTEMS = ("default", "network", "guided")
+SECTIONS = ("relations", "faults", "selection", "field", "realism", "shapes", "physics")
+
+
+@dataclass(frozen=True)
+class SuiteSettings:
+    """What is asked.
+
+    Arguments:
+        systems: as `System.parse` reads them; the first is what others are compared with.
+        against: rooms file, room set (its held-out rooms), SG-FRONT folder (its test split), or `generated`: rooms of
+            the room generator that no training saw.
+        samples: rooms that are laid out. seed: of every draw. only: sections, () = all.
+        told: relations an object where people would tell them. drafts: of `+half`, of which the best is kept.
+        shapes: set of shapes to compare pieces with, None = the programs' own, drawn anew.
+        inception, clip: files of weights of FID, KID and FID-CLIP, None = not measured.
+        workers: processes that place rooms; they change nothing.
+    """
+
+    systems: tuple[str, ...] = SYSTEMS
+    against: str = "generated"
+    samples: int = 24
+    seed: int = 0
+    only: tuple[str, ...] = ()
+    told: float = 1.0
+    drafts: int = 3
+    shapes: str | None = None
+    inception: str | None = None
+    clip: str | None = None
+    workers: int = 1
+
+    def __post_init__(self) -> None:
+        wrong = [name for name in self.only if name not in SECTIONS]
+        if wrong:
+            raise ValueError(f"--only: no section {wrong[0]!r}, allowed: {', '.join(SECTIONS)}")
+        if self.samples < 2:
+            raise ValueError(f"--samples is {self.samples}, allowed: 2 or more; one room alone has no interval")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of systems, columns of figures.
+
+    Arguments:
+        name: of the section; note: what is measured, in a sentence or two. better: column -> "low" or "high".
+        rows: system -> column -> figure.
+    """
+
+    name: str
+    title: str
+    note: str
+    rows: Mapping[str, Mapping[str, Figure]]
+    better: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What was laid out.
+
+    Arguments:
+        systems: in the order of the rows. tasks: that all who can be asked were asked. reference: other rooms of that
+            source. made, of: system -> its rooms and what they were asked, room by room.
+        seconds: of the processor a room. missing: what is not measured and why; sections add to it.
+    """
+
+    settings: SuiteSettings
+    systems: Sequence[System]
+    tasks: Sequence[Task]
+    reference: Sequence[RoomBoxes]
+    made: Mapping[str, Sequence[RoomBoxes]]
+    of: Mapping[str, Sequence[Task]]
+    seconds: Mapping[str, float]
+    missing: list[str] = field(default_factory=list)
+
+
+def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBoxes]]:
+    """Rooms to lay out and, of the same source, as many others to compare with; raises ValueError for too few."""
+    wanted = 2 * settings.samples
+    path = Path(settings.against)
+    if settings.against == "generated":
+        rooms = generate_rooms(wanted, HELD_OUT + settings.seed)
+    elif (path / "classes_all.txt").exists():
+        rooms = SGFront(path, split="test").rooms()
+    else:
+        rooms = load_rooms(path, held_out=path.is_dir() or path.suffix == ".npz")
+    rooms = [room for room in with_known_words(rooms) if len(room) > 1 and len(room.floor_polygon) > 2]
+    if len(rooms) < 4:
+        raise ValueError(f"{settings.against}: {len(rooms)} rooms with a floor and two known objects, 4 are needed")
+    count = min(wanted, len(rooms) // 2 * 2)
+    chosen = [rooms[number * len(rooms) // count] for number in range(count)]
+    return chosen[::2], chosen[1::2]
+
+
+def run_systems(
+    systems: Sequence[System], tasks: Sequence[Task], settings: SuiteSettings, progress: StageListener | None = None
+) -> tuple[dict[str, list[RoomBoxes]], dict[str, float]]:
+    """The rooms of every system, and its CPU seconds a room (drawing here, placing wherever it ran)."""
+    made: dict[str, list[RoomBoxes]] = {}
+    seconds: dict[str, float] = {}
+    bases: dict[tuple[str, int], tuple[list[RoomBoxes], float]] = {}
+    with Workers(settings.workers) as pool:
+        for number, system in enumerate(systems):
+            drafts, spent = [], 0.0
+            for draft in range(settings.drafts if system.finish == "half" else 1):
+                if (system.base, draft) not in bases:
+                    began = time.process_time()
+                    found = drawn(system, tasks, settings.seed + 1000 * draft)
+                    bases[system.base, draft] = found, time.process_time() - began
+                drafts.append(bases[system.base, draft][0])
+                spent += bases[system.base, draft][1]
+            done = pool.map(_finished, [(system, *row) for row in zip(tasks, zip(*drafts, strict=True), strict=True)])
+            made[system.name] = [room for room, _ in done]
+            seconds[system.name] = (spent + sum(took for _, took in done)) / len(tasks)
+            if progress:
+                progress("rooms", number + 1, len(systems))
+    return made, seconds
+
+
+def _finished(asked: tuple[System, Task, Sequence[RoomBoxes]]) -> tuple[RoomBoxes, float]:
+    began = time.process_time()
+    return finished(*asked), time.process_time() - began
+
+
+class Workers:
+    """A map over so many processes, in order; none of them where one is enough."""
+
+    def __init__(self, count: int) -> None:
+        self.pool = ProcessPoolExecutor(count, get_context("spawn")) if count > 1 else None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.pool:
+            self.pool.shutdown()
+
+    def map(self, function: Callable, rows: Sequence) -> list:
+        """The function of every row."""
+        return list(self.pool.map(function, rows, chunksize=2) if self.pool else map(function, rows))
+
+
+def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[str]]:
+    """Rooms from elsewhere as tasks that they answered themselves, and what was left out of them, a sentence each."""
+    assert system.foreign is not None
+    found = foreign_rooms(system.foreign)
+    known = with_known_words(found)
+    odd = sorted({word for old, new in zip(found, known, strict=True) for word in {*old.categories}
+                  if vocabulary().known_category(word) is None})  # fmt: skip
+    notes = [f"{system.name}: objects that the vocabulary does not hold are left out: {', '.join(odd)}"] if odd else []
+    bare = sum(len(room.floor_polygon) < 3 for room in known)
+    notes += [f"{system.name}: {bare} of {len(known)} rooms have no floor, figures of floors leave them out"] * bool(
+        bare
+    )
+    tasks = []
+    for old, new in zip(found, known, strict=True):
+        kept = old.relations is not None and len(old) == len(new)
+        told = np.asarray(old.relations if kept else np.zeros((0, 3)), np.int64).reshape(-1, 3)
+        if len(new):
+            tasks.append(Task(new, told))
+    if len(tasks) < 2:
+        raise ValueError(f"{system.name}: {len(tasks)} rooms with known objects, 2 or more are needed for an interval")
+    count = min(settings.samples, len(tasks))
+    return [tasks[number * len(tasks) // count] for number in range(count)], notes
+
+
+def figures(
+    scores: Mapping[str, Sequence[Mapping[str, Pair]]], columns: Sequence[str], seed: int, reference: str
+) -> dict[str, dict[str, Figure]]:
+    """The table of some columns of what rooms score, every system compared with one of them on the same rooms."""
+    counts = {
+        name: {column: Counts.of([row.get(column, (0.0, 0.0)) for row in rows]) for column in columns}
+        for name, rows in scores.items()
+    }
+    return {
+        name: {c: figure(row[c], seed, counts[reference][c] if name != reference else None) for c in columns}
+        for name, row in counts.items()
+    }

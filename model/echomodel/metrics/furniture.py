@@ -1,0 +1,107 @@
+"""Scores of furniture made of parts: do pieces hold together, share a told style, differ else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+import trimesh
+from torch import Tensor
+
+from echomodel.boxes import Boxes
+from echomodel.echo import EchoModel
+from echomodel.furniture import mesh_of, sample_size, solids
+from echomodel.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.furniture.solids import Solid
+from echomodel.graph import GraphBatch
+from echomodel.metrics.pieces import loose_solids
+from echomodel.objective.sizes import size_range
+from echomodel.roomboxes import RoomBoxes
+from echomodel.rules import label_relations
+from echomodel.vocabulary import vocabulary
+
+SUITE = 4  # pieces of different classes in a suite
+
+
+def piece_scores(parts: Sequence[Solid], size: np.ndarray) -> tuple[trimesh.Trimesh, dict[str, float]]:
+    """The mesh of one piece; whether it is `closed`, has `loose` parts, and how far it is off its box, metres."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mesh = mesh_of(list(parts), size)
+        try:
+            loose = bool(loose_solids(parts))
+        except ZeroDivisionError:  # a solid without height, as untrained networks write them, touches nothing
+            loose = True
+    return mesh, {
+        "closed": float(mesh.is_watertight and mesh.is_winding_consistent),
+        "loose": float(loose),
+        "box_error": float(np.abs(mesh.extents - size).max()),
+    }
+
+
+def room_pieces(model: EchoModel, rooms: Sequence[RoomBoxes], seed: int) -> list[dict[str, float]]:
+    """What the furniture of rooms scores, piece by piece; half of what holds in each is told."""
+    rng, generator = np.random.default_rng([seed, 6]), torch.Generator().manual_seed(seed)
+    words, out = [category.name for category in vocabulary().categories], []
+    for room in rooms:
+        relations = label_relations(room, rules="strict", drop=0.5, rng=rng)
+        graph = GraphBatch.from_room(room, triplets=torch.from_numpy(relations))
+        found = model.sample_furniture(graph, Boxes.from_room(room), generator=generator).float().cpu().numpy()
+        for number, vector, size in zip(graph.category.tolist(), found, room.size, strict=True):
+            out.append(piece_scores(solids(words[number], *piece_of(vector), np.asarray(size)), np.asarray(size))[1])
+    return out
+
+
+def style_scores(
+    styles: Callable[[GraphBatch, np.ndarray], Tensor], classes: int, suites: int, seed: int
+) -> dict[str, float]:
+    """Mean style distance of pieces of different classes: told to be of one style, nothing told, of other suites.
+
+    `ratio` is the first over the last.
+
+    Arguments:
+        styles: graph, and (N, 3) metres, -> (N, D) descriptions. classes: the first of the vocabulary.
+    """
+    rng = np.random.default_rng([seed, 4])
+    words, same = vocabulary().categories, vocabulary().predicate_id("same_style_as")
+    every = [(i, same, j) for i in range(SUITE) for j in range(SUITE) if i != j]
+    out: dict[str, float] = {}
+    for name, triplets in (("told", every), ("untold", [])):
+        drawn = [rng.permutation(classes)[:SUITE].tolist() for _ in range(suites)]
+        graph = GraphBatch.pack([GraphBatch.single(suite, triplets) for suite in drawn])
+        sizes = np.stack([usual_size(words[number].name, rng) for suite in drawn for number in suite])
+        distance = style_distances(styles(graph, sizes))
+        other = graph.category[:, None] != graph.category
+        scene = graph.scene[:, None] == graph.scene
+        out[name] = float(distance[scene & other].mean())
+        if name == "told":
+            out["other"] = float(distance[~scene & other].mean())
+    return {**out, "ratio": out["told"] / max(out["other"], 1e-12)}
+
+
+def style_distances(descriptions: Tensor) -> Tensor:
+    """(N, N) in [0, 1]: mean of the share of kinds that differ and of how far the proportions lie apart.
+
+    Arguments:
+        descriptions: (N, D).
+    """
+    words, start = [], 0
+    for size in GROUPS:
+        words.append(descriptions[:, start : start + size].argmax(1))
+        start += size
+    kinds = torch.stack(words, 1)
+    differ = (kinds[:, None] != kinds).float().mean(2)
+    numbers = descriptions[:, HOT:STYLE]
+    return (differ + (numbers[:, None] - numbers).abs().mean(2) / 2) / 2
+
+
+def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:
+    """(3,) float, metres: a size as `sample_size` draws it, within what a person takes for one of the category."""
+    return np.clip(sample_size(category, rng), *map(np.array, size_range(category)))
+
+
+def sampled(model: EchoModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> Tensor:
+    """(N, D) float32 descriptions of the furniture of a graph in boxes `sizes` (N, 3), metres."""
+    count = graph.num_nodes
+    boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))
+    return model.sample_furniture(graph, boxes, generator=generator).float().cpu()

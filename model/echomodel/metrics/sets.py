@@ -1,0 +1,198 @@
+"""Two sets of rooms beside each other: can they be told apart, does one cover the other, do they hold the same."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from echomodel.boxes import Boxes
+from echomodel.compact.draft import measurable, seen_from, wall_features
+from echomodel.floors import centred
+from echomodel.metrics.pointsets import coverage, one_nearest_neighbour
+from echomodel.metrics.statistics import LEVEL, Figure
+from echomodel.roomboxes import RoomBoxes
+from echomodel.sizes import size_score
+from echomodel.vocabulary import vocabulary
+
+COMPONENTS = 12  # principal components of the reference that layout features are told in
+SUBSETS, PART = 60, 0.8  # random parts of both sets that give a figure its interval
+FOLDS, TREES, LEAF = 4, 150, 3
+SCORES = 3.0  # standard scores beyond which a size is told no further
+WORDS = 2  # the last columns of what is measured of an object are words
+
+
+def object_features(room: RoomBoxes) -> np.ndarray:
+    """(n, F) float: gaps to walls, headings, size, height, the nearest neighbour; last the words of both.
+
+    Boxes are rounded to a centimetre and a degree first: rooms are judged, not how many digits their files have.
+    """
+    room = replace(
+        room, size=np.maximum(np.round(room.size, 2), 0.01), position=np.round(room.position, 2),
+        yaw=np.radians(np.round(np.degrees(room.yaw)) % 360),
+    )  # fmt: skip
+    boxes = measurable(Boxes.from_room(room))
+    floor = centred(room.floor_polygon if len(room.floor_polygon) else None)[None].expand(len(room), -1, -1)
+    sizes = [size_score(word, room.size[k : k + 1])[0] for k, word in enumerate(room.categories)]
+    lift = torch.tanh(5 * boxes.position[:, 1:2])
+    apart = torch.cdist(boxes.position[:, [0, 2]], boxes.position[:, [0, 2]]).fill_diagonal_(torch.inf)
+    here, near = torch.arange(len(boxes)), apart.argmin(1)
+    turn = (boxes.yaw[near] - boxes.yaw)[:, None]
+    words = torch.tensor([vocabulary().category_id(word) for word in room.categories])
+    told = torch.from_numpy(np.array(sizes)).float().clamp(-SCORES, SCORES)
+    columns = [
+        wall_features(boxes, floor), told, lift, seen_from(boxes, here, near), turn.sin(), turn.cos(),
+        words[:, None], words[near][:, None],
+    ]  # fmt: skip
+    return torch.cat([column.float() for column in columns], 1).numpy()
+
+
+def layout_features(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes]) -> tuple[np.ndarray, np.ndarray]:
+    """(A, D) and (B, D) float: means and spreads over each room's objects, in principal components of the reference."""
+    from sklearn.decomposition import PCA
+    from sklearn.preprocessing import StandardScaler
+
+    tables = [np.array([_of_room(room) for room in part]) for part in (rooms, reference)]
+    scaler = StandardScaler().fit(tables[1])
+    ours, theirs = (np.clip(scaler.transform(table), -10, 10) for table in tables)
+    found = PCA(min(COMPONENTS, len(theirs) - 1), svd_solver="full").fit(theirs)
+    return found.transform(ours), found.transform(theirs)
+
+
+def _of_room(room: RoomBoxes) -> np.ndarray:
+    measured = object_features(room)[:, :-WORDS]
+    return np.concatenate([measured.mean(0), measured.std(0)])
+
+
+def set_figures(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes], seed: int) -> dict[str, Figure]:
+    """Scene-level 1-NNA, COV and MMD, the Frechet and the kernel distance on layout features, and category KL.
+
+    Intervals are those of `SUBSETS` random parts of both sets, `PART` of each.
+    """
+    ours, theirs = layout_features(rooms, reference)
+    words = [[list(room.categories) for room in part] for part in (rooms, reference)]
+
+    def measured(i: np.ndarray, j: np.ndarray) -> dict[str, float]:
+        return neighbours(ours[i], theirs[j]) | {
+            "Frechet on layout features": frechet_distance(ours[i], theirs[j]),
+            "kernel on layout features": kernel_distance(ours[i], theirs[j]),
+            "category KL": category_divergence([words[0][k] for k in i], [words[1][k] for k in j]),
+        }
+
+    return with_subsets(measured, len(rooms), len(reference), seed)
+
+
+def with_subsets(
+    measured: Callable[[np.ndarray, np.ndarray], dict[str, float]], first: int, second: int, seed: int
+) -> dict[str, Figure]:
+    """What is measured of two whole sets, with the interval of their random parts."""
+    rng, whole = np.random.default_rng([seed, 4]), measured(np.arange(first), np.arange(second))
+    sizes = [max(2, round(PART * count)) for count in (first, second)]
+    parts = [
+        measured(*(np.sort(rng.permutation(n)[:m]) for n, m in zip((first, second), sizes, strict=True)))
+        for _ in range(SUBSETS)
+    ]
+    out = {}
+    for name, value in whole.items():
+        low, high = np.quantile([part[name] for part in parts], [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+        out[name] = Figure(value, float(low), float(high), first)
+    return out
+
+
+def neighbours(ours: np.ndarray, theirs: np.ndarray) -> dict[str, float]:
+    """1-NNA (0.5 is best), COV and MMD of two sets of vectors, (A, D) and (B, D) cut to the smaller number."""
+    count = min(len(ours), len(theirs))
+    a, b = (torch.from_numpy(np.ascontiguousarray(part[:count], dtype=float)) for part in (ours, theirs))
+    between = torch.cdist(a, b)
+    found = coverage(between) | one_nearest_neighbour(torch.cdist(b, b), between.t(), torch.cdist(a, a))
+    return {"1-NNA": found["acc"], "COV": found["cov"], "MMD": found["mmd"]}
+
+
+def frechet_distance(first: np.ndarray, second: np.ndarray) -> float:
+    """|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) of (A, D) and (B, D) (Heusel et al. 2017); features as they are."""
+    means = [np.mean(part, 0) for part in (first, second)]
+    spreads = [np.atleast_2d(np.cov(part, rowvar=False)) for part in (first, second)]
+    root = np.sqrt(np.linalg.eigvals(spreads[0] @ spreads[1]).real.clip(0)).sum()  # trace of the square root
+    return float(np.sum((means[0] - means[1]) ** 2) + np.trace(spreads[0]) + np.trace(spreads[1]) - 2 * root)
+
+
+def kernel_distance(first: np.ndarray, second: np.ndarray) -> float:
+    """Unbiased squared MMD with the kernel (x.y / D + 1)^3 of (A, D) and (B, D) (Binkowski et al. 2018)."""
+
+    def kernel(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return (x @ y.T / x.shape[1] + 1) ** 3
+
+    def within(x: np.ndarray) -> float:
+        k = kernel(x, x)
+        return float((k.sum() - np.trace(k)) / (len(x) * (len(x) - 1)))
+
+    return within(first) + within(second) - 2 * float(kernel(first, second).mean())
+
+
+def category_divergence(rooms: Sequence[Sequence[str]], reference: Sequence[Sequence[str]]) -> float:
+    """KL divergence of the categories of the reference from those of the rooms, nats; half a piece added of each."""
+    ours, theirs = (Counter(word for room in part for word in room) for part in (rooms, reference))
+    words = sorted({*ours, *theirs})
+    q, p = (np.array([count[word] + 0.5 for word in words]) for count in (ours, theirs))
+    p, q = p / p.sum(), q / q.sum()
+    return float((p * np.log(p / q)).sum())
+
+
+def told_apart(
+    made: Sequence[RoomBoxes], real: Sequence[RoomBoxes], seed: int, *, paired: bool = False
+) -> Figure:  # fmt: skip
+    """Area under the curve of a random forest that tells made rooms from real ones, by their objects; 0.5 = it cannot.
+
+    It judges rooms that it was not trained on; a room's score is the mean over its objects.
+
+    Arguments:
+        paired: the n-th of both are the same furniture, and judged by the same fold.
+    """
+    from sklearn.ensemble import RandomForestClassifier
+    from sklearn.metrics import roc_auc_score
+    from sklearn.model_selection import GroupKFold
+
+    rooms = [*made, *real]
+    tables = [object_features(room) for room in rooms]
+    x, room = np.concatenate(tables), np.repeat(np.arange(len(rooms)), [len(table) for table in tables])
+    truth = np.arange(len(rooms)) < len(made)
+    group = np.where(truth, np.arange(len(rooms)), np.arange(len(rooms)) - (len(made) if paired else 0))[room]
+    said = np.zeros(len(x))
+    for train, test in GroupKFold(FOLDS).split(x, truth[room], group):
+        forest = RandomForestClassifier(TREES, min_samples_leaf=LEAF, class_weight="balanced", random_state=seed)
+        forest.fit(x[train], truth[room][train])
+        said[test] = forest.predict_proba(x[test])[:, list(forest.classes_).index(True)]
+    score = np.bincount(room, said) / np.bincount(room)
+    rng, drawn = np.random.default_rng([seed, 6]), []
+    for _ in range(200):
+        rows = np.concatenate([rng.choice(np.flatnonzero(truth == side), (truth == side).sum()) for side in (0, 1)])
+        drawn.append(roc_auc_score(truth[rows], score[rows]))
+    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Figure(float(roc_auc_score(truth, score)), float(low), float(high), len(made))
+
+
+def size_distances(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes]) -> dict[str, float]:
+    """Kolmogorov-Smirnov distances of the standard scores of sizes within their classes, axis by axis."""
+    from scipy.stats import ks_2samp
+
+    def scores(part: Sequence[RoomBoxes]) -> np.ndarray:
+        return np.concatenate([size_score(w, r.size[k : k + 1]) for r in part for k, w in enumerate(r.categories)])
+
+    ours, theirs = (np.round(scores(part), 3) for part in (rooms, reference))
+    names = ("width", "height", "depth")
+    return {n: float(ks_2samp(ours[:, k], theirs[:, k], method="asymp").statistic) for k, n in enumerate(names)}
+
+
+def layout_distance(one: RoomBoxes, other: RoomBoxes) -> float:
+    """Mean distance in plan between the pieces of two layouts of the same furniture, metres; equal pieces may swap."""
+    from scipy.optimize import linear_sum_assignment
+
+    words, total = np.array(one.categories, dtype=object), 0.0
+    for word in set(one.categories):
+        a, b = (room.position[words == word][:, [0, 2]] for room in (one, other))
+        apart = np.linalg.norm(a[:, None] - b[None], axis=-1)
+        total += float(apart[linear_sum_assignment(apart)].sum())
+    return total / max(len(one), 1)
