@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -10,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from echousd.cli.options import Written
 from echousd.cli.output import say
+from echousd.cli.report import say_done
 
 if TYPE_CHECKING:
     from echomodel.progress import StageListener
@@ -48,6 +51,7 @@ def suite(
     inception: Annotated[Path | None, typer.Option(help="Weights of FID and KID: inception-2015-12-05.pt.")] = None,
     clip: Annotated[Path | None, typer.Option(help="Weights of FID-CLIP: OpenAI's ViT-B-32 (extra text).")] = None,
     workers: Annotated[int, typer.Option(help="Processes that place rooms.", min=1)] = 2,
+    json: Written = False,
 ) -> None:
     """Ask systems the same rooms, score them beside chance and plain baselines, and write a report.
 
@@ -57,6 +61,7 @@ def suite(
     from echousd.evaluation.runs import SYSTEMS, SuiteSettings
     from echousd.evaluation.suite import evaluate
 
+    started = time.perf_counter()
     chosen = tuple(word.strip() for word in only.split(",") if word.strip())
     asked = tuple(systems) if systems else SYSTEMS
     files = {"shapes": shapes, "inception": inception, "clip": clip}
@@ -68,8 +73,8 @@ def suite(
     command += "".join(f" --{name} {path}" for name, path in files.items() if path is not None)
     with _progress() as told_to:
         found, run = evaluate(settings, told_to)
-    for path in write_report(found, run, out, command):
-        say(str(path))
+    written = write_report(found, run, out, command)
+    say_done(json, written, started, map(str, written))
 
 
 @eval_app.command("study")
@@ -79,6 +84,7 @@ def study(
     against: Against = "generated",
     samples: Samples = 12,
     seed: Seed = 0,
+    json: Written = False,
 ) -> None:
     """Write a page that shows people pairs of rooms and records which they prefer, offline.
 
@@ -86,8 +92,10 @@ def study(
     """
     from echousd.evaluation.study import write_study
 
+    started = time.perf_counter()
     with _progress() as told_to:
-        say(str(write_study(systems, against, samples, seed, out, told_to)))
+        path = write_study(systems, against, samples, seed, out, told_to)
+    say_done(json, [path], started, [str(path)])
 
 
 @eval_app.command("answers")
