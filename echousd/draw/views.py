@@ -149,14 +149,14 @@ def inside_view(
         points, blocked = furniture.blocked(eye)
         hidden = 0.0 if main is None else _hidden(wider, points[main], blocked[main], eye)
         views = _turned(eye, np.stack([aim - spot, around - spot]))
-        half = APERTURE / 2 / np.array(LENSES)
-        cut = (_aside(corners, views)[..., None] > half / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
+        halves = APERTURE / 2 / np.array(LENSES)
+        cut = (_aside(corners, views)[..., None] > halves / MARGIN).mean(-2) if len(corners) else np.zeros(len(LENSES))
         cost = WHOLE * cut + CLEAR * hidden + np.abs(PANS)[:, None, None] + 0.1 * np.arange(len(LENSES))
         cost = cost.transpose(0, 1, 3, 2).reshape(-1, len(SLOPES))  # of each slope the first that costs least
         for slope, row in sorted(enumerate(cost.argmin(0)), key=lambda found: (found[1] // len(LENSES), found[0])):
-            heading, lens = divmod(int(row), len(LENSES))
+            heading, number = divmod(int(row), len(LENSES))
             view = views.reshape(-1, len(SLOPES), 4, 4)[heading, slope]
-            shots.append(Shot(float(cost[row, slope]), view, LENSES[lens], points, blocked))
+            shots.append(Shot(float(cost[row, slope]), view, LENSES[number], points, blocked))
     for first, view, lens, points, blocked in sorted(shots, key=lambda shot: shot.cost)[:TRIED]:
         eye, half = view[:3, 3], APERTURE / 2 / lens
         merit = min(_depth(room, eye[[0, 2]], -view[[0, 2], 2]), FAR) - first
