@@ -19,14 +19,18 @@ import tempfile
 from pathlib import Path
 
 COLD = """
-import atexit, json, sys, time
+import json, sys, time
 begun, time.perf_counter = time.process_time(), time.process_time
-from echousd.cli.main import run
-code = run(sys.argv[2:])
+from echousd.cli.main import main
+told, sys.argv = sys.argv[1], ["echousd", *sys.argv[2:]]
+try:
+    main()
+except SystemExit as ended:
+    code = ended.code
 ours = [m.__file__ for n, m in sys.modules.items() if n.split(".")[0] in ("echousd", "echomodel") and m.__file__]
 counts = {"modules": len(sys.modules), "of ours": len(ours), "lines of ours": sum(len(open(f).readlines()) for f in ours
           if f.endswith(".py"))} | {name: name in sys.modules for name in ("torch", "trimesh", "scipy", "networkx")}
-open(sys.argv[1], "w").write(json.dumps({"start": begun, "end": time.process_time(), **counts}))
+open(told, "w").write(json.dumps({"start": begun, "end": time.process_time(), **counts}))
 sys.exit(code)
 """
 WARM = """
