@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from echousd.graph.files import STAGE_FORMS, TEXT_FORMS, read_file, write_text
-from echousd.graph.text import read_text
-from echousd.home.graph import HomeGraph, home_of_plain
+
+if TYPE_CHECKING:  # what a single room does not need is not loaded to see that it is one
+    from echousd.home.graph import HomeGraph
 
 
 def load_home(path: str | Path) -> HomeGraph | None:
@@ -18,15 +19,25 @@ def load_home(path: str | Path) -> HomeGraph | None:
     """
     path = Path(path)
     if path.suffix.lower() in STAGE_FORMS:
+        from echousd.stage.files import open_stage
+        from echousd.stage.read import is_home
+
+        stage = open_stage(path)
+        if not is_home(stage):
+            return None
         from echousd.home.stages import read_home
 
-        return read_home(path)
+        return read_home(stage)
     if path.suffix.lower() not in TEXT_FORMS:
         return None
 
     def read(text: str, *rest: Any) -> HomeGraph | None:
-        holds = re.search(r"""^[{\s]*["']?rooms["']?\s*:""", text, re.MULTILINE)
-        return read_text(home_of_plain, text, *rest) if holds else None
+        if not re.search(r"""^[{\s]*["']?rooms["']?\s*:""", text, re.MULTILINE):
+            return None
+        from echousd.graph.text import read_text
+        from echousd.home.graph import home_of_plain
+
+        return read_text(home_of_plain, text, *rest)
 
     home: HomeGraph | None = read_file(path, read)
     return home

@@ -53,9 +53,10 @@ def plan_there(path: Path, home: HomeGraph | None = None) -> Plan | None:
     """The plan on a stage, None where its rooms state no floors or floors in one place."""
     if path.suffix.lower() not in STAGE_FORMS:
         return _plan_of_graphs(home)
-    from echousd.home.stages import read_home, read_poses
+    from echousd.home.files import load_home
+    from echousd.home.stages import read_poses
 
-    home = home or read_home(path)
+    home = home or load_home(path)
     return None if home is None else given_plan(home, read_poses(path))
 
 

@@ -89,17 +89,14 @@ def write_home(home: HomeGraph, path: Path, plan: Plan | None = None) -> None:
     save_layer(home_layer(home, plan), path)
 
 
-def read_home(path: Path) -> HomeGraph | None:
-    """The graph of the home on a stage, None where it holds at most one room; raises StageError.
+def read_home(stage: Usd.Stage) -> HomeGraph:
+    """The graph of the home on a stage; raises StageError.
 
     What a plan says of a room (floor, walls, openings) is no part of what was asked of it.
     """
-    stage = open_stage(path)
     with values.reading(stage):
         found = find_rooms(stage)
         graph = next((prim for prim in stage.Traverse() if prim.GetTypeName() == usd.HOME_TYPE), None)
-        if len(found) < 2 and graph is None:
-            return None
         names = _names([prims.room.GetPath() for prims in found])
         try:
             rooms = []

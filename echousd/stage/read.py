@@ -56,6 +56,12 @@ def the_room(stage: Usd.Stage, room: str | None, rooms: list[RoomPrims] | None =
     raise StageError(f"{source(stage)}: {what}" + (f", allowed: {paths}" if rooms else ""))
 
 
+def is_home(stage: Usd.Stage) -> bool:
+    """Whether a stage holds several rooms' graphs or the graph of a home."""
+    kinds = [prim.GetTypeName() for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())]
+    return usd.HOME_TYPE in kinds or kinds.count(usd.GRAPH_TYPE) > 1
+
+
 def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     """All rooms of a stage in one traversal; a node or relation belongs to the closest room above it."""
     kinds = {usd.GRAPH_TYPE: "graphs", usd.RELATION_TYPE: "relations", usd.OPENING_TYPE: "openings"}

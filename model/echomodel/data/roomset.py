@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from echomodel.files import read_json, whole_file, write_json
+from echomodel.files import claim, read_note, whole_file, write_json
 from echomodel.openings import HINGES, KINDS, SWINGS, Opening, numbered
 from echomodel.progress import StepListener
 from echomodel.roomboxes import RoomBoxes, read_rooms
@@ -252,44 +252,6 @@ def _openings(entries: np.ndarray) -> tuple[Opening, ...]:
         name, words = numbered(kind, [o.name for o in found]), (HINGES[entry["hinge"]], SWINGS[entry["swing"]])
         found.append(Opening(name, kind, int(entry["edge"]), offset, width, height, sill, *words))
     return tuple(found)
-
-
-LARGEST = 2**24  # bytes of a note
-
-
-def read_note(path: Path, **kinds: type) -> dict:
-    """What a folder of data says of itself, a JSON object.
-
-    Arguments:
-        kinds: fields that it must have, and their types.
-
-    Raises ValueError, with the file's path, for anything else.
-    """
-    try:
-        found = read_json(path, LARGEST)
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror or error})") from None
-    wrong = [key for key, kind in kinds.items() if not isinstance(found, dict) or type(found.get(key)) is not kind]
-    if wrong or not isinstance(found, dict):
-        told = ", ".join(f"{key} ({kinds[key].__name__})" for key in wrong) or "an object"
-        raise ValueError(f"{path}: not what a set of data says of itself, missing: {told}")
-    return found
-
-
-def claim(folder: Path, plan: dict) -> None:
-    """Remember what a folder is being filled with (`plan.json`).
-
-    Raises ValueError for a folder that was begun with something else.
-    """
-    note = folder / "plan.json"
-    if not note.exists():
-        write_json(note, plan)
-        return
-    found = read_note(note)
-    wrong = [key for key in plan if found.get(key) != plan[key]]
-    if wrong:
-        told = ", ".join(f"{key} {found.get(key)!r}" for key in wrong if key != "categories") or "other categories"
-        raise ValueError(f"{folder}: was begun with {told}; choose another folder or remove it")
 
 
 def load_rooms(path: Path, limit: int | None = None, *, held_out: bool = False) -> list[RoomBoxes]:

@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
-from echomodel.data.roomset import claim, read_note
-from echomodel.files import whole_file, write_json
+from echomodel.files import claim, read_note, whole_file, write_json
 from echomodel.furniture import Choices, Style, sample_size, solids, tsdf_of
 from echomodel.furniture.solids import Solid
 from echomodel.progress import StepListener
