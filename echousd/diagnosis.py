@@ -16,6 +16,8 @@ EXTRAS = (
     ("validate", ("usd_validation_nvidia",), "NVIDIA's validator, by which our tests check rooms"),
     ("home", ("ortools",), "plans of homes of several rooms"),
     ("dxf", ("ezdxf",), "plans as DXF"),
+    ("svg", ("svgelements",), "floor plans in SVG"),
+    ("ifc", ("ifcopenshell",), "floor plans in IFC"),
     ("eval", ("sklearn", "fcl", "jinja2"), "`echousd eval suite`"),
     ("batch", ("pyarrow",), "Parquet tables of `echousd batch`"),
     ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),

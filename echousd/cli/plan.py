@@ -1,31 +1,112 @@
-"""`echousd plan`: from a graph of rooms, or somebody's floor plan, to a plan."""
+"""`echousd plan`: from a graph of rooms, or somebody's floor plan, to a plan, and from a plan to other programs."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from echousd.cli.options import Force, Written
 from echousd.cli.report import say_done
 
 EXAMPLES = """Examples:
 
-    echousd plan flat.yaml -o plans.png --plans 6
+    echousd plan export flat.yaml -o plans.png --plans 6        (export may be left out)
 
     echousd plan flat.yaml -o planned.usda --seed 3        (echousd generate planned.usda -o flat furnishes this one)
 
     echousd plan flat/home.usda -o flat.dxf"""
 
+IMPORT_EXAMPLES = """Examples:
+
+    echousd plan import flat.dxf -o flat.usda --unit mm --picture flat.png
+
+    echousd plan import house.ifc -o house.usda --storey 'Ground floor'
+
+    echousd plan import scan.json -o scan.usda        (RoomPlan, ProcTHOR, Holodeck, SceneSmith, SAGE or Infinigen)"""
+
+
+class _ExportsByItself(TyperGroup):
+    """`echousd plan HOME -o ...` is `echousd plan export HOME -o ...`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments with the command that they leave out."""
+        named = bool(args) and (args[0] in self.commands or args[0] in ctx.help_option_names)
+        return super().parse_args(ctx, args if named or not args else ["export", *args])
+
+
+plan_app = typer.Typer(cls=_ExportsByItself, no_args_is_help=True, epilog=EXAMPLES)
+
 
 def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("plan", epilog=EXAMPLES)(plan)
+    """Add the topic."""
+    app.add_typer(plan_app, name="plan", help="Plan a home, draw or write its plan; read somebody's floor plan.")
 
 
-def plan(
+@plan_app.command("import", epilog=IMPORT_EXAMPLES)
+def import_(
+    source: Annotated[
+        Path, typer.Argument(metavar="FILE", help=".dxf, .ifc, .svg, .sh3d or .json.", show_default=False)
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Stage (.usda) to write.", show_default=False)],
+    form: Annotated[str | None, typer.Option("--format", help="Format, where it is not to be found out.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of a drawing that states none: m, cm, mm, in, ft, or metres of one.")
+    ] = None,
+    storey: Annotated[str | None, typer.Option(help="Storey of several; default: the lowest.")] = None,
+    lenient: Annotated[bool, typer.Option("--lenient", help="Leave out doors and windows that meet no wall.")] = False,
+    picture: Annotated[
+        Path | None, typer.Option(help="Draw the plan over the source (.png, .svg, .pdf).", show_default=False)
+    ] = None,
+    force: Force = False,
+    json: Written = False,
+) -> None:
+    """Read a floor plan of another program: its rooms, doors and windows, and its furniture, which stays put.
+
+    Rooms without furniture get what such rooms usually hold.
+    """
+    from echousd.graph import GraphError
+    from echousd.graph.files import STAGE_FORMS
+    from echousd.home.draw import PICTURES, draw_plans
+    from echousd.home.importing.formats import read_plan, unit_of
+    from echousd.home.importing.homes import imported
+    from echousd.home.stages import write_home
+
+    started = time.perf_counter()
+    _writable(output, STAGE_FORMS[:-1], force)
+    if picture is not None:
+        _writable(picture, PICTURES, force)
+    name, found = read_plan(source, form, unit_of(unit))
+    try:
+        made = imported(found, storey, lenient=lenient)
+    except GraphError as error:
+        raise GraphError(f"{source}: {error}") from None
+    write_home(made.plan.home, output, made.plan)
+    if picture is not None:
+        draw_plans(
+            [made.plan], picture, found.lines or [room.corners[[*range(len(room.corners)), 0]] for room in found.rooms]
+        )
+    told = ", ".join(f"{count} {what}" for what, count in made.counts.items())
+    lines = [f"wrote {output}", f"format   {name}: {found.frame}", f"found    {told}, {made.plan.area:.1f} m²"]
+    lines += [f"ignored  {count} x {what}" for what, count in made.ignored.items()]
+    facts = {"format": name, "frame": found.frame, "found": made.counts, "ignored": made.ignored}
+    say_done(json, [output, *([picture] if picture else [])], started, lines, facts)
+
+
+def _writable(path: Path, endings: tuple[str, ...], force: bool) -> None:
+    from echousd.graph import GraphError
+
+    if path.suffix.lower() not in endings:
+        raise GraphError(f"{path}: extension {path.suffix!r}, allowed: {', '.join(endings)}")
+    if path.exists() and not force:
+        raise GraphError(f"{path} exists, allowed: a new path, or --force to overwrite it")
+
+
+@plan_app.command("export", epilog=EXAMPLES)
+def export(
     source: Annotated[Path, typer.Argument(metavar="HOME", help="Home: YAML, JSON or stage.", show_default=False)],
     output: Annotated[
         Path,
@@ -48,11 +129,7 @@ def plan(
     from echousd.home.stages import write_home
 
     started, form = time.perf_counter(), output.suffix.lower()
-    if form not in (*PICTURES, ".dxf", *STAGE_FORMS[:-1]):
-        allowed = ", ".join((*PICTURES, ".dxf", *STAGE_FORMS[:-1]))
-        raise GraphError(f"{output}: extension {output.suffix!r}, allowed: {allowed}")
-    if output.exists() and not force:
-        raise GraphError(f"{output} exists, allowed: a new path, or --force to overwrite it")
+    _writable(output, (*PICTURES, ".dxf", *STAGE_FORMS[:-1]), force)
     if several > 1 and form not in PICTURES:
         raise GraphError(f"--plans is {several}, allowed with a picture; name one by its --seed")
     home = load_home(source)

@@ -13,11 +13,12 @@ from echomodel.files import whole_file
 from echomodel.openings import Opening, hinge_point, inward_normal, segment, signed_area, swing_area
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
-from echousd.home.plan import Plan
+from echousd.home.plan import Plan, ways
 
 PICTURES = (".png", ".svg", ".pdf")
 TINTS = {"": "#f4efe4", "wet": "#e3eef4", "outdoor": "#e6f0df"}
-LAYERS = {"wall": 7, "door": 3, "window": 5, "room": 8}  # of a DXF, with their colours
+LAYERS = {"wall": 7, "door": 3, "window": 5, "passage": 9, "room": 8}  # of a DXF, with their colours
+INK = {"door": "#8a5a2b", "window": "#3a6ea5", "passage": "#c9c2b2"}
 ACROSS = 5.0  # inches of one plan
 
 
@@ -45,6 +46,9 @@ def lines_of(plan: Plan) -> Iterator[Line]:
             out = -inward_normal(floor, opening.edge) * (plan.walls[name][opening.edge] + 0.005)
             holes.append(shapely.Polygon([*near, *(near[::-1] + out)]).buffer(0.005))
             yield from _filled(floor, opening, near, out)
+    for (name, _), opening in ways(plan):
+        if opening.kind == "passage":
+            yield Line("passage", on_paper(segment(plan.floors[name], opening)))
     cells = shapely.union_all([shapely.Polygon(cell) for cell in plan.cells.values()])
     floors = shapely.union_all([shapely.Polygon(floor) for floor in plan.floors.values()])
     solid = cells.difference(floors).difference(shapely.union_all(holes))
@@ -65,8 +69,12 @@ def _filled(floor: np.ndarray, opening: Opening, near: np.ndarray, out: np.ndarr
         yield Line("door", on_paper(swing[1:]))
 
 
-def draw_plans(plans: Sequence[Plan], path: Path) -> None:
-    """Write a picture of plans side by side; the extension (.png, .svg, .pdf) chooses its form. Raises OSError."""
+def draw_plans(plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = ()) -> None:
+    """Write a picture of plans side by side; the extension (.png, .svg, .pdf) chooses its form. Raises OSError.
+
+    Arguments:
+        over: (k, 2) float each, lines (x, z) of a drawing that the plans were taken from.
+    """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -90,7 +98,9 @@ def draw_plans(plans: Sequence[Plan], path: Path) -> None:
             if line.layer == "wall":
                 axes.fill(*line.points.T, color="#3a3a3a")
             elif line.layer != "room":
-                axes.plot(*points.T, color="#3a6ea5" if line.layer == "window" else "#8a5a2b", linewidth=0.8)
+                axes.plot(*points.T, color=INK[line.layer], linewidth=0.8)
+        for points in over:
+            axes.plot(*on_paper(points).T, color="#d02f2f", linewidth=0.5, alpha=0.8)
         axes.set_title(f"{plan.area:.1f} m²", fontsize=8)
     form = path.suffix.lower().removeprefix(".")
     dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": "echousd"}}[form]

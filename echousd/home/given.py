@@ -70,14 +70,36 @@ def _plan_of_graphs(home: HomeGraph | None) -> Plan | None:
 def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
     """The plan that rooms with floors and poses make together, None where a floor is missing or stands in another's.
 
-    Floors that meet are taken to end in the middle of their wall and lose half of it; a door in one of them is a hole
-    in the other.
+    A door in one of them is a hole in the other; where none is stated, there are those that the graph asks for.
+    """
+    plan = walled(home, rooms)
+    if plan is None:
+        return None
+    stated = {
+        name: _moved(graph.room.openings, _placed(graph, pose), plan.floors[name])
+        for name, (graph, pose) in rooms.items()
+    }
+    if not any(stated.values()):
+        return with_openings(replace(plan, home=_reached(plan)))
+    return replace(plan, openings=_shared(plan, stated))
+
+
+def _placed(graph: SceneGraph, pose: np.ndarray) -> np.ndarray:
+    """(k, 2) float, the floor of a room in the home's frame, as stated."""
+    found: np.ndarray = graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
+    return found
+
+
+def walled(home: HomeGraph, rooms: Placed) -> Plan | None:
+    """The floors of rooms and the walls between them, without openings; as `given_plan`.
+
+    Floors that meet are taken to end in the middle of their wall and lose half of it.
     """
     corners = {}
     for name, (graph, pose) in rooms.items():
         if graph.room.corners is None:
             return None
-        corners[name] = graph.room.corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
+        corners[name] = _placed(graph, pose)
     shapes = {name: shapely.Polygon(floor) for name, floor in corners.items()}
     if any(shapes[a].intersection(shapes[b]).area > APART for a, b in combinations(shapes, 2)):
         return None
@@ -101,13 +123,8 @@ def given_plan(home: HomeGraph, rooms: Placed) -> Plan | None:
         name: tuple(rectangles(shapely.Polygon(cell - low)))[:2] if len(cell) in (4, 6) else ()
         for name, cell in cells.items()
     }
-    plan = Plan(
-        home, cells, walls, {name: () for name in cells}, lie, {name: pose for name, (_, pose) in rooms.items()}
-    )
-    stated = {name: _moved(graph.room.openings, corners[name], floors[name]) for name, (graph, _) in rooms.items()}
-    if not any(stated.values()):
-        return with_openings(replace(plan, home=_reached(plan)))
-    return replace(plan, openings=_shared(plan, stated))
+    poses = {name: pose for name, (_, pose) in rooms.items()}
+    return Plan(home, cells, walls, {name: () for name in cells}, lie, poses)
 
 
 def _gap(floor: np.ndarray, edge: int, others: list[np.ndarray]) -> float | None:

@@ -26,6 +26,7 @@ PASSAGE = (3.0, 2.3)  # at most
 JAMB = 0.12  # metres from a corner to a hole
 PIER = 0.3  # metres from a corner, or a door, to a window
 WINDOWS = {"": (0.9, 1.3, 2.0), "wet": (1.2, 1.0, 1.2), "outdoor": ()}  # by use: sill, height, width at most
+UNEVEN = 0.15  # metres that a wall may be thicker in one place than in another
 STEP = 0.1  # metres between the places that are tried
 
 
@@ -49,6 +50,7 @@ class Facing:
     low: float
     high: float
     length: float  # from the other's corner to where `low` is, against its own direction
+    deep: float  # metres of wall between the two floors
 
     def across(self, opening: Opening) -> Opening:
         """The hole on the other side of the wall."""
@@ -66,14 +68,15 @@ def facings(one: Floor, other: Floor) -> Iterator[Facing]:
             if outward @ inward_normal(other.corners, other_edge) < 0.999:
                 continue
             start = other.corners[other_edge] - one.corners[edge]
-            if abs(start @ outward - one.walls[edge] - other.walls[other_edge]) > 0.02:
+            deep = float(start @ outward)
+            if abs(deep - one.walls[edge] - other.walls[other_edge]) > UNEVEN:
                 continue
             turned = float(direction(other.corners, other_edge) @ along)
             at = float(start @ along)
             low, high = sorted((at, at + turned * float(other_length)))
             low, high = max(low, 0.0), min(high, float(length))
             if high - low > 0.05:
-                yield Facing(one.name, other.name, edge, other_edge, low, high, at)
+                yield Facing(one.name, other.name, edge, other_edge, low, high, at, deep)
 
 
 def counterpart(floor: Floor, opening: Opening, floors: Iterable[Floor]) -> tuple[str, Opening] | None:

@@ -129,8 +129,7 @@ def doorways(plan: Plan) -> Iterator[tuple[str, np.ndarray]]:
     for (one, other), opening in ways(plan):
         near = segment(floors[one].corners, opening)
         behind = next(f for f in facings(floors[one], floors[other]) if f.edge == opening.edge)
-        deep = plan.walls[one][opening.edge] + plan.walls[other][behind.other_edge]
-        far = near - inward_normal(floors[one].corners, opening.edge) * deep
+        far = near - inward_normal(floors[one].corners, opening.edge) * behind.deep
         name = numbered(f"threshold_{one}_{other}", taken)
         taken.append(name)
         corners = np.concatenate([near, far])

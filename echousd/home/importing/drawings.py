@@ -1,0 +1,263 @@
+"""Drawings: DXF and SVG, in which the names of layers say what a line is; rooms are outlines or lie between walls."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from echousd.graph import GraphError
+from echousd.home.importing.found import MAP, SCREEN, Found, Hole, Piece, Room, long_sides, rooms_between, span
+
+# First match wins: what the name of a layer, group, class or block means.
+MEANINGS = tuple(
+    (kind, re.compile(words))
+    for kind, words in (
+        ("window", r"window|glaz|fenster|fenetre|ventana|finestra|janela"),
+        ("door", r"door|tuer|tür|porte|puerta|porta\b"),
+        ("passage", r"passage|opening|durchgang|archway"),
+        ("piece", r"furn|moebel|möbel|mobilier|muebl|arred|sanit|equip|fixture|appliance|kitchen ?unit"),
+        ("wall", r"wall|wand|mauer|mur\b|murs\b|muro|parete|parede"),
+        ("room", r"room|space|raum|räume|raeume|zimmer|area|zone|piece|habit|ambient|comodo"),
+    )
+)
+MOST = 200_000  # strokes of a drawing
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """A polyline: what its layer is called, (k, 2) points in metres in the source's axes, and whether it is closed."""
+
+    layer: str
+    points: np.ndarray
+    closed: bool = False
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A symbol that is set into a drawing: its layer and name, and (k, 2) points of all that it draws."""
+
+    layer: str
+    name: str
+    points: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Lines, symbols and (text, (2) where) labels of a drawing."""
+
+    strokes: Sequence[Stroke]
+    blocks: Sequence[Block] = ()
+    labels: Sequence[tuple[str, np.ndarray]] = ()
+    ignored: Counter[str] = field(default_factory=Counter)
+
+
+def meaning(*words: str) -> str:
+    """What a layer's or block's names say that it is: window, door, passage, piece, wall, room or nothing."""
+    text = " ".join(words).lower().replace("_", " ").replace("-", " ")
+    return next((kind for kind, pattern in MEANINGS if pattern.search(text)), "")
+
+
+def found_in(drawing: Drawing, axes: np.ndarray, frame: str) -> Found:
+    """What a drawing shows; raises `GraphError` where it has neither outlines of rooms nor walls that enclose any."""
+    kinds: dict[str, list[Stroke]] = {}
+    ignored = Counter(drawing.ignored)
+    for stroke in drawing.strokes:
+        kind = meaning(stroke.layer)
+        kinds.setdefault(kind, []).append(stroke)
+        if not kind:
+            ignored[f"lines on layer {stroke.layer or '0'!r}"] += 1
+    labels = [(text, axes @ where) for text, where in drawing.labels]
+    rooms = list(_rooms(kinds, labels, axes))
+    if not rooms:
+        layers = Counter(stroke.layer or "0" for stroke in drawing.strokes)
+        told = ", ".join(f"{name} ({count})" for name, count in layers.most_common(6)) or "none"
+        raise GraphError(
+            f"no rooms; layers: {told}; allowed: closed lines on a layer such as 'room', or lines that "
+            "enclose rooms on one such as 'wall'"
+        )
+    holes = [
+        Hole(f"{kind}_{number + 1}", kind, ends, tips=tips)
+        for kind in ("door", "passage", "window")
+        for number, (ends, tips) in enumerate(_holes(kinds.get(kind, ()), drawing.blocks, kind, axes))
+    ]
+    pieces = []
+    symbols = [b for b in drawing.blocks if meaning(b.layer, b.name) in ("piece", "") and len(b.points)]
+    for block in [*symbols, *(Block(s.layer, s.name, s.points) for s in kinds.get("piece", ()) if s.closed)]:
+        middle, along, width, deep = long_sides(block.points @ axes.T)
+        if min(width, deep) > 0.05:
+            at, size = np.array([middle[0], 0.0, middle[1]]), np.array([width, np.nan, deep])
+            pieces.append(Piece(block.name, (block.name,), at, np.array([-along[1], along[0]]), size, sides=4))
+    lines = [stroke.points @ axes.T for stroke in drawing.strokes]
+    return Found(frame, rooms, holes, pieces, lines=lines, ignored=ignored)
+
+
+def _rooms(
+    kinds: dict[str, list[Stroke]], labels: Sequence[tuple[str, np.ndarray]], axes: np.ndarray
+) -> Iterator[Room]:
+    """Outlines that are drawn, else what walls and the holes in them enclose; named by the text in them."""
+    outlines = [(s.name, s.points @ axes.T) for s in kinds.get("room", ()) if s.closed]
+    if not outlines:
+        walls = [np.vstack([s.points, s.points[:1]]) if s.closed else s.points for s in kinds.get("wall", ())]
+        walls += [s.points for kind in ("door", "window", "passage") for s in kinds.get(kind, ())]
+        outlines = [("", corners) for corners in rooms_between([points @ axes.T for points in walls])]
+    for number, (name, corners) in enumerate(outlines):
+        shape = shapely.Polygon(corners) if len(corners) > 2 else shapely.Polygon()
+        inside = [text for text, where in labels if shape.contains(shapely.Point(where))]
+        words = tuple(filter(None, (name, *inside)))
+        yield Room(words[0] if words else f"room_{number + 1}", words, corners)
+
+
+def _holes(
+    strokes: Sequence[Stroke], blocks: Sequence[Block], kind: str, axes: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """Ends, and tips of leaves: a symbol's long side, the radius of an arc, the middle of a box, or a line itself."""
+    for block in blocks:
+        if meaning(block.layer, block.name) == kind and len(block.points):
+            middle, along, width, deep = long_sides(block.points @ axes.T)
+            across = np.array([-along[1], along[0]])
+            sides = [middle + across * deep / 2 * way for way in (-1, 1)]  # a leaf stands open within its symbol
+            ends = [span(side, along, width)[0] for side in sides]
+            ends += [span(middle + along * width / 2 * way, across, deep)[0] for way in (-1, 1)] if deep > 0.5 else []
+            yield np.array([span(middle, along, width)[0], *ends]), None
+    arcs = [found for stroke in strokes if (found := _arc(stroke.points @ axes.T)) is not None]
+    yield from ((arc, arc[::-1, 1]) for arc in arcs)
+    for stroke in strokes if not arcs else ():
+        middle, along, width, _ = long_sides(stroke.points @ axes.T)
+        yield span(middle, along, width), None
+
+
+def _arc(points: np.ndarray) -> np.ndarray | None:
+    """(2, 2, 2) float: from the middle of an arc, where the hinge is, to both of its ends; None for other lines."""
+    if len(points) < 4:
+        return None
+    first, last, between = points[0], points[-1], points[len(points) // 2]
+    rows = 2 * np.array([between - first, last - first])
+    if abs(np.linalg.det(rows)) < 1e-6:
+        return None
+    hinge = np.linalg.solve(rows, [between @ between - first @ first, last @ last - first @ first])
+    radii = np.linalg.norm(points - hinge, axis=1)
+    if np.ptp(radii) > 0.03 or not 0.4 < radii[0] < 2.5:
+        return None
+    return np.array([[hinge, first], [hinge, last]])
+
+
+# -- DXF ---------------------------------------------------------------------------------------------------------------
+
+
+def read_dxf(path: Path, unit: float | None) -> Found:
+    """A DXF in the unit that it states, or in `unit` metres; x is east, y north. Raises `GraphError`."""
+    try:
+        import ezdxf
+        from ezdxf import path as paths
+        from ezdxf import recover
+        from ezdxf.enums import InsertUnits
+        from ezdxf.units import conversion_factor
+    except ImportError:
+        raise GraphError('DXF needs ezdxf: pip install "echousd[dxf]"') from None
+    try:
+        document, _ = recover.readfile(path)
+    except (ezdxf.DXFError, OSError, ValueError) as error:
+        raise GraphError(f"cannot be read as DXF ({error})") from None
+    stated = document.units
+    if unit is None and stated == 0:
+        raise GraphError("states no unit ($INSUNITS), allowed: --unit m, cm, mm, in, ft or metres of one unit")
+    scale = unit if unit is not None else float(conversion_factor(InsertUnits(stated), InsertUnits.Meters))
+    strokes, blocks, labels, ignored = [], [], [], Counter[str]()
+
+    def points(entity: Any) -> np.ndarray:
+        drawn = paths.make_path(entity)
+        return np.array([(p.x, p.y) for p in drawn.flattening(0.02 / scale, segments=8)]).reshape(-1, 2) * scale
+
+    def shown(entity: Any) -> Iterator[Any]:
+        return (one for one in entity.virtual_entities() if one.dxftype() in DRAWN)
+
+    entity: Any
+    for entity in document.modelspace():
+        kind, layer = entity.dxftype(), entity.dxf.layer
+        if kind in DRAWN:
+            closed = bool(getattr(entity, "closed", False) or getattr(entity, "is_closed", False))
+            strokes.append(Stroke(layer, points(entity), closed))
+        elif kind == "INSERT":
+            parts = [points(one) for one in shown(entity)]
+            blocks.append(Block(layer, entity.dxf.name, np.concatenate(parts) if parts else np.zeros((0, 2))))
+        elif kind in ("TEXT", "MTEXT"):
+            text = entity.dxf.text if kind == "TEXT" else entity.plain_text()
+            where = entity.get_placement()[1] if kind == "TEXT" else entity.dxf.insert
+            labels.append((text.split("\n")[0].strip(), np.array([where.x, where.y]) * scale))
+        else:
+            ignored[kind.lower()] += 1
+        if len(strokes) > MOST:
+            raise GraphError(f"more than {MOST} lines, allowed: that many")
+    told = f"{scale:g} m a unit ({'as told' if unit is not None else 'as the file says'}), x is east, y north"
+    return found_in(Drawing(strokes, blocks, labels, ignored), MAP, told)
+
+
+DRAWN = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
+
+# -- SVG ---------------------------------------------------------------------------------------------------------------
+
+
+def read_svg(content: bytes, unit: float | None) -> Found:
+    """An SVG of which one unit is `unit` metres; x is east, y south. Raises `GraphError`."""
+    try:
+        import svgelements
+    except ImportError:
+        raise GraphError('SVG needs svgelements: pip install "echousd[svg]"') from None
+    from xml.etree.ElementTree import ParseError
+
+    if unit is None:
+        raise GraphError(
+            "an SVG has no scale, allowed: --unit with the metres of one of its units, such as --unit 0.01"
+        )
+    if b"<!ENTITY" in content:
+        raise GraphError("defines entities, allowed: none")
+    try:
+        shown = svgelements.SVG.parse(io.BytesIO(content), ppi=96, reify=True)
+    except (ParseError, ValueError) as error:
+        raise GraphError(f"cannot be read as SVG ({error})") from None
+    box = getattr(shown, "viewbox", None)
+    unit = unit * (
+        box.width / shown.width if box and box.width and shown.width else 1.0
+    )  # the size on paper is no scale
+    strokes: list[Stroke] = []
+    labels = []
+
+    def walk(group: Any, layer: str) -> None:
+        for one in group:
+            values = getattr(one, "values", {})
+            own = " ".join(filter(None, (values.get("class"), one.id, values.get(INKSCAPE))))
+            if isinstance(one, svgelements.Group):
+                walk(one, f"{layer} {own}".strip())
+            elif isinstance(one, svgelements.Text):
+                labels.append((str(one.text), np.array([one.x, one.y], float) * unit))
+            elif isinstance(one, svgelements.Shape):
+                for part in svgelements.Path(one).as_subpaths():
+                    line = svgelements.Path(part)
+                    dots = [line.point(t) for t in np.linspace(0, 1, 17)] if _curved(line, svgelements) else [
+                        segment.end for segment in line
+                    ]  # fmt: skip
+                    points = np.array([(p.x, p.y) for p in dots if p is not None], float) * unit
+                    closed = any(isinstance(segment, svgelements.Close) for segment in line)
+                    if len(points) > 1:
+                        strokes.append(Stroke(own if meaning(own) else layer, points, closed, one.id or ""))
+
+    walk(shown, "")
+    if len(strokes) > MOST:
+        raise GraphError(f"more than {MOST} lines, allowed: that many")
+    return found_in(Drawing(strokes, (), labels), SCREEN, f"{unit:g} m a unit (as told), up of the picture is north")
+
+
+INKSCAPE = "{http://www.inkscape.org/namespaces/inkscape}label"
+
+
+def _curved(line: Any, svgelements: Any) -> bool:
+    return any(isinstance(s, svgelements.Arc | svgelements.CubicBezier | svgelements.QuadraticBezier) for s in line)

@@ -1,0 +1,123 @@
+"""Which formats of floor plans are read, how each is known, and by whom it is read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from echomodel.files import read_bounded, within_memory
+from echousd.graph import GraphError
+from echousd.home.importing.drawings import read_dxf, read_svg
+from echousd.home.importing.found import Found
+from echousd.home.importing.ifc import read_ifc
+from echousd.home.importing.scans import read_roomplan, read_sweethome
+from echousd.home.importing.simulators import read_infinigen, read_procthor, read_sage, read_scenesmith
+
+MOST = 256 * 2**20  # bytes of a file
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: what it is called, how a file in it ends, whether it needs a unit to be told, and its reader.
+
+    Arguments:
+        told: of JSON, whether this is the format of some data; None for others.
+        read: of a path and a unit in metres (`None` = as the file says), or of the data.
+    """
+
+    name: str
+    ending: str
+    read: Callable[..., Found]
+    told: Callable[[Any], bool] | None = None
+    metric: bool = True  # always in one unit, so that none can be told
+
+
+def _first(data: Any, key: str) -> Any:
+    """The first entry under a key, {} where there is none."""
+    found = data.get(key)
+    entries = list(found.values()) if isinstance(found, dict) else found
+    return entries[0] if isinstance(entries, list) and entries and isinstance(entries[0], dict) else {}
+
+
+def _scan(data: Any) -> Any:
+    return _first(data, "rooms") or data
+
+
+FORMATS = (
+    Format("dxf", ".dxf", read_dxf, metric=False),
+    Format("ifc", ".ifc", read_ifc, metric=False),
+    Format("svg", ".svg", lambda path, unit: read_svg(read_bounded(path, MOST), unit), metric=False),
+    Format("sweethome", ".sh3d", lambda path, unit: read_sweethome(read_bounded(path, MOST), path.name)),
+    Format("scenesmith", ".json", read_scenesmith, lambda data: "placed_rooms" in data),
+    Format("procthor", ".json", read_procthor, lambda data: "floorPolygon" in _first(data, "rooms")),
+    Format("roomplan", ".json", read_roomplan, lambda data: "transform" in _first(_scan(data), "walls")),
+    Format("sage", ".json", read_sage, lambda data: {"room_type", "walls"} <= _first(data, "rooms").keys()),
+    Format("infinigen", ".json", read_infinigen, lambda data: bool({"shape", "operation"} & {*_first(data, "rooms")})),
+)
+
+
+def unit_of(text: str | None) -> float | None:
+    """Metres of a unit by its name or as a number; raises `GraphError`."""
+    if text is None or text in UNITS:
+        return None if text is None else UNITS[text]
+    try:
+        metres = float(text)
+    except ValueError:
+        metres = 0.0
+    if not 1e-6 <= metres <= 1e4:
+        raise GraphError(f"--unit {text!r}, allowed: {', '.join(UNITS)} or metres of one unit")
+    return metres
+
+
+def read_plan(path: Path, form: str | None = None, unit: float | None = None) -> tuple[str, Found]:
+    """The name of the format of somebody's floor plan, and what is in it.
+
+    Arguments:
+        form: its format, where that is not to be found out. unit: metres of a unit, where the file does not say.
+
+    Raises `GraphError` that names the file.
+    """
+    try:
+        chosen, data = _format_of(path, form)
+        if unit is not None and chosen.metric:
+            raise GraphError(f"--unit: {chosen.name} is always in one unit, allowed: to leave it out")
+        with within_memory(path):
+            return chosen.name, chosen.read(data) if chosen.told else chosen.read(path, unit)
+    except GraphError as error:
+        told = str(error)
+        raise GraphError(told if told.startswith(str(path)) else f"{path}: {told}") from None
+    except OSError as error:
+        raise GraphError(f"{path}: {(error.strerror or str(error)).lower()}") from None
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        said = f"{error} is missing" if isinstance(error, KeyError) else str(error).splitlines()[0]
+        raise GraphError(
+            f"{path}: not as {form or path.suffix.lstrip('.')} has it ({said})".replace(
+                f"{path}: {path}: ", f"{path}: "
+            )
+        ) from None
+
+
+def _format_of(path: Path, form: str | None) -> tuple[Format, Any]:
+    """The format of a file, and of JSON its data."""
+    names = ", ".join(dict.fromkeys(one.name for one in FORMATS))
+    if form is not None and form not in [one.name for one in FORMATS]:
+        raise GraphError(f"--format {form!r}, allowed: {names}")
+    fitting = [one for one in FORMATS if one.name == form or (form is None and one.ending == path.suffix.lower())]
+    if not fitting:
+        raise GraphError(f"extension {path.suffix!r}, allowed: {', '.join(dict.fromkeys(f.ending for f in FORMATS))}")
+    if fitting[0].told is None:
+        if path.stat().st_size > MOST:
+            raise GraphError(f"{path.stat().st_size} bytes, allowed: at most {MOST}")
+        return fitting[0], None
+    data = json.loads(read_bounded(path, MOST))
+    if not isinstance(data, dict):
+        raise GraphError("no plan that is known, allowed: an object with rooms")
+    known = [one for one in fitting if form or (one.told is not None and one.told(data))]
+    if not known:
+        names = ", ".join(one.name for one in FORMATS if one.told)
+        raise GraphError(f"no plan that is known, allowed: JSON of {names}")
+    return known[0], data

@@ -1,0 +1,172 @@
+"""Houses of simulators: ProcTHOR and Holodeck (Unity), SceneSmith, SAGE and Infinigen's plans (z up); all metres."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import shapely
+
+from echousd.home.importing.found import MAP, Found, Hole, Piece, Room, long_sides, span
+
+UNITY = "metres, left-handed with +Y up as Unity has it; its +z is our north"
+Z_UP = "metres, z up; its +y is our north"
+SHAPE = re.compile(r"\s*(?:shapely\.)?(box|Polygon|LineString)\s*\((.*)\)\s*", re.DOTALL)
+LONGEST = 20_000  # characters of one shape
+
+
+def read_procthor(data: Any) -> Found:
+    """ProcTHOR 1.0.0 and Holodeck: walls without a surface are passages, holes count along their first wall."""
+    rooms = [
+        Room(str(one["id"]), (str(one["roomType"]),), _flat(one["floorPolygon"]), _ceiling(one, data))
+        for one in data["rooms"]
+    ]
+    walls = {str(wall["id"]): _flat(wall["polygon"]) for wall in data.get("walls", ()) if wall.get("polygon")}
+    holes = []
+    for kind in ("door", "window"):
+        for one in data.get(f"{kind}s", ()):
+            low, high = one["holePolygon"][:2]
+            if one.get(f"{kind}Segment"):
+                ends = np.array(one[f"{kind}Segment"], float) @ MAP.T
+            else:
+                start, *_ = corners = walls[str(one["wall0"])]
+                along = corners[np.linalg.norm(corners - start, axis=1).argmax()] - start
+                unit = along / np.linalg.norm(along)
+                ends = start + unit * np.array([[low["x"]], [high["x"]]], float)
+            passage = str(one.get("assetId", "")).startswith("Doorframe")  # without a leaf
+            height = abs(high["y"] - low["y"])
+            sill = min(low["y"], high["y"]) if kind == "window" else None
+            holes.append(Hole(str(one["id"]), "passage" if passage else kind, ends[None], height, sill))
+    holes += [Hole(str(wall["id"]), "passage", walls[str(wall["id"])][None, :2]) for wall in _open_walls(data)]
+    by_name = {room.name: shapely.Polygon(room.corners) for room in rooms}
+    for pair in data.get("open_room_pairs", ()):
+        shared = by_name[str(pair[0])].intersection(by_name[str(pair[1])])
+        if shared.length > 0.5:
+            ends = np.array(shapely.line_merge(shared).minimum_rotated_rectangle.coords)[[0, -1]]
+            holes.append(Hole(f"{pair[0]} open to {pair[1]}", "passage", ends[None]))
+    pieces, ignored = [], Counter[str]()
+    for one in data.get("objects", ()):
+        ignored["small things on furniture"] += len(one.get("children") or ())
+        where, turn = one["position"], math.radians(one.get("rotation", {}).get("y", 0.0))
+        at = np.array([where["z"], where["y"], where["x"]], float)
+        word = str(one.get("object_name") or one["id"]).split("|")[0].split("-")[0]
+        front = np.array([math.cos(turn), math.sin(turn)])
+        pieces.append(Piece(word, (word, str(one.get("assetId", ""))), at, front))
+    return Found(UNITY, rooms, holes, pieces, ignored=ignored)
+
+
+def _flat(corners: Any) -> np.ndarray:
+    return np.array([(corner["x"], corner["z"]) for corner in corners], float) @ MAP.T
+
+
+def _ceiling(room: Any, data: Any) -> float | None:
+    tops = [c["y"] for wall in data.get("walls", ()) if wall.get("roomId") == room["id"] for c in wall["polygon"]]
+    return data.get("wall_height") or max(tops, default=None)
+
+
+def _open_walls(data: Any) -> list[Any]:
+    """One of each two walls without a surface."""
+    found: dict[Any, Any] = {}
+    for wall in data.get("walls", ()):
+        if wall.get("empty"):
+            found.setdefault(tuple(sorted({(c["x"], c["z"]) for c in wall["polygon"]})), wall)
+    return list(found.values())
+
+
+def read_scenesmith(data: Any) -> Found:
+    """SceneSmith's house layout: rectangles with walls and what opens in them, from a wall's start to its near side."""
+    kinds = {str(room["id"]): str(room.get("type", "")) for room in data.get("rooms", ())}
+    rooms: list[Room] = []
+    holes: dict[str, Hole] = {}
+    for room in data["placed_rooms"]:
+        name, walls = str(room["room_id"]), room["walls"]
+        low, high = (
+            f([[p[0], p[1]] for w in walls for p in (w["start_point"], w["end_point"])], axis=0)
+            for f in (np.min, np.max)
+        )
+        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ MAP.T
+        rooms.append(Room(name, (kinds.get(name, ""), name), corners, data.get("wall_height")))
+        for wall in walls:
+            start, end = (np.array(wall[key][:2], float) @ MAP.T for key in ("start_point", "end_point"))
+            unit = (end - start) / np.linalg.norm(end - start)
+            for one in wall.get("openings", ()):
+                kind = str(one["opening_type"]).lower().replace("open", "passage")
+                ends = start + unit * np.array(
+                    [[one["position_along_wall"]], [one["position_along_wall"] + one["width"]]]
+                )
+                key = str(one["opening_id"])
+                holes.setdefault(key, Hole(key, kind, ends[None], one.get("height"), one.get("sill_height")))
+    return Found(Z_UP, rooms, [*holes.values()])
+
+
+def read_sage(data: Any) -> Found:
+    """SAGE's layout: rooms with walls, doors and windows at a share of their wall, objects as boxes."""
+    rooms, holes, pieces = [], [], []
+    for room in data["rooms"]:
+        points = {str(w["id"]): np.array([_xy(w["start_point"]), _xy(w["end_point"])]) @ MAP.T for w in room["walls"]}
+        box = shapely.MultiPoint(np.concatenate([*points.values()])).envelope
+        corners = np.array(box.exterior.coords)[:-1]
+        words = (str(room["room_type"]),)
+        rooms.append(Room(str(room.get("id", room["room_type"])), words, corners, room.get("ceiling_height")))
+        for kind in ("door", "window"):
+            for one in room.get(f"{kind}s", ()):
+                start, end = points[str(one["wall_id"])]
+                ends = span(start + (end - start) * one["position_on_wall"], end - start, one["width"])
+                kind_of = "passage" if one.get("opening") is True and kind == "door" else kind
+                holes.append(Hole(str(one["id"]), kind_of, ends, one.get("height"), one.get("sill_height")))
+        for one in room.get("objects", ()):
+            turn = math.radians((one.get("rotation") or {}).get("z", 0.0))
+            size, where = one["dimensions"], one["position"]
+            at = np.array([where["y"], where.get("z", 0.0), where["x"]], float)
+            front = np.array([math.cos(turn), -math.sin(turn)])  # +y of the source, turned about its z
+            extents = np.array([size["width"], size["height"], size["length"]], float)
+            pieces.append(Piece(str(one["type"]), (str(one["type"]),), at, front, extents, sides=2))
+    return Found(Z_UP, rooms, holes, pieces)
+
+
+def _xy(point: Any) -> tuple[float, float]:
+    return (point["x"], point["y"]) if isinstance(point, dict) else (point[0], point[1])
+
+
+def read_infinigen(data: Any) -> Found:
+    """Infinigen's plans: shapes by name, stated as a call of shapely's or as its name and arguments; none is called."""
+    rooms = []
+    for name, entry in data["rooms"].items():
+        words, _, number = name.partition("_")
+        level = number.partition("/")[0]
+        rooms.append(Room(name, (words.replace("-", " "),), _shape(name, entry), storey=level))
+    levels = sorted({room.storey for room in rooms})
+    holes = [
+        Hole(name, kind, _ends(name, entry))
+        for key, kind in (("doors", "door"), ("opens", "passage"), ("interiors", "passage"), ("windows", "window"))
+        for name, entry in (data.get(key) or {}).items()
+    ]
+    entrance = data.get("entrance")
+    if isinstance(entrance, dict) and ("shape" in entrance or "operation" in entrance):
+        holes.append(Hole("entrance", "door", _ends("entrance", entrance)))
+    return Found(Z_UP, rooms, holes, storeys=levels)
+
+
+def _ends(name: str, entry: Any) -> np.ndarray:
+    middle, along, length, _ = long_sides(_shape(name, entry))
+    return span(middle, along, length)
+
+
+def _shape(name: str, entry: Any) -> np.ndarray:
+    """(k, 2) float, the points of a shape."""
+    if isinstance(entry, dict) and "operation" in entry:
+        kind, args = str(entry["operation"]).rpartition(".")[2], entry["args"]
+    else:
+        text = str(entry["shape"] if isinstance(entry, dict) else entry)
+        match = SHAPE.fullmatch(text[:LONGEST])
+        if match is None:
+            raise ValueError(f"{name}: {text[:60]!r}, allowed: shapely.box, Polygon or LineString of numbers")
+        kind, args = match[1], list(ast.literal_eval(f"({match[2]},)"))  # numbers in brackets, nothing is run
+    if kind == "box":
+        low_x, low_y, high_x, high_y = args
+        args = [[(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]]
+    return np.array(args[0], float)[:, :2] @ MAP.T
