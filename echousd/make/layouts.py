@@ -132,7 +132,7 @@ def best_boxes(
             if drafts == 1 or not place:
                 return found
             with timer.stage("place"), one_thread():
-                wrong = _wishes(graph, found, proposed)
+                wrong = _wishes(graph, found, draws.seed if proposed else None)
             if best is None or wrong < worth:
                 best, worth = found, wrong
             if not any(worth):
@@ -164,16 +164,18 @@ def draft_rounds(drafts: int) -> list[tuple[int, int]]:
     return out
 
 
-def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], proposed: bool) -> tuple[float, ...]:
+def _wishes(graph: SceneGraph, found: tuple[Boxes, tuple[str, ...]], seed: int | None) -> tuple[float, ...]:
     """What a layout leaves to be wished for, the worse first: what is broken or collides, conflicts, living faults.
 
     Arguments:
-        proposed: faults of openings come last, as these may still be moved.
+        seed: where nobody stated the openings, that by which they make way; None = they stay.
     """
     from echousd.place.living import living_faults
 
     boxes, conflicts = found
-    late = [proposed and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
+    if seed is not None:
+        graph = with_free_openings(graph, [boxes], seed)
+    late = [seed is not None and fault.rule in OF_OPENINGS for fault in living_faults(graph, boxes)]
     return len(layout_outcome(graph, boxes).faults), len(conflicts), len(late) - sum(late), sum(late)
 
 

@@ -10,6 +10,7 @@ from echomodel.boxes import Boxes
 from echomodel.openings import Opening
 from echomodel.rooms.generator import generate_rooms
 from echousd.graph import Node, RoomSpec, SceneGraph
+from echousd.make import layouts
 from echousd.make.layouts import backlit, with_free_openings
 from echousd.make.verdicts import colliding
 from echousd.place.living import living_faults
@@ -64,3 +65,14 @@ def test_windows_that_nobody_stated_are_not_put_behind_the_television():
     moved = with_free_openings(stated, [boxes], seed=0)
     assert any(opening.kind == "window" for opening in moved.room.openings)
     assert backlit(moved, boxes) == 0
+
+
+def test_a_door_that_may_make_way_asks_for_no_further_draft():
+    """What stands before an opening that nobody stated is worth no second layout: the opening goes elsewhere."""
+    room = RoomSpec("living_room", size=(4.6, 4.4))
+    boxes = Boxes(torch.tensor([(2.0, 0.85, 0.9)]), torch.tensor([(0.0, 0.0, -1.7)]), torch.tensor([0.0]))
+    door = Opening("door", "door", 0, 1.85, 0.9, 2.0)
+    graph = SceneGraph(room.replaced(openings=(door,)), (Node("sofa", "multi_seat_sofa"),))
+    assert [fault.rule for fault in living_faults(graph, boxes)] == ["door_free"]
+    assert sum(layouts._wishes(graph, (boxes, ()), None)) == 1
+    assert not any(layouts._wishes(graph, (boxes, ()), 0))
