@@ -109,6 +109,11 @@ def digest(content: bytes) -> str:
     return hashlib.blake2b(content, digest_size=16).hexdigest()
 
 
+def cache_folder() -> Path:
+    """Where what was computed once is kept for later: `$ECHOUSD_CACHE`, else `~/.cache/echousd`; it may not exist."""
+    return Path(os.environ.get("ECHOUSD_CACHE") or Path.home() / ".cache" / "echousd")
+
+
 def flush(path: Path) -> None:
     """Have the system write a file, or the names in a folder, to the disk before anything that comes after it."""
     if path.is_dir() and os.name != "posix":

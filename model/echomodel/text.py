@@ -13,7 +13,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from torch import Tensor
 
-from echomodel.files import whole_file
+from echomodel.files import cache_folder, whole_file
 
 PUBLISHED_MODEL, PUBLISHED_WEIGHTS = "ViT-B-32-quickgelu", "openai"  # OpenAI's ViT-B/32 was trained with the quick GELU
 
@@ -136,13 +136,12 @@ class CachedTextEncoder:
 
     Arguments:
         encoder: what computes texts that are not cached.
-        folder: where the files lie; None = `$ECHOUSD_CACHE`, else `~/.cache/echousd`.
+        folder: where the files lie; None = `echomodel.files.cache_folder`.
     """
 
     def __init__(self, encoder: TextEncoder, folder: str | os.PathLike[str] | None = None) -> None:
         self.encoder = encoder
-        base = folder or os.environ.get("ECHOUSD_CACHE") or Path.home() / ".cache" / "echousd"
-        self.path = Path(base) / f"text-{encoder.name}.safetensors"
+        self.path = Path(folder or cache_folder()) / f"text-{encoder.name}.safetensors"
         self._known: dict[str, Tensor] | None = None
 
     @property

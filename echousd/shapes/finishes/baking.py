@@ -3,16 +3,59 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
-from functools import cache
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache, wraps
+from pathlib import Path
+from typing import TypeVar, cast
 
 import numpy as np
+import PIL
 
+from echomodel.files import cache_folder, digest
 from echousd.shapes.finishes.harmonies import HARMONIES, Color, linear
 from echousd.shapes.finishes.patterns import SIZE, noise, relief
 from echousd.srgb import from_linear
 
+Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
+
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
+
+
+def kept(bake: Bake) -> Bake:
+    """A function that bakes an image, its results kept in memory and, for later processes, in the cache on disk.
+
+    What is found there was baked by the same code and libraries from the same arguments; what is damaged is baked anew,
+    and where nothing can be written nothing is kept.
+    """
+
+    @cache
+    @wraps(bake)
+    def found(*asked: object) -> bytes | None:
+        file = cache_folder() / "images" / digest(repr((bake.__name__, asked, _code())).encode())
+        try:
+            content = file.read_bytes()
+        except OSError:
+            content = b""
+        told, image = content[:32], content[32:]
+        if told != digest(image).encode():
+            image = bake(*asked) or b""
+            with suppress(OSError):
+                file.parent.mkdir(parents=True, exist_ok=True)
+                beside = file.with_name(f".{file.name}.{os.getpid()}")
+                beside.write_bytes(digest(image).encode() + image)
+                beside.replace(file)
+        return image or None
+
+    return cast("Bake", found)
+
+
+@cache
+def _code() -> str:
+    """What decides on the bytes of an image besides its arguments: the programs here and the libraries."""
+    sources = [*sorted(Path(__file__).parent.glob("*.py")), Path(__file__).parents[2] / "srgb.py"]
+    return digest(b"".join([*(f.read_bytes() for f in sources), np.__version__.encode(), PIL.__version__.encode()]))
 
 
 def hexadecimal(color: Color) -> str:
@@ -20,7 +63,7 @@ def hexadecimal(color: Color) -> str:
     return "".join(f"{int(v * 255 + 0.5):02x}" for v in from_linear(np.clip(np.asarray(color, float), 0, 1)))
 
 
-@cache
+@kept
 def color_image(pattern: str, color: Color, harmony: str) -> bytes:
     """A pattern in a colour (linear RGB), or a painting in the colours of a harmony, as JPEG."""
     if pattern.startswith("painting_"):
@@ -32,7 +75,7 @@ def color_image(pattern: str, color: Color, harmony: str) -> bytes:
     return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
 
 
-@cache
+@kept
 def normal_image(pattern: str, metres: float) -> bytes | None:
     """Tangent-space normals of a pattern that covers `metres`, +Y up as UsdPreviewSurface takes it; None if flat."""
     height = None if pattern.startswith("painting_") else relief(pattern).height
@@ -46,14 +89,14 @@ def normal_image(pattern: str, metres: float) -> bytes | None:
     return _encoded(normal / 2 + 0.5, 78)
 
 
-@cache
+@kept
 def rough_image(pattern: str, roughness: float) -> bytes | None:
     """Roughness about a mean, grey; None where it is even."""
     rough = None if pattern.startswith("painting_") else relief(pattern).rough
     return None if rough is None else _encoded(np.clip(roughness + rough, 0.05, 1), 70)
 
 
-@cache
+@kept
 def sky_image() -> bytes:
     """What lies around a room, for its dome light, as JPEG."""
     return _jpeg(sky())

@@ -148,3 +148,32 @@ def test_labels_say_what_things_are_made_of():
         "ceramic", "fabric", "foliage", "fruit", "glass", "leather", "linen", "metal", "paper", "plaster", "print",
         "soil", "wax", "wicker", "wood", "wool",
     }  # fmt: skip
+
+
+def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
+    """The same bytes without baking; what is damaged, or was baked by other programs, is baked anew."""
+    monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "cache"))
+    baked = []
+
+    @baking.kept
+    def image(pattern, size):
+        baked.append(pattern)
+        return b"" if size is None else pattern.encode() * size
+
+    def later(*asked):
+        image.cache_clear()
+        return image(*asked)
+
+    assert [later("oak", 3), later("oak", 3), later("elm", None), later("elm", None)] == [b"oakoakoak"] * 2 + [None] * 2
+    assert baked == ["oak", "elm"]
+    for file in (tmp_path / "cache/images").iterdir():
+        file.write_bytes(file.read_bytes()[:-1] + b"?")
+    assert later("oak", 3) == b"oakoakoak"
+    assert baked == ["oak", "elm", "oak"]
+    monkeypatch.setattr(baking, "_code", lambda: "of later")
+    assert later("oak", 3) == b"oakoakoak"
+    assert len(baked) == 4
+    monkeypatch.setenv("ECHOUSD_CACHE", str(tmp_path / "file"))
+    (tmp_path / "file").touch()
+    assert later("oak", 3) == b"oakoakoak"
+    assert len(baked) == 5
