@@ -3,21 +3,27 @@
 PYTHON ?= python3.11
 VENV ?= .venv
 BIN := $(VENV)/bin
+ROOM := $(VENV)/.room
 STAMP := $(VENV)/.installed
 AUDIT := .audit
 
 .PHONY: help room test lint types clients hashes audit benchmarks benchmark eval schema clean
 
 help:
-	@grep -E '^# ' Makefile | cut -c3-
+	@grep -E '^# make' Makefile | cut -c3-
 
-$(STAMP): pyproject.toml setup.py constraints.txt
+# What a room needs, then what tests need: simulators, validators, linters.
+$(ROOM): pyproject.toml setup.py constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check torch -c constraints.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[render]"
+	touch $@
+
+$(STAMP): $(ROOM)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
 	touch $@
 
-room: $(STAMP)
+room: $(ROOM)
 	$(BIN)/echousd generate samples/bedroom.usda -o out/bedroom --seed 7
 
 lint: $(STAMP)
