@@ -119,19 +119,21 @@ def export(
     force: Force = False,
     json: Written = False,
 ) -> None:
-    """Plan a home, or take the plan that it has, and draw it or write it down."""
+    """Plan a home, or take the plan that it has with what stands in it, and draw it or write it down."""
+    from echousd.folder.found import room_at
     from echousd.graph import GraphError
     from echousd.graph.files import STAGE_FORMS
     from echousd.home.draw import PICTURES, draw_plans, write_dxf
     from echousd.home.files import load_home
     from echousd.home.given import plan_of, plan_there
     from echousd.home.plan import plans
-    from echousd.home.stages import write_home
+    from echousd.home.stages import furniture, write_home
 
     started, form = time.perf_counter(), output.suffix.lower()
     _writable(output, (*PICTURES, ".dxf", *STAGE_FORMS[:-1]), force)
     if several > 1 and form not in PICTURES:
         raise GraphError(f"--plans is {several}, allowed with a picture; name one by its --seed")
+    source = room_at(source) if source.is_dir() else source
     home = load_home(source)
     if home is None:
         raise GraphError(f"{source}: no home, allowed: a file with rooms and how they lie to each other")
@@ -139,10 +141,11 @@ def export(
         found = [one] if (one := plan_there(source, home)) else plans(home, several, seed)
     else:
         found = [plan_of(source, home, seed=seed)]
+    things = furniture(found[0], source) if plan_there(source, home) else []
     if form in PICTURES:
-        draw_plans(found, output)
+        draw_plans(found, output, things=things)
     elif form == ".dxf":
-        write_dxf(found[0], output)
+        write_dxf(found[0], output, things)
     else:
         write_home(found[0].home, output, found[0])
     lines = [f"wrote {output}", *(f"plan     {len(one.floors)} rooms, {one.area:.1f} m²" for one in found)]

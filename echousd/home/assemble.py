@@ -15,6 +15,7 @@ import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
 import echousd
+from echomodel.openings import numbered
 from echousd.batches.batch import cores, weights_hash
 from echousd.batches.executor import Executor, LocalWorkers, Task
 from echousd.batches.options import BatchOptions
@@ -22,7 +23,7 @@ from echousd.batches.run import MEMORY
 from echousd.batches.work import Job, room
 from echousd.folder.manifest import find_manifest
 from echousd.home.graph import HomeGraph, home_of_plain
-from echousd.home.plan import Plan
+from echousd.home.plan import Plan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
 from echousd.naming import HOME as ROOT_FILE
 from echousd.naming import HOUSE as MARK
@@ -199,8 +200,6 @@ def home_files(
 
 def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
     """Author floors in the doorways, where those of the rooms end: /House/Plan, one for each way through."""
-    from echousd.home.plan import doorways
-
     stage = Usd.Stage.Open(layer)
     UsdGeom.Scope.Define(stage, f"{HOME}/Plan")
     look = UsdShade.Material.Define(stage, f"{HOME}/Plan/Looks/threshold")
@@ -208,7 +207,10 @@ def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(THRESHOLD)
     look.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
-    for name, corners in doorways(plan):
+    taken: list[str] = []
+    for (one, other), _, corners in doorways(plan):
+        name = numbered(f"threshold_{one}_{other}", taken)
+        taken.append(name)
         path = f"{HOME}/Plan/{name}"
         part = UsdGeom.Xform.Define(stage, path)
         Usd.ModelAPI(part).SetKind("component")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,13 +12,13 @@ import shapely
 from pxr import Usd
 from scipy import ndimage
 
-from echomodel.openings import inward_normal, segment
-from echomodel.roomboxes import footprints
+from echomodel.openings import STEP, inward_normal, segment
+from echomodel.vocabulary import vocabulary
 from echousd.checks.report import CheckReport, check
 from echousd.home.given import plan_there
 from echousd.home.openings import Floor, counterpart
 from echousd.home.plan import Plan, doorways
-from echousd.stage.contents import read_contents
+from echousd.home.stages import Standing, furniture
 from echousd.stage.files import open_stage
 from echousd.stage.read import find_rooms
 
@@ -68,7 +68,8 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
     if plan is None:
         raise ValueError(f"{path}: no home, allowed: a stage of rooms with floors side by side")
     stage = open_stage(path)
-    reached = walked(plan, stage)
+    ground = Ground.of(plan, furniture(plan, path))
+    reached = walked(plan, ground)
     told = [("broken", f"{relation}: the plan does not keep it") for relation in plan.broken()]
     told += [("walls", says) for says in (*_overlaps(plan), *_openings(plan))]
     told += [
@@ -76,6 +77,7 @@ def check_home(path: Path, *, rules: str = "strict", layout: int | None = None, 
         for name, share in reached.items()
         if share < REACHED
     ]
+    told += [("ways", says) for says in _blocked(plan, ground)]
     rooms = {
         prims.room.GetName(): check(_room_file(prims.room), rules=rules, layout=layout, settle=settle)
         for prims in find_rooms(stage)
@@ -121,33 +123,70 @@ def _openings(plan: Plan) -> Iterator[str]:
                 yield f"{name} and {other}: two leaves in one door, allowed: one"
 
 
-def walked(plan: Plan, stage: Usd.Stage) -> dict[str, float]:
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A home's floors and doorways as cells: points (a, b, 2) in plan, and where the middle of a robot may be."""
+
+    points: np.ndarray
+    open: np.ndarray
+
+    @classmethod
+    def of(cls, plan: Plan, things: Sequence[Standing]) -> Ground:
+        """The ground of a home with what stands on it in a robot's way."""
+        shapes = [shapely.Polygon(floor) for floor in plan.floors.values()]
+        shapes += [shapely.box(*corners.ravel()).buffer(0.02) for *_, corners in doorways(plan)]
+        whole = shapely.union_all(shapes)
+        low, high = np.array(whole.bounds).reshape(2, 2)
+        xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
+        points = np.stack(np.meshgrid(xs, zs, indexing="ij"), -1)
+        free = shapely.contains_xy(whole, points[..., 0], points[..., 1])
+        for thing in things:
+            if thing.low > LOW or vocabulary().category(thing.node.category).support != "floor":
+                continue
+            corners = thing.corners
+            x, z = (
+                slice(*np.searchsorted(axis, (c.min() - CELL, c.max() + CELL)))
+                for axis, c in zip((xs, zs), corners.T, strict=True)
+            )
+            free[x, z] &= ~shapely.contains_xy(shapely.Polygon(corners), points[x, z, 0], points[x, z, 1])
+        room = (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5) * CELL >= ROBOT - CELL / 2
+        return cls(points, room)
+
+    def on(self, shape: shapely.Geometry) -> np.ndarray:
+        """(a, b) bool: where a robot may be in a part of the plan."""
+        inside: np.ndarray = shapely.contains_xy(shape, self.points[..., 0], self.points[..., 1])
+        return inside & self.open
+
+
+def walked(plan: Plan, ground: Ground) -> dict[str, float]:
     """Of every room the share of its free floor that a robot gets to which enters the home by its front door."""
-    shapes = [shapely.Polygon(floor) for floor in plan.floors.values()]
-    shapes += [shapely.box(*corners.ravel()).buffer(0.02) for _, corners in doorways(plan)]
-    whole = shapely.union_all(shapes)
-    low, high = np.array(whole.bounds).reshape(2, 2)
-    xs, zs = (np.arange(a, b + CELL, CELL) for a, b in zip(low, high, strict=True))
-    points = np.stack(np.meshgrid(xs, zs, indexing="ij"), -1)
-    free = shapely.contains_xy(whole, points[..., 0], points[..., 1])
-    for corners in _things(plan, stage):
-        x, z = (
-            slice(*np.searchsorted(axis, (c.min() - CELL, c.max() + CELL)))
-            for axis, c in zip((xs, zs), corners.T, strict=True)
-        )
-        free[x, z] &= ~shapely.contains_xy(shapely.Polygon(corners), points[x, z, 0], points[x, z, 1])
-    room = (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5) * CELL >= ROBOT - CELL / 2
-    parts, _ = ndimage.label(room)
+    parts, _ = ndimage.label(ground.open)
     start = _start(plan)
-    near = np.hypot(points[..., 0] - start[0], points[..., 1] - start[1]) < 0.6
+    near = np.hypot(ground.points[..., 0] - start[0], ground.points[..., 1] - start[1]) < 0.6
     entered = np.bincount(parts[near], minlength=1)
     entered[0] = 0
-    here = parts == int(entered.argmax()) if entered.any() else np.zeros_like(room)
+    here = parts == int(entered.argmax()) if entered.any() else np.zeros_like(ground.open)
     out = {}
     for name, floor in plan.floors.items():
-        mine = shapely.contains_xy(shapely.Polygon(floor), points[..., 0], points[..., 1]) & room
+        mine = ground.on(shapely.Polygon(floor))
         out[name] = float((here & mine).sum() / mine.sum()) if mine.any() else 0.0
     return out
+
+
+def _blocked(plan: Plan, ground: Ground) -> Iterator[str]:
+    """Doors and passages that furniture stands in, on either side."""
+    for (one, other), opening, corners in doorways(plan):
+        near, inward = segment(plan.floors[one], opening), inward_normal(plan.floors[one], opening.edge)
+        deep = float(np.ptp(corners, 0) @ np.abs(inward)) + STEP
+        way = shapely.Polygon([*(near + inward * STEP), *(near[::-1] - inward * deep)])
+        parts, _ = ndimage.label(ground.on(way))
+        off = (ground.points - near[0]) @ inward
+        before, behind = ({*np.unique(parts[side])} - {0} for side in (off > STEP - 2 * CELL, off < 2 * CELL - deep))
+        if not before & behind:
+            yield (
+                f"{opening.kind} between {one} and {other}: furniture leaves no 0.3 m to get through, "
+                f"allowed: a way of {STEP} m on both sides"
+            )
 
 
 def _start(plan: Plan) -> np.ndarray:
@@ -160,17 +199,3 @@ def _start(plan: Plan) -> np.ndarray:
         if opening.kind == "door" and counterpart(mine, opening, floors) is None:
             return segment(floor, opening).mean(0) + inward_normal(floor, opening.edge) * (ROBOT + 2 * CELL)
     return np.asarray(floor.mean(0))
-
-
-def _things(plan: Plan, stage: Usd.Stage) -> Iterator[np.ndarray]:
-    """(4, 2) float: footprints in the home's frame of what stands in a robot's way."""
-    from echomodel.vocabulary import vocabulary
-
-    for prims in find_rooms(stage):
-        pose = plan.pose(prims.room.GetName())
-        contents = read_contents(prims)
-        for thing in contents.objects:
-            if thing.position[1] > LOW or vocabulary().category(thing.node.category).support != "floor":
-                continue
-            corners = footprints(*(np.array([v], float) for v in (thing.size, thing.position, thing.yaw)))[0]
-            yield corners @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]

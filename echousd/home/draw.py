@@ -14,12 +14,28 @@ from echomodel.openings import Opening, hinge_point, inward_normal, segment, sig
 from echomodel.vocabulary import vocabulary
 from echousd.graph import GraphError
 from echousd.home.plan import Plan, ways
+from echousd.home.stages import Standing
+from echousd.naming import free_name
 
 PICTURES = (".png", ".svg", ".pdf")
 TINTS = {"": "#f4efe4", "wet": "#e3eef4", "outdoor": "#e6f0df"}
-LAYERS = {"wall": 7, "door": 3, "window": 5, "passage": 9, "room": 8}  # of a DXF, with their colours
+# Of a DXF, with their colours.
+LAYERS = {
+    "wall": 7,
+    "door": 3,
+    "window": 5,
+    "passage": 9,
+    "room": 8,
+    "furniture": 6,
+    "dimension": 2,
+}
 INK = {"door": "#8a5a2b", "window": "#3a6ea5", "passage": "#c9c2b2"}
+FRONT = [2, 3]  # corners of a footprint at its front
+ASIDE = 0.5  # metres from the walls to what says how long they are
 ACROSS = 5.0  # inches of one plan
+
+
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +85,24 @@ def _filled(floor: np.ndarray, opening: Opening, near: np.ndarray, out: np.ndarr
         yield Line("door", on_paper(swing[1:]))
 
 
-def draw_plans(plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = ()) -> None:
+def dimensions_of(plan: Plan) -> Iterator[tuple[Place, Place, str]]:
+    """Ends on paper and text of the lengths that a plan has outside: from wall to wall, below and left."""
+    corners = on_paper(np.concatenate([*plan.cells.values()]))
+    low, high = corners.min(0), corners.max(0)
+    for axis in (0, 1):
+        start, end = low - ASIDE, high - ASIDE
+        start[axis], end[axis] = low[axis], high[axis]
+        end[1 - axis] = start[1 - axis]
+        yield (float(start[0]), float(start[1])), (float(end[0]), float(end[1])), f"{high[axis] - low[axis]:.2f} m"
+
+
+def draw_plans(
+    plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = (), things: Sequence[Standing] = ()
+) -> None:
     """Write a picture of plans side by side; the extension (.png, .svg, .pdf) chooses its form. Raises OSError.
 
     Arguments:
-        over: (k, 2) float each, lines (x, z) of a drawing that the plans were taken from.
+        over: (k, 2) float each, lines (x, z) of a drawing that the plans were taken from. things: that stand in them.
     """
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -91,7 +120,8 @@ def draw_plans(plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = (
             row = vocabulary().room_type(plan.home.room(name).type)
             axes.fill(*on_paper(floor).T, color=TINTS[row.use])
             middle = shapely.Polygon(on_paper(floor)).representative_point()
-            told = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²"
+            sides = " x ".join(f"{side:.2f}" for side in np.ptp(on_paper(floor), 0))
+            told = f"{name.replace('_', ' ')}\n{abs(signed_area(floor)):.1f} m²\n{sides} m"
             axes.text(middle.x, middle.y, told, ha="center", va="center", fontsize=7)
         for line in lines_of(plan):
             points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
@@ -99,6 +129,19 @@ def draw_plans(plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = (
                 axes.fill(*line.points.T, color="#3a3a3a")
             elif line.layer != "room":
                 axes.plot(*points.T, color=INK[line.layer], linewidth=0.8)
+        for thing in things:
+            corners = on_paper(thing.corners)
+            axes.fill(*corners.T, facecolor="#ffffff80", edgecolor="#7a7a7a", linewidth=0.5)
+            axes.plot(*corners[FRONT].T, color="#7a7a7a", linewidth=1.4)  # where it looks
+            word = thing.node.category.replace("_", "\n")
+            x, y = corners.mean(0).tolist()
+            axes.text(x, y, word, ha="center", va="center", fontsize=3.5, color="#5a5a5a")
+        for start, end, told in dimensions_of(plan):
+            axes.annotate("", start, end, arrowprops={"arrowstyle": "<->", "linewidth": 0.6})
+            middle = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
+            upright = 90 if start[0] == end[0] else 0
+            box = {"facecolor": "white", "linewidth": 0, "pad": 1}
+            axes.annotate(told, middle, fontsize=6, rotation=upright, ha="center", va="center", bbox=box)
         for points in over:
             axes.plot(*on_paper(points).T, color="#d02f2f", linewidth=0.5, alpha=0.8)
         axes.set_title(f"{plan.area:.1f} m²", fontsize=8)
@@ -108,8 +151,8 @@ def draw_plans(plans: Sequence[Plan], path: Path, over: Sequence[np.ndarray] = (
         figure.savefig(beside, format=form, metadata=dated)
 
 
-def write_dxf(plan: Plan, path: Path) -> None:
-    """Write a plan as DXF in metres, a layer for each kind of line; raises `GraphError` without ezdxf."""
+def write_dxf(plan: Plan, path: Path, things: Sequence[Standing] = ()) -> None:
+    """Write a plan as DXF in metres with what stands in it, a layer each; raises `GraphError` without ezdxf."""
     try:
         import ezdxf
     except ImportError:
@@ -124,5 +167,16 @@ def write_dxf(plan: Plan, path: Path) -> None:
         at = shapely.Polygon(on_paper(floor)).representative_point()
         text = space.add_text(name, height=0.25, dxfattribs={"layer": "room"})
         text.set_placement((at.x, at.y))
+    for thing in things:
+        name = thing.node.category
+        block = drawing.blocks.new(free_name(name, {one.name for one in drawing.blocks}))
+        middle = on_paper(thing.corners).mean(0)
+        block.add_lwpolyline((on_paper(thing.corners) - middle).round(4).tolist(), close=True)
+        space.add_blockref(block.name, middle.round(4).tolist(), dxfattribs={"layer": "furniture"})
+    for start, end, _ in dimensions_of(plan):
+        angle = 90 if start[0] == end[0] else 0
+        style = {"dimtxt": 0.25, "dimasz": 0.15, "dimexo": 0.0, "dimexe": 0.1}
+        made = space.add_linear_dim(start, start, end, angle=angle, override=style, dxfattribs={"layer": "dimension"})
+        made.render()
     with whole_file(path) as beside:
         drawing.saveas(beside)

@@ -11,7 +11,7 @@ import networkx
 import numpy as np
 import shapely
 
-from echomodel.openings import Opening, inward_normal, numbered, segment, signed_area
+from echomodel.openings import Opening, inward_normal, segment, signed_area
 from echomodel.plans import floor_extents
 from echomodel.rooms.statistics import room_type_statistics
 from echomodel.vocabulary import vocabulary
@@ -122,18 +122,15 @@ def ways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening]]:
                 yield (name, other[0]), opening
 
 
-def doorways(plan: Plan) -> Iterator[tuple[str, np.ndarray]]:
-    """(name, (2, 2) float lower and upper corner (x, z), metres) of the floor in every way between two rooms."""
+def doorways(plan: Plan) -> Iterator[tuple[tuple[str, str], Opening, np.ndarray]]:
+    """The `ways`, and (2, 2) float lower and upper corner (x, z), metres, of the floor in each."""
     floors = {name: Floor(name, floor, plan.walls[name]) for name, floor in plan.floors.items()}
-    taken: list[str] = []
     for (one, other), opening in ways(plan):
         near = segment(floors[one].corners, opening)
         behind = next(f for f in facings(floors[one], floors[other]) if f.edge == opening.edge)
         far = near - inward_normal(floors[one].corners, opening.edge) * behind.deep
-        name = numbered(f"threshold_{one}_{other}", taken)
-        taken.append(name)
         corners = np.concatenate([near, far])
-        yield name, np.array([corners.min(0), corners.max(0)])
+        yield (one, other), opening, np.array([corners.min(0), corners.max(0)])
 
 
 def _same(opening: Opening, wanted: Opening) -> bool:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
-from echousd.graph import GraphError, SceneGraph
+from echomodel.roomboxes import footprints
+from echomodel.vocabulary import vocabulary
+from echousd.graph import GraphError, Node, SceneGraph
+from echousd.graph.files import STAGE_FORMS
 from echousd.home.graph import RATIO, HomeGraph, HomeRelation, HomeRoom
 from echousd.home.plan import Plan
 from echousd.stage import encoding as usd
 from echousd.stage import values
+from echousd.stage.contents import read_contents
 from echousd.stage.encoding import StageError
 from echousd.stage.files import open_stage, save_layer, source
 from echousd.stage.read import find_rooms, place, room_graph, value
@@ -139,6 +144,32 @@ def read_poses(path: Path) -> dict[str, tuple[SceneGraph, np.ndarray]]:
             pose[:3, :3] = _upright(pose[:3, :3])  # rooms are made upright and in metres
             out[names[prims.room.GetPath()]] = (room_graph(prims), pose)
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A piece of furniture of a home: its node, footprint (4, 2) in the home's frame, and its lower side, metres."""
+
+    node: Node
+    corners: np.ndarray
+    low: float
+
+
+def furniture(plan: Plan, path: Path) -> list[Standing]:
+    """What stands or hangs on walls in the rooms of a home on a stage, where it has a place."""
+    found: list[Standing] = []
+    if path.suffix.lower() not in STAGE_FORMS:
+        return found
+    stage = open_stage(path)
+    for prims in find_rooms(stage):
+        pose = plan.pose(prims.room.GetName())
+        for thing in read_contents(prims).objects:
+            if vocabulary().category(thing.node.category).support == "ceiling":
+                continue
+            around = footprints(*(np.array([v], float) for v in (thing.size, thing.position, thing.yaw)))[0]
+            corners = around @ pose[[0, 2]][:, [0, 2]].T + pose[[0, 2], 3]
+            found.append(Standing(thing.node, corners, float(thing.position[1])))
+    return found
 
 
 def _upright(rotation: np.ndarray) -> np.ndarray:

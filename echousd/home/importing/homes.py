@@ -14,7 +14,7 @@ import shapely
 from echomodel.openings import USUAL, Opening, direction, inward_normal, numbered, overlap, segment, signed_area
 from echomodel.sizes import size_statistics
 from echomodel.vocabulary import UnknownWord, normalised, vocabulary
-from echousd.assets.naming import category_of, plain
+from echousd.assets.naming import category_of, known_word, plain
 from echousd.graph import GraphError, Node, RoomSpec, SceneGraph, starting_graph
 from echousd.graph.nodes import OBSTACLE
 from echousd.home.given import APART, walled
@@ -290,8 +290,8 @@ def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node
             continue
         size = None if piece.size is None or not np.isfinite(piece.size[[0, 2]]).all() else np.abs(piece.size)
         known = size if size is not None and np.isfinite(size).all() else None
-        category, _ = category_of((), next(filter(None, piece.words), ""), "", known)
-        category = category or next(filter(None, (category_of((), word, "", known)[0] for word in piece.words)), "")
+        read = [known_word(word) or category_of((), word, "", known)[0] for word in piece.words]
+        category = next(filter(None, read), "")
         told = {}
         if not category:
             if known is None or sorted(known)[1] < LARGE:

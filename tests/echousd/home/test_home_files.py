@@ -2,6 +2,8 @@
 
 import json
 
+import ezdxf
+import numpy as np
 import pytest
 from homes import QUICK, inline
 from pxr import Usd, UsdGeom
@@ -9,6 +11,9 @@ from pxr import Usd, UsdGeom
 import echousd
 from echousd.batches.journal import room_digest
 from echousd.folder.manifest import find_manifest
+from echousd.home.files import load_home
+from echousd.home.given import plan_there
+from echousd.home.stages import furniture
 
 FLAT = """home: {area: 34}
 rooms:
@@ -123,3 +128,22 @@ def test_an_edit_follows_through(made, echousd_command):
     assert "no relation 'living door bedroom' in this home, allowed: 'living open_to bedroom'" in done.err
     done = echousd_command("edit", folder, "--add", "fern:plant")
     assert "home.usda: a home, which composes rooms; name one of them: rooms/bedroom/bedroom.usda" in done.err
+
+
+def test_a_plan_is_drawn_with_what_stands_in_it(made, tmp_path, echousd_command):
+    done = echousd_command("plan", "export", made[0], "-o", tmp_path / "flat.dxf")
+    assert done.code == 0, done.err
+    space = ezdxf.readfile(tmp_path / "flat.dxf").modelspace()
+    assert sorted(one.dxf.name for one in space.query("INSERT[layer=='furniture']")) == [
+        "coffee_table", "double_bed", "sofa",
+    ]  # fmt: skip
+    assert len(space.query("DIMENSION")) == 2
+    done = echousd_command("plan", "import", tmp_path / "flat.dxf", "-o", tmp_path / "again.usda", "--json")
+    assert json.loads(done.out)["found"]["fixed pieces"] == 3
+    home, plan = load_home(tmp_path / "again.usda"), plan_there(made[0] / "home.usda")
+    (bed,) = home.room("bedroom").graph.nodes
+    (there,) = (thing for thing in furniture(plan, made[0] / "home.usda") if thing.node.name == "bed")
+    place = np.array(bed.position)[[0, 2]] + plan_there(tmp_path / "again.usda").origin("bedroom")
+    assert place == pytest.approx(there.corners.mean(0), abs=0.02)
+    assert echousd_command("plan", made[0], "-o", tmp_path / "flat.svg").code == 0
+    assert (tmp_path / "flat.svg").read_text().count("<path") > 20

@@ -131,6 +131,29 @@ def test_ways_that_would_cross_are_named():
     assert told.startswith("no flat plan has all of 'bedroom_1 door bedroom_2'")
 
 
+K4 = [f"{one} door {other}" for one, other in combinations(["living", "kitchen", "bedroom", "study"], 2)]
+BETWEEN = ["hall north_of living", "living north_of kitchen", "hall door kitchen", "living east_of hall",
+           "living west_of kitchen"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kept", "more"),
+    [
+        (K4, ["hall door living", "hall door bathroom", "bedroom larger_than study"]),
+        (BETWEEN, ["hall door living", "living door kitchen", "hall larger_than kitchen"]),
+    ],
+)
+def test_what_no_plan_keeps_is_a_smallest_set(kept, more):
+    with pytest.raises(GraphError) as raised:
+        plan_home(home_of_words(", ".join([*more, *kept])))
+    said = str(raised.value)
+    named = said.partition(" has all of ")[2].partition("; ")[0]
+    assert {*named.strip("'").split("', '")} == {*kept}
+    for left_out in kept:
+        rest = [one for one in kept if one != left_out]
+        assert plan_home(home_of_words(", ".join([*more, *rest]))).broken() == (), f"without {left_out}"
+
+
 def test_without_the_solver_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ortools.sat.python", None)
     with pytest.raises(GraphError, match=r'pip install "echousd\[home\]"'):
