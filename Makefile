@@ -7,7 +7,7 @@ ROOM := $(VENV)/.room
 STAMP := $(VENV)/.installed
 AUDIT := .audit
 
-.PHONY: help room test lint types clients hashes audit benchmarks benchmark eval schema clean
+.PHONY: help room test lint types clients hashes audit benchmarks benchmark eval paper schema clean
 
 help:
 	@grep -E '^# make' Makefile | cut -c3-
@@ -58,6 +58,14 @@ benchmarks: $(STAMP)
 SET ?= generated
 eval: $(STAMP)
 	$(BIN)/echousd eval suite --against $(SET) --samples 24 --workers 2 -o out/eval/report
+
+# make paper SGFRONT=DIR: trains the paper preset on SG-FRONT with 3D-FUTURE-SDF in it, and fills our column of the tables.
+PAPER ?= out/paper
+TRAIN = $(BIN)/echousd train model/recipes/paper.toml --set data=$(SGFRONT) $(SETTINGS)
+paper: $(STAMP)
+	$(TRAIN) --set stage=paper_vqvae -o $(PAPER)/vqvae
+	$(TRAIN) --set 'start=["$(PAPER)/vqvae/weights.safetensors"]' -o $(PAPER)/run
+	$(BIN)/echousd eval suite $(PAPER)/run default --against $(SGFRONT) --samples 370 $(ASKED) -o $(PAPER)/report
 
 # make benchmark: what everything takes, as one table of ratios to the machine's matrix products and memory.
 benchmark: $(STAMP)

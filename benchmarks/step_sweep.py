@@ -11,13 +11,13 @@ import torch
 
 from echomodel.boxes import Boxes
 from echomodel.compact.predictors import wholeness
+from echomodel.data.roomset import with_known_words
 from echomodel.data.shapeset import ShapeSet
 from echomodel.echo import EchoModel
 from echomodel.graph import GraphBatch
 from echomodel.guidance import outside
 from echomodel.metrics.pointsets import chamfer_matrix
 from echomodel.metrics.shapes import surface_points
-from echomodel.metrics.tasks import with_known_words
 from echomodel.roomboxes import RoomBoxes, read_rooms
 from echomodel.rules import label_rooms, verdicts
 from echomodel.samplers import SAMPLERS

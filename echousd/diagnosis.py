@@ -18,10 +18,11 @@ EXTRAS = (
     ("dxf", ("ezdxf",), "plans as DXF"),
     ("svg", ("svgelements",), "floor plans in SVG"),
     ("ifc", ("ifcopenshell",), "floor plans in IFC"),
-    ("eval", ("sklearn", "fcl", "jinja2"), "`echousd eval suite`"),
+    ("eval", ("sklearn", "fcl", "jinja2", "embreex"), "`echousd eval suite`"),
     ("batch", ("pyarrow",), "Parquet tables of `echousd batch`"),
     ("assets", ("pyarrow",), "libraries of furniture, `echousd assets`"),
     ("ray", ("ray",), "`echousd batch` on a Ray cluster"),
+    ("sgfront", ("h5py",), "shapes of 3D-FUTURE-SDF to train the paper preset on"),
     ("text", ("open_clip",), "text features of the released models"),
 )
 GPUS = ("/dev/nvidiactl", "/dev/dxg", "/dev/kfd", "/dev/accel")  # on Linux; without one torch finds the processor alone

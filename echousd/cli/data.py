@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
     import trimesh
 
-    from echomodel.metrics.report import Row
     from echomodel.roomboxes import RoomBoxes
+    from echomodel.rooms.figures import Row
 
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 
@@ -148,7 +148,7 @@ def report(
     Example: echousd data report --count 2000 --worst 20
     """
     from echomodel.data.roomset import load_rooms
-    from echomodel.metrics.report import compare, left_out, section_means
+    from echomodel.rooms.figures import compare, left_out, section_means
     from echomodel.rooms.generator import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
@@ -283,8 +283,7 @@ def to_usd(
 
     Example: echousd data to-usd rooms.json -o stages --limit 10
     """
-    from echomodel.data.roomset import load_rooms
-    from echomodel.metrics.tasks import with_known_words
+    from echomodel.data.roomset import load_rooms, with_known_words
     from echousd.stage.boxes import write_stages
 
     found = load_rooms(rooms, limit)
@@ -318,9 +317,8 @@ def import_rooms(
 
     Example: echousd data import my_stages more_rooms.json -o mine.npz
     """
-    from echomodel.data.roomset import kept_out, load_rooms, pack_rooms
+    from echomodel.data.roomset import kept_out, load_rooms, pack_rooms, with_known_words
     from echomodel.data.sgfront import SGFront
-    from echomodel.metrics.tasks import with_known_words
     from echomodel.roomboxes import write_rooms
     from echousd.cli.terminal import Terminal
     from echousd.stage.boxes import read_stages
@@ -358,8 +356,7 @@ def to_sgfront(
 
     Example: echousd data to-sgfront rooms.json -o sgfront
     """
-    from echomodel.data.roomset import load_rooms
+    from echomodel.data.roomset import load_rooms, with_known_words
     from echomodel.data.sgfront_writer import write_sgfront
-    from echomodel.metrics.tasks import with_known_words
 
     write_sgfront(out, with_known_words(load_rooms(rooms)), split=split, drop=drop, seed=seed)

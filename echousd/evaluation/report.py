@@ -7,13 +7,15 @@ import io
 import json
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from echomodel.data.sheet import plot_rooms
 from echomodel.files import write_json, write_text
@@ -23,7 +25,7 @@ from echousd.evaluation.runs import Run, Table
 
 FORMS = (".md", ".json", ".html")
 SHOWN = 6  # rooms of each system in the contact sheet
-BARS = 14  # columns beyond which a table has no plot
+PANELS, ACROSS = 16, 6  # columns beyond which a table has no plot; panels in a line
 
 
 def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) -> list[Path]:
@@ -39,10 +41,9 @@ def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) ->
     write_text(paths[0], _rendered("report.md.j2", content, escaped=False))
     plain = {**found, "about": content["about"], "tables": [asdict(table) for table in found["tables"]]}
     write_text(paths[1], json.dumps(plain, indent=1, default=float) + "\n")
-    plots = {id(table): bars(table) for table in found["tables"]}
-    for tables in content["sections"].values():
-        for table in tables:
-            table["plot"] = plots[table["id"]]
+    told = [table for tables in content["sections"].values() for table in tables]
+    for table, made in zip(told, found["tables"], strict=True):
+        table["plot"] = plot(made)
     write_text(paths[2], _rendered("report.html.j2", content | {"pictures": pictures(run)}, escaped=True))
     seconds = out.with_name(f"{out.name}.seconds.json")
     write_json(seconds, {"CPU seconds a room": {name: round(value, 3) for name, value in run.seconds.items()}})
@@ -50,24 +51,38 @@ def write_report(found: Mapping[str, Any], run: Run, out: Path, command: str) ->
 
 
 def _content(found: Mapping[str, Any], command: str) -> dict[str, Any]:
+    published = json.loads(resources.files("echousd.evaluation").joinpath("published.json").read_text("utf-8"))
+    theirs = {table["title"]: table for table in published["tables"]}
     sections: dict[str, list[dict[str, Any]]] = {}
     for table in found["tables"]:
         columns = list(dict.fromkeys(column for row in table.rows.values() for column in row))
-        rows = [
-            {"name": name, "cells": [cell(row.get(column)) for column in columns]} for name, row in table.rows.items()
-        ]
+        other = theirs.get(table.title) or {"columns": [], "rows": {}, "where": ""}
+        if not {*other["columns"]} <= {*columns}:
+            other = {"columns": [], "rows": {}, "where": ""}  # not measured here: it stands below
+        theirs.pop(table.title if other["rows"] else "", None)
         sections.setdefault(table.name, []).append(
-            {"id": id(table), "title": table.title, "note": table.note, "columns": columns, "rows": rows}
-        )
-    published = json.loads(resources.files("echousd.evaluation").joinpath("published.json").read_text("utf-8"))
+            {
+                "title": table.title, "note": table.note, "columns": columns, "where": other["where"],
+                "rows": [{"name": n, "cells": [cell(row.get(c)) for c in columns]} for n, row in table.rows.items()],
+                "published": _published(other, columns),
+            }
+        )  # fmt: skip
+    rest = [table | {"cells": _published(table, table["columns"])} for table in theirs.values()]
     return {
         **found,
         "about": {**found["about"], "command": command},
         "sections": sections,
         "reference": next(iter(found["tables"][0].rows)) if found["tables"] else "",
-        "published": published,
-        "missing": found.get("missing", ()),
+        "published": published | {"tables": rest},
     }
+
+
+def _published(table: Mapping[str, Any], columns: Sequence[str]) -> list[dict[str, Any]]:
+    told = {name: dict(zip(table["columns"], row, strict=True)) for name, row in table["rows"].items()}
+    return [
+        {"name": name, "cells": ["-" if row.get(c) is None else f"{row[c]:g}" for c in columns]}
+        for name, row in told.items()
+    ]
 
 
 def cell(found: Figure | None) -> str:
@@ -90,39 +105,71 @@ def _rendered(name: str, content: Mapping[str, Any], *, escaped: bool) -> str:
     return Environment(autoescape=escaped).from_string(text).render(**content) + "\n"
 
 
-def bars(table: Table) -> str:
-    """A table as bars with their intervals, SVG; "" for one with too many columns."""
+def plot(table: Table) -> str:
+    """A table as SVG, a panel for each column or curve; "" where there is nothing to see.
+
+    Bars have their intervals, every panel a scale of its own.
+    """
+    columns = list(dict.fromkeys(column for row in table.rows.values() for column in row))
+    if table.plain or not (table.curves or 0 < len(columns) <= PANELS):
+        return ""
+    if table.curves:
+        with _panels(list(table.curves), 2.6) as (every, out):
+            for axes, lines in zip(every, table.curves.values(), strict=True):
+                for number, (name, (x, y)) in enumerate(lines.items()):
+                    axes.plot(x, y, ["-", "--", ":"][number % 3], label=name, lw=1.2, color=f"C{number % 10}")
+            every[0].legend(fontsize=6, frameon=False)
+        return out[0]
+    names = list(table.rows)
+    with _panels(columns, 0.5 + 0.14 * len(names)) as (every, out):
+        for number, (axes, column) in enumerate(zip(every, columns, strict=True)):
+            found = [table.rows[name].get(column) or Figure(None) for name in names]
+            value = np.array([f.value if f.value is not None else np.nan for f in found], float)
+            ends = np.array([[f.low, f.high] if f.low is not None else [np.nan] * 2 for f in found], float)
+            reach = np.nan_to_num(np.abs(ends - value[:, None])).T
+            tint = ["#356" if name == names[0] else "#9ab" for name in names]
+            axes.barh(range(len(names)), value, xerr=reach, error_kw={"lw": 0.7}, color=tint)
+            axes.set_yticks(range(len(names)), names if number % ACROSS == 0 else [""] * len(names))
+            axes.invert_yaxis()
+    return out[0]
+
+
+@contextmanager
+def _panels(titles: Sequence[str], height: float) -> Iterator[tuple[list[Any], list[str]]]:
+    """Axes with these titles, and a list that holds the SVG of them afterwards."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure as Canvas
 
-    columns = list(dict.fromkeys(column for row in table.rows.values() for column in row))
-    if not 0 < len(columns) <= BARS:
-        return ""
-    with rc_context({"svg.hashsalt": "echousd", "svg.fonttype": "none", "font.size": 8}):
-        canvas = Canvas(figsize=(11, 3.2), layout="constrained")
-        axes, wide = canvas.subplots(), 0.86 / len(table.rows)
-        for number, (name, row) in enumerate(table.rows.items()):
-            found = [row.get(column) or Figure(None) for column in columns]
-            value = np.array([f.value if f.value is not None else np.nan for f in found], float)
-            low, high = (np.array([getattr(f, end) or 0.0 for f in found]) for end in ("low", "high"))
-            at = np.arange(len(columns)) + (number - len(table.rows) / 2 + 0.5) * wide
-            ends = np.nan_to_num(np.abs(np.stack([value - low, high - value])))
-            axes.bar(at, value, wide, label=name, yerr=ends, error_kw={"lw": 0.6}, color=f"C{number % 10}")
-        axes.set_xticks(range(len(columns)), columns, rotation=20, ha="right")
-        axes.legend(ncols=2, fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        axes.spines[["top", "right"]].set_visible(False)
-        out = io.StringIO()
-        canvas.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    return re.sub(r"<metadata>.*?</metadata>", "", out.getvalue(), flags=re.DOTALL).partition('.dtd">')[2].strip()
+    lines, out = -(-len(titles) // ACROSS), list[str]()
+    with rc_context({"svg.hashsalt": "echousd", "svg.fonttype": "none", "font.size": 7}):
+        across = min(len(titles), ACROSS)
+        canvas = Canvas(figsize=(1.4 + 1.9 * across, lines * (height + 0.3)), layout="constrained")
+        every = list(np.ravel(canvas.subplots(lines, across)))
+        for axes, title in zip(every, titles, strict=False):
+            axes.set_title(title, fontsize=7.5)
+            axes.spines[["top", "right"]].set_visible(False)
+        for axes in every[len(titles) :]:
+            axes.remove()
+        yield every[: len(titles)], out
+        text = io.StringIO()
+        canvas.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    out.append(re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL).partition('.dtd">')[2].strip())
 
 
 def pictures(run: Run) -> dict[str, str]:
-    """Contact sheets, PNG as base64: the same rooms by every system, a row each."""
+    """Contact sheets, PNG as base64: the same rooms by every system, a row each, as plans and from above."""
     names = list(run.made)
     rows: list = []
     for number in np.linspace(0, len(run.tasks) - 1, min(SHOWN, len(run.tasks))).astype(int):
-        rows += [replace(run.made[name][number], id=f"{name} {number}") for name in names]
-    return {"The same rooms by every system": sheet(rows, len(names))} if rows else {}
+        rows += [replace(made[number], id=name) for name, made in run.made.items() if number < len(made)]
+    out = {"The same rooms by every system": sheet(rows, len(names))} if rows else {}
+    if run.shown:
+        whole = np.concatenate([np.concatenate(list(shown), 1) for shown in run.shown.values()])
+        text = io.BytesIO()
+        Image.fromarray(whole).save(text, "PNG")
+        title = f"From above, top to bottom: {', '.join(run.shown)}"
+        out[title] = base64.b64encode(text.getvalue()).decode()
+    return out
 
 
 def sheet(rooms: Sequence[RoomBoxes], columns: int) -> str:

@@ -5,20 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from echomodel.data.roomset import load_rooms
+from echomodel.data.roomset import load_rooms, with_known_words
 from echomodel.data.sgfront import SGFront
 from echomodel.metrics.statistics import Counts, Figure, Pair, figure
-from echomodel.metrics.tasks import Task, with_known_words
+from echomodel.metrics.tasks import Task
 from echomodel.progress import StageListener
 from echomodel.roomboxes import RoomBoxes
 from echomodel.rooms.generator import generate_rooms
-from echomodel.vocabulary import vocabulary
+from echomodel.vocabulary import UnknownWord, vocabulary
 from echousd.evaluation.foreign import foreign_rooms
 from echousd.evaluation.systems import System, drawn, finished
 
@@ -26,7 +26,7 @@ HELD_OUT = 770_000  # seed of generated rooms that no training used
 UNTRAINED = ("random", "generator", "shuffled")
 HONEST = (*UNTRAINED, *(f"{name}+search" for name in UNTRAINED), "retrieval", "real")
 SYSTEMS = ("default", "network", "guided")
-SECTIONS = ("relations", "faults", "selection", "field", "realism", "shapes", "physics")
+SECTIONS = ("relations", "faults", "selection", "field", "realism", "pictures", "steps", "shapes", "physics")
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,16 @@ class Table:
     """Rows of systems, columns of figures.
 
     Arguments:
-        name: of the section; note: what is measured, in a sentence or two. better: column -> "low" or "high".
-        rows: system -> column -> figure.
+        name: of the section; note: what is measured, in a sentence or two. rows: system -> column -> figure.
+        curves: panel -> line -> (x, y); what is plotted, instead of the rows. plain: without a plot.
     """
 
     name: str
     title: str
     note: str
     rows: Mapping[str, Mapping[str, Figure]]
-    better: Mapping[str, str] = field(default_factory=dict)
+    curves: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[float]]]] = field(default_factory=dict)
+    plain: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,8 @@ class Run:
     Arguments:
         systems: in the order of the rows. tasks: that all who can be asked were asked. reference: other rooms of that
             source. made, of: system -> its rooms and what they were asked, room by room.
-        seconds: of the processor a room. missing: what is not measured and why; sections add to it.
+        seconds: of the processor a room. missing: what is not measured and why; shown: system -> (n, 256, 256, 3)
+        pictures from above; sections add to both.
     """
 
     settings: SuiteSettings
@@ -98,24 +100,38 @@ class Run:
     of: Mapping[str, Sequence[Task]]
     seconds: Mapping[str, float]
     missing: list[str] = field(default_factory=list)
+    shown: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBoxes]]:
     """Rooms to lay out and, of the same source, as many others to compare with; raises ValueError for too few."""
     wanted = 2 * settings.samples
     path = Path(settings.against)
+    published = (path / "classes_all.txt").exists()
     if settings.against == "generated":
         rooms = generate_rooms(wanted, HELD_OUT + settings.seed)
-    elif (path / "classes_all.txt").exists():
+    elif published:
         rooms = SGFront(path, split="test").rooms()
     else:
         rooms = load_rooms(path, held_out=path.is_dir() or path.suffix == ".npz")
-    rooms = [room for room in with_known_words(rooms) if len(room) > 1 and len(room.floor_polygon) > 2]
+    known = [
+        replace(new, relations=old.relations if published and len(new) == len(old) else None)
+        for new, old in zip(known_rooms(settings.against, rooms), rooms, strict=True)
+    ]
+    rooms = [room for room in known if len(room) > 1 and len(room.floor_polygon) > 2]
     if len(rooms) < 4:
         raise ValueError(f"{settings.against}: {len(rooms)} rooms with a floor and two known objects, 4 are needed")
     count = min(wanted, len(rooms) // 2 * 2)
     chosen = [rooms[number * len(rooms) // count] for number in range(count)]
     return chosen[::2], chosen[1::2]
+
+
+def known_rooms(name: str, rooms: Sequence[RoomBoxes]) -> list[RoomBoxes]:
+    """The rooms in the vocabulary's words; raises ValueError that names the source for a room type of another one."""
+    try:
+        return with_known_words(rooms)
+    except UnknownWord as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def run_systems(
@@ -170,7 +186,7 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
     """Rooms from elsewhere as tasks that they answered themselves, and what was left out of them, a sentence each."""
     assert system.foreign is not None
     found = foreign_rooms(system.foreign)
-    known = with_known_words(found)
+    known = known_rooms(system.name, found)
     odd = sorted({word for old, new in zip(found, known, strict=True) for word in {*old.categories}
                   if vocabulary().known_category(word) is None})  # fmt: skip
     notes = [f"{system.name}: objects that the vocabulary does not hold are left out: {', '.join(odd)}"] if odd else []

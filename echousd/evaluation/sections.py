@@ -5,39 +5,41 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 import torch
-import trimesh
 
 from echomodel.boxes import Boxes
-from echomodel.data.shapeset import ShapeSet
-from echomodel.echo import EchoModel
-from echomodel.furniture import Choices, Style, mesh_of, solids
-from echomodel.furniture.description import piece_of
-from echomodel.graph import GraphBatch
+from echomodel.loading import load_model
 from echomodel.metrics.bodies import body_scores
-from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size
 from echomodel.metrics.layouts import layout_scores, strata_of
-from echomodel.metrics.sets import layout_distance, set_figures, size_distances, told_apart
-from echomodel.metrics.shapes import reconstruction_scores, reference_points, set_scores, surface_points
-from echomodel.metrics.statistics import Counts, Figure, figure, interval
+from echomodel.metrics.pictures import WEIGHTS, features, picture, picture_figures, told_by_pictures
+from echomodel.metrics.sets import (
+    AXES,
+    layout_distance,
+    set_figures,
+    size_distances,
+    size_scores,
+    told_apart,
+)
+from echomodel.metrics.statistics import Counts, Figure, figure
 from echomodel.metrics.tasks import GROUPS, changed, extended, kept_relations, tasks_of
 from echomodel.roomboxes import RoomBoxes
-from echomodel.tsdf import mesh_from_tsdf
-from echomodel.vocabulary import vocabulary
+from echousd.evaluation.pieces import shapes
 from echousd.evaluation.runs import Run, Table, figures, run_systems
-from echousd.evaluation.systems import System, shuffled_model
+from echousd.evaluation.systems import System, networks
 
 AGAIN, ALIKE = 1, 8  # added to the seed for a second layout of the same graph; rooms that are laid out twice
-PUBLISHED = (  # classes of the paper's Tables 3 and 6, in our words
-    "double_bed", "nightstand", "wardrobe", "dining_chair", "dining_table", "cabinet", "floor_lamp", "shelf",
-    "multi_seat_sofa", "tv_stand",
-)  # fmt: skip
-POINTS, MOVED = 1024, 128  # points of a shape, and of those that the earth mover's distance looks at
+OTHERS = "other rooms"  # of the source
+NAMES = {"inception": ("FID", "KID x 1000"), "clip": ("FID-CLIP",)}
+ROOMS: dict[str, tuple[str, ...]] = {  # of the paper: a living and dining room counts as both; all of them
+    "": (), "bedroom": ("bedroom",), "living_room": ("living_room", "living_dining_room"),
+    "dining_room": ("dining_room", "living_dining_room"),
+}  # fmt: skip
+LEAST, SHOWN = 4, 6  # rooms of a type that have a figure of their own; that are shown
+SWEPT = (2, 5, 10, 20, 50)  # steps of sampling
 SETTLED = 4  # rooms that are simulated
+SIZES = "Share of pieces up to a size, as the standard score of its class; what a search does to sizes is left out."
 
 
 def relations(run: Run) -> list[Table]:
@@ -163,71 +165,69 @@ def realism(run: Run) -> list[Table]:
         "KL divergence of categories, which a graph states; Kolmogorov-Smirnov distances of sizes within classes. "
         "Intervals of set figures are those of random parts of 80 %."
     )
-    return [Table("realism", "Real or generated", note, rows)]
+    share = np.linspace(0, 1, 41)
+    spread = {n: np.quantile(size_scores(rooms), share, axis=0).T for n, rooms in run.made.items() if "+" not in n}
+    curves = {
+        f"{axis}, standard score": {name: (at[k].tolist(), share.tolist()) for name, at in spread.items()}
+        for k, axis in enumerate(AXES)
+    }
+    return [Table("realism", "Real or generated", note, rows), Table("realism", "Sizes", SIZES, {}, curves)]
 
 
-def shapes(run: Run) -> list[Table]:
-    """Tables 3 and 6: MMD, COV, 1-NNA by Chamfer and earth mover's distance, and whether told styles agree."""
-    seed, count = run.settings.seed, max(4, min(8, run.settings.samples // 4))
-    rng = np.random.default_rng([seed, 20])
-    sizes = {word: np.stack([usual_size(word, rng) for _ in range(count)]) for word in PUBLISHED}
-
-    def programs(number: int) -> dict[str, list[trimesh.Trimesh]]:
-        luck = np.random.default_rng([seed, 21, number])
-        return {
-            w: [mesh_of(solids(w, Style.draw(luck), Choices.draw(luck), s), s) for s in sizes[w]] for w in PUBLISHED
-        }
-
-    made: dict[str, dict[str, list[trimesh.Trimesh]]] = {}
-    held: dict[str, list[dict[str, float]]] = {}
-    styles: dict[str, dict[str, Figure]] = {}
-    for name, model in (("network", EchoModel.load()), ("shuffled", shuffled_model())):
-        generator = torch.Generator().manual_seed(seed)
-        pieces: dict[str, list] = {}
-        for word in PUBLISHED:
-            graph = GraphBatch.pack([GraphBatch.single([vocabulary().category_id(word)])] * count)
-            found = sampled(model, graph, sizes[word], generator).numpy()
-            pieces[word] = [
-                piece_scores(solids(word, *piece_of(v), s), s) for v, s in zip(found, sizes[word], strict=True)
-            ]
-        made[name] = {word: [mesh for mesh, _ in row] for word, row in pieces.items()}
-        held[name] = [score for row in pieces.values() for _, score in row]
-        told = style_scores(partial(sampled, model, generator=generator), len(vocabulary().categories), 24, seed)
-        styles[name] = {f"style distance, {key}": Figure(value) for key, value in told.items()}
-    made["retrieval"] = {word: programs(0)[word][::-1] for word in PUBLISHED}
-    made["random"] = {w: [trimesh.creation.box(s) for s in sizes[w]] for w in PUBLISHED}
-    made["programs"] = programs(1)
-    against = {word: _clouds(found) for word, found in programs(2).items()}
-    if run.settings.shapes:
-        against = _set_clouds(run.settings.shapes, count, seed)
-    rows: dict[str, dict[str, Figure]] = {}
-    for name, by_class in made.items():
-        ours = {word: _clouds(found) for word, found in by_class.items() if word in against}
-        row: dict[str, Figure] = {}
-        for distance, points in (("Chamfer", 0), ("EMD", MOVED)):
-            scores = {k: v for k, v in set_scores(ours, against, points=points).items() if k != "mean"}
-            for key, title in (("mmd", "MMD"), ("cov", "COV"), ("acc", "1-NNA")):
-                values = np.array([score[key] for score in scores.values()])
-                row[f"{title}, {distance}"] = Figure(float(values.mean()), *interval(values, seed), len(values))
-        for key in ("closed", "loose"):
-            if name in held:
-                row[key] = figure(Counts.of([(score[key], 1.0) for score in held[name]]), seed)
-        rows[name] = row | styles.get(name, {})
+def pictures(run: Run) -> list[Table]:
+    """Table 1: FID, KID and FID-CLIP of rooms from above by weights from the disk, and a small CNN trained here."""
+    seed, rows = run.settings.seed, {}
+    rooms = {**run.made, OTHERS: run.reference}
+    try:
+        shown = {name: np.stack([picture(room, seed) for room in made]) for name, made in rooms.items()}
+    except ValueError as error:
+        run.missing.append(f"pictures from above: {error}")
+        return []
+    seen: dict[str, dict[str, np.ndarray]] = {}
+    for kind, names in NAMES.items():
+        if path := getattr(run.settings, kind):
+            seen[kind] = {name: features(part, kind, path) for name, part in shown.items()}
+        else:
+            run.missing.append(f"{' and '.join(names)} of pictures from above: --{kind} FILE, {WEIGHTS[kind]}")
+    for name, made in run.made.items():
+        real = "real" if run.of[name] is run.tasks and name != "real" else OTHERS
+        rows[name] = {"small CNN": told_by_pictures(shown[name], shown[real], seed)}
+        for word, kinds in ROOMS.items():
+            of = [[k for k, r in enumerate(part) if not kinds or r.room_type in kinds] for part in (made, rooms[real])]
+            for kind, found in seen.items():
+                if min(map(len, of)) >= LEAST:
+                    scored = picture_figures(found[name][of[0]], found[real][of[1]], NAMES[kind], seed)
+                    rows[name] |= {f"{title} {word}".strip(): value for title, value in scored.items()}
+    run.shown.update({name: shown[name][:SHOWN] for name in run.made})
     note = (
-        f"{count} pieces of each of the paper's ten classes, each alone and filling the unit box, against "
-        f"{run.settings.shapes or 'pieces of the programs drawn anew'}; means over classes with intervals over them. "
-        "`programs` is another draw of the programs (what `real` is elsewhere), `retrieval` pieces of the programs of "
-        "other sizes, `random` bare boxes. Style distance of pieces of different classes: told to be of one style, "
-        "nothing told, of other suites (the paper's consistency)."
+        "Rooms from above, 256 x 256, by the paper's camera, palette and shader (no floor, walls or lamps), with "
+        "furniture of the programs, the same pieces for every system; `real` stands against other rooms of the source. "
+        "Small CNN: share of pictures that a network of three convolutions, trained here on the other half, tells "
+        "rightly as made or real (0.5: it cannot); it is no published classifier."
     )
-    tables = [Table("shapes", "Shapes", note, rows)]
-    if run.settings.shapes:
-        tables.append(_reconstruction(run.settings.shapes, seed))
-    else:
-        run.missing.append(
-            "reconstruction of held-out shapes: name a set with --shapes (echousd data build, data meshes)"
-        )
-    return tables
+    return [Table("pictures", "Pictures from above", note, rows)]
+
+
+def steps(run: Run) -> list[Table]:
+    """What a network makes in so many steps of sampling, without a search."""
+    system = next((s for s in run.systems if s.weights or s.base == "network"), System.parse("network"))
+    model, seed = load_model(system.weights), run.settings.seed
+    made = {f"{count} steps": networks(model, steps=count)(run.tasks, seed) for count in SWEPT}
+    made |= {name: list(run.made[name]) for name in ("random", "real") if name in run.made}
+    scores = {n: [layout_scores(t, r) for t, r in zip(run.tasks, rooms, strict=True)] for n, rooms in made.items()}
+    rows = figures(scores, ["told", "faults", "physics"], seed, next(iter(made)))
+    for name, rooms in made.items():
+        rows[name]["real or generated, AUC"] = told_apart(rooms, run.reference, seed)
+
+    def line(name: str, column: str) -> tuple[list[float], list[float]]:
+        swept = [f"{count} steps" for count in SWEPT] if name == system.base else [name] * 2
+        ends = [float(count) for count in SWEPT] if name == system.base else [float(SWEPT[0]), float(SWEPT[-1])]
+        return ends, [rows[at][column].value or 0.0 for at in swept]
+
+    names = [system.base, *(name for name in ("random", "real") if name in run.made)]
+    curves = {column: {name: line(name, column) for name in names} for column in next(iter(rows.values()))}
+    note = f"`{system.base}` as drawn, without a search, sampled in fewer and more steps."
+    return [Table("steps", "Steps of sampling", note, rows, curves)]
 
 
 def physics(run: Run) -> list[Table]:
@@ -240,11 +240,10 @@ def physics(run: Run) -> list[Table]:
     chosen = [name for name in dict.fromkeys([named[0], "random+search", "real"]) if name in run.made]
     scores: dict[str, list] = {name: [] for name in chosen}
     for name in chosen:
-        for room in run.made[name][:SETTLED]:
-            graph, boxes = (
-                graph_of(room, None),
-                Boxes(*(torch.from_numpy(v).float() for v in (room.size, room.position, room.yaw))),
-            )
+        for made in run.made[name][:SETTLED]:
+            room = replace(made, yaw=np.remainder(made.yaw, 2 * np.pi))
+            values = (torch.from_numpy(value).float() for value in (room.size, room.position, room.yaw))
+            graph, boxes = graph_of(room, None), Boxes(*values)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of what boxes of others do not keep
                 whole = generate(graph, boxes=boxes, seed=run.settings.seed, dress="none")
@@ -273,41 +272,14 @@ def _layout_scores(run: Run) -> dict[str, list[dict]]:
     }
 
 
-def _clouds(meshes: Sequence[trimesh.Trimesh]) -> np.ndarray:
-    """(n, POINTS, 3) float32 points on the surfaces in the unit box."""
-    units = [trimesh.Trimesh((m.vertices - m.bounds[0]) / m.extents - 0.5, m.faces, process=False) for m in meshes]
-    return np.stack([surface_points(unit, POINTS) for unit in units])
-
-
-def _shape_set(folder: str) -> ShapeSet:
-    path = Path(folder)
-    return ShapeSet(path / "shapes" if (path / "shapes").is_dir() else path)
-
-
-def _set_clouds(folder: str, count: int, seed: int) -> dict[str, np.ndarray]:
-    found, rng = _shape_set(folder), np.random.default_rng([seed, 22])
-    wanted = {word: range(count) for word in PUBLISHED if word in found.categories}
-    return reference_points(found, wanted, rng, lambda grid: _clouds([mesh_from_tsdf(grid)])[0])
-
-
-def _reconstruction(folder: str, seed: int, limit: int = 40) -> Table:
-    """Held-out shapes through the autoencoder."""
-    found, model = _shape_set(folder), EchoModel.load()
-    held = np.random.default_rng(seed).permutation(np.flatnonzero(found.held_out))[:limit]
-    scores = reconstruction_scores(
-        lambda i: found[int(held[i])], [found.categories[found.category[i]] for i in held],
-        lambda grid: model.reconstruct(torch.from_numpy(grid)[None])[0].cpu().numpy(),
-    )  # fmt: skip
-    rows = {name: {key: Figure(row[key]) for key in ("f_score", "iou", "chamfer")} for name, row in scores.items()}
-    return Table("shapes", "Held-out shapes there and back", f"{len(held)} shapes of {folder}.", rows)
-
-
 RUNNERS: dict[str, Callable[[Run], list[Table]]] = {
     "relations": relations,
     "faults": faults,
     "selection": selection,
     "field": field,
     "realism": realism,
+    "pictures": pictures,
+    "steps": steps,
     "shapes": shapes,
     "physics": physics,
 }

@@ -10,7 +10,10 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+
 from echomodel.loading import load_model
+from echomodel.metrics.pictures import SIDE, WEIGHTS, features
 from echomodel.metrics.tasks import tasks_of
 from echomodel.progress import StageListener
 from echomodel.roomboxes import RoomBoxes
@@ -26,6 +29,9 @@ def evaluate(settings: SuiteSettings, progress: StageListener | None = None) -> 
 
     Raises ValueError for systems, sets and sections that there are not.
     """
+    for kind in WEIGHTS:
+        if path := getattr(settings, kind):  # hours before they are wanted
+            features(np.zeros((1, SIDE, SIDE, 3), np.uint8), kind, path)
     systems = [System.parse(name) for name in dict.fromkeys([*settings.systems, *HONEST])]
     systems = list({system.name: system for system in systems}.values())
     theirs = {system.name: rooms_of(system, settings) for system in systems if system.foreign}

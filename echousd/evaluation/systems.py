@@ -117,8 +117,8 @@ def searched(task: Task, draft: RoomBoxes, config: PlaceConfig) -> RoomBoxes:
 # -- networks ----------------------------------------------------------------------------------------------------------
 
 
-def networks(model: RoomModel, guidance: float | None = 0.0) -> Layouts:
-    """Layouts by a model, many scenes at once; `guidance` of compact ones while sampling, None = the model's own."""
+def networks(model: RoomModel, guidance: float | None = 0.0, steps: int | None = None) -> Layouts:
+    """Layouts by a model, many scenes at once; `guidance` of compact ones, and `steps`: None = the model's own."""
     extra = {} if guidance is None or not isinstance(model, EchoModel) else {"relation_guidance": guidance}
 
     def layouts(tasks: Sequence[Task], seed: int) -> list[RoomBoxes]:
@@ -130,7 +130,7 @@ def networks(model: RoomModel, guidance: float | None = 0.0) -> Layouts:
             if isinstance(model, EchoModel):
                 each = SceneGenerators([seeded(seed, "layout", start + k) for k in range(len(part))], rows)
             with one_thread():
-                found = model.sample_layout(graph, generator=each, edit=_edit(part), **extra).to("cpu")
+                found = model.sample_layout(graph, generator=each, edit=_edit(part), steps=steps, **extra).to("cpu")
             for task, one in zip(part, torch.arange(sum(rows)).split(rows), strict=True):
                 out.append(_with_boxes(task.room, found[one]))
         return out

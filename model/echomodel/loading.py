@@ -15,7 +15,7 @@ from safetensors import SafetensorError, safe_open
 from echomodel.protocols import RoomModel
 
 PRESETS = ("compact", "paper", "released")
-COMPACT = "echousd-compact-1"
+COMPACT, RUN = "echousd-compact-1", "weights.safetensors"  # a format, and what a training calls its weights
 # format of a weights file -> class whose `load(path, device=...)` gives the model; imported when asked for
 LOADERS = {COMPACT: "echomodel.echo:EchoModel", "echousd-released-1": "echoscene.echo:ReleasedEcho"}
 
@@ -43,6 +43,8 @@ def load_model(model: RoomModel | str | Path | None, preset: str | None = None, 
 
 @lru_cache(maxsize=2)
 def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: str) -> RoomModel:
+    if path is not None and _format(path / RUN) in LOADERS.keys() - {COMPACT}:
+        path = path / RUN  # a training of published networks; a folder of compact weights is read as a whole
     module, name = LOADERS.get(_format(path), LOADERS[COMPACT]).split(":")
     found: RoomModel = getattr(import_module(module), name).load(path, device=device)
     return found
@@ -50,7 +52,7 @@ def _loaded(path: Path | None, stamp: tuple[tuple[str, int, int], ...], device: 
 
 def _format(path: Path | None) -> str:
     """What a weights file says it is, "" for folders, files that say nothing and those that cannot be read."""
-    if path is None or path.is_dir():
+    if path is None or not path.is_file():
         return ""
     try:
         with safe_open(path, framework="pt") as file:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -52,7 +53,6 @@ class ClipTextEncoder:
 
     def __init__(self, weights: str | os.PathLike[str] | None = None) -> None:
         self.weights = str(weights) if weights is not None else PUBLISHED_WEIGHTS
-        self._model: torch.nn.Module | None = None
 
     @property
     def name(self) -> str:
@@ -68,14 +68,15 @@ class ClipTextEncoder:
     @torch.inference_mode()
     def __call__(self, texts: Sequence[str]) -> Tensor:
         """n texts -> (n, 512) float32; raises TextEncoderError if package or weights are absent."""
-        if self._model is None:
-            self._model = self._load()
+        model = self.model
         import open_clip
 
         tokens = open_clip.get_tokenizer(PUBLISHED_MODEL)(list(texts))
-        return self._model.encode_text(tokens, normalize=False).float()  # type: ignore[operator]
+        return model.encode_text(tokens, normalize=False).float()  # type: ignore[operator]
 
-    def _load(self) -> torch.nn.Module:
+    @cached_property
+    def model(self) -> torch.nn.Module:
+        """Both towers; raises TextEncoderError if package or weights are absent."""
         try:
             import open_clip
         except ImportError:

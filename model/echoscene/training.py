@@ -24,6 +24,7 @@ from echoscene.config import PaperSizes, paper
 from echoscene.echo import pack_changes, pack_scenes, pseudo_graph, published_grids, published_scene
 from echoscene.encoder import SceneGraphTensors
 from echoscene.model import GraphChange, ReleasedModel
+from echoscene.published import PublishedRooms, PublishedShapes
 from echoscene.weights import load_released, write_released
 
 SCENE_BOX = (-1.0,) * 6  # what the published loader gives the `_scene_` node, with an angle of -1
@@ -62,8 +63,8 @@ class PaperStage:
 
     def __init__(
         self,
-        rooms: RoomSet,
-        shapes: ShapeSet,
+        rooms: RoomSet | PublishedRooms,
+        shapes: ShapeSet | PublishedShapes,
         text: TextEncoder,
         *,
         scenes: int,
@@ -100,7 +101,7 @@ class PaperStage:
         return {f"held/{name}": float(losses[name]) for name in ("layout", "shape")}
 
     def _autoencoding(self, model: PaperModel, numbers: np.ndarray) -> Tensor:
-        grids = published_grids(read(self.shapes, numbers), model.vqvae.config.resolution)
+        grids = grids_of(self.shapes, numbers, model.vqvae.config.resolution)
         return model.vqvae.loss(grids.to(model.device))
 
     def _draw(self, generator: torch.Generator, *, held: bool) -> list[RoomBoxes]:
@@ -146,7 +147,7 @@ class PaperStage:
             known = torch.zeros(len(room), 1, side, side, side)
             rows = [k for k, number in enumerate(own) if number >= 0]
             if rows:
-                known[rows] = published_grids(read(self.shapes, np.array([own[k] for k in rows])), side)
+                known[rows] = grids_of(self.shapes, np.array([own[k] for k in rows]), side)
             grids += [known, empty]
         encoder = model.vqvae.eval()
         found = torch.cat([encoder.encode(part.to(model.device)) for part in torch.cat(grids).split(8)])
@@ -164,7 +165,7 @@ def scene_boxes(room: RoomBoxes, statistics: BoxStatistics) -> Tensor:
     return torch.cat([Boxes.cat([objects, floor]).encode(statistics.scale()), scene[None]])
 
 
-def box_bounds(rooms: RoomSet, count: int = 2000) -> BoxStatistics:
+def box_bounds(rooms: RoomSet | PublishedRooms, count: int = 2000) -> BoxStatistics:
     """Lowest and highest sizes and positions of a set's first rooms, floors included, as the published bounds file."""
     boxes = []
     for number in range(min(count, len(rooms))):
@@ -184,6 +185,22 @@ def box_bounds(rooms: RoomSet, count: int = 2000) -> BoxStatistics:
         bound(every.position.amin(0)),
         bound(every.position.amax(0)),
     )
+
+
+def opened_data(recipe: Recipe) -> tuple[RoomSet | PublishedRooms, ShapeSet | PublishedShapes]:
+    """The recipe's rooms and shapes; `data` may be a folder of SG-FRONT. Raises ValueError for what is not there."""
+    folder = Path(recipe.data)
+    if not (folder / "classes_all.txt").is_file():
+        return RoomSet(data_folder(recipe, "rooms")), ShapeSet(data_folder(recipe, "shapes"))
+    shapes = ShapeSet(folder / "shapes") if (folder / "shapes").is_dir() else PublishedShapes(folder)
+    return PublishedRooms(folder), shapes
+
+
+def grids_of(shapes: ShapeSet | PublishedShapes, numbers: np.ndarray, side: int) -> Tensor:
+    """(K, 1, side, side, side) float32 distances of some shapes in the published frame."""
+    if isinstance(shapes, PublishedShapes):
+        return shapes.published(numbers, side)
+    return published_grids(read(shapes, numbers), side)
 
 
 def paper_model(sizes: PaperSizes, start: tuple[str, ...] = ()) -> PaperModel:
@@ -221,7 +238,7 @@ def opened(
     autoencoder = recipe.stage == "paper_vqvae"
     if not autoencoder and not recipe.start and not resume:
         raise ValueError("recipe field 'start': stage 'paper' needs the weights of a 'paper_vqvae' run")
-    rooms, shapes = RoomSet(data_folder(recipe, "rooms")), ShapeSet(data_folder(recipe, "shapes"))
+    rooms, shapes = opened_data(recipe)
     model = paper_model(sizes, recipe.start)
     if model.statistics is None:
         model.statistics = box_bounds(rooms)

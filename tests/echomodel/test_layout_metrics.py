@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from echomodel.data.roomset import with_known_words
 from echomodel.metrics.bodies import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.layouts import HALVES, clearance, fullness, layout_scores, navigability
-from echomodel.metrics.report import compare, section_means
-from echomodel.metrics.room_figures import ray_lengths, room_figures
 from echomodel.metrics.sets import (
     category_divergence,
     frechet_distance,
@@ -29,10 +28,10 @@ from echomodel.metrics.tasks import (
     extended,
     kept_relations,
     tasks_of,
-    with_known_words,
 )
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
+from echomodel.rooms.figures import compare, ray_lengths, room_figures, section_means
 from echomodel.rooms.generator import generate_rooms
 
 FLOOR = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]], float)

@@ -8,9 +8,9 @@ from shapely import affinity
 from shapely.geometry import Polygon, box
 
 from echomodel.metrics.layouts import layout_scores
-from echomodel.metrics.room_figures import room_figures
 from echomodel.metrics.tasks import Task
 from echomodel.rooms.builder import Item, overlaps
+from echomodel.rooms.figures import room_figures
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.recipes import SOFA_KINDS

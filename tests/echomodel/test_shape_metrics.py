@@ -2,15 +2,12 @@
 
 import numpy as np
 import pytest
-import trimesh
 
 from echomodel.metrics.shapes import (
     reconstruction_scores,
     set_scores,
-    style_likeness,
     surface_points,
     surface_scores,
-    watertight_share,
 )
 from echomodel.tsdf import FILLED, RESOLUTION, TRUNCATION, mesh_from_tsdf
 
@@ -70,16 +67,6 @@ def clouds():
     return np.stack([shape + rng.normal(0, 0.002, shape.shape) for shape in shapes for _ in range(3)]).astype("f4")
 
 
-def test_shapes_of_one_style_are_closer_than_the_class():
-    groups = [("chair", i // 3) for i in range(9)]
-    likeness = style_likeness(clouds(), groups)
-    assert likeness["within_n"] == 9
-    assert likeness["ratio"] < 0.01
-    shuffled = style_likeness(clouds(), [("chair", i % 3) for i in range(9)])
-    assert shuffled["ratio"] > 0.5
-    assert style_likeness(clouds()[:3], [("chair", 0), ("desk", 0), ("desk", 1)]) == {}
-
-
 def test_a_set_covers_itself_and_not_another():
     points = clouds()
     same = set_scores({"chair": points}, {"chair": points})["chair"]
@@ -88,12 +75,6 @@ def test_a_set_covers_itself_and_not_another():
     apart = set_scores({"chair": points}, {"chair": points + 10, "desk": points})
     assert apart["chair"]["acc"] == 1.0
     assert set(apart) == {"chair", "mean"}
-
-
-def test_closed_meshes_are_counted():
-    closed = mesh_from_tsdf(box_grid(10))
-    open_mesh = trimesh.Trimesh(closed.vertices, closed.faces[5:], process=False)
-    assert watertight_share([closed, closed, open_mesh, closed]) == 0.75
 
 
 def test_points_repeat_for_equal_seeds():

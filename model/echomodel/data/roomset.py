@@ -10,7 +10,7 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -277,3 +277,27 @@ def rooms_of_type(rooms: list[RoomBoxes], word: str, path: Path) -> list[RoomBox
     if not kept:
         raise ValueError(f"{path}: holds no room of type {wanted}")
     return kept
+
+
+def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
+    """The rooms in the vocabulary's words, without the objects that it does not hold."""
+    out = []
+    for room in rooms:
+        rows = [vocabulary().known_category(word) for word in room.categories]
+        keep = [k for k, row in enumerate(rows) if row is not None]
+        styles = room.styles or (-1,) * len(room)
+        models = room.models or ("",) * len(room)
+        out.append(
+            replace(
+                room,
+                room_type=vocabulary().room_type(room.room_type).name,
+                categories=tuple(row.name for row in rows if row is not None),
+                size=room.size[keep],
+                position=room.position[keep],
+                yaw=room.yaw[keep],
+                models=tuple(models[k] for k in keep),
+                styles=tuple(styles[k] for k in keep),
+                relations=None,
+            )
+        )
+    return out

@@ -10,15 +10,13 @@ import trimesh
 from torch import Tensor
 
 from echomodel.boxes import Boxes
-from echomodel.echo import EchoModel
-from echomodel.furniture import mesh_of, sample_size, solids
-from echomodel.furniture.description import GROUPS, HOT, STYLE, piece_of
+from echomodel.furniture import mesh_of, sample_size
+from echomodel.furniture.description import GROUPS, HOT, STYLE
 from echomodel.furniture.solids import Solid
 from echomodel.graph import GraphBatch
 from echomodel.metrics.pieces import loose_solids
 from echomodel.objective.sizes import size_range
-from echomodel.roomboxes import RoomBoxes
-from echomodel.rules import label_relations
+from echomodel.protocols import FurnitureModel
 from echomodel.vocabulary import vocabulary
 
 SUITE = 4  # pieces of different classes in a suite
@@ -37,19 +35,6 @@ def piece_scores(parts: Sequence[Solid], size: np.ndarray) -> tuple[trimesh.Trim
         "loose": float(loose),
         "box_error": float(np.abs(mesh.extents - size).max()),
     }
-
-
-def room_pieces(model: EchoModel, rooms: Sequence[RoomBoxes], seed: int) -> list[dict[str, float]]:
-    """What the furniture of rooms scores, piece by piece; half of what holds in each is told."""
-    rng, generator = np.random.default_rng([seed, 6]), torch.Generator().manual_seed(seed)
-    words, out = [category.name for category in vocabulary().categories], []
-    for room in rooms:
-        relations = label_relations(room, rules="strict", drop=0.5, rng=rng)
-        graph = GraphBatch.from_room(room, triplets=torch.from_numpy(relations))
-        found = model.sample_furniture(graph, Boxes.from_room(room), generator=generator).float().cpu().numpy()
-        for number, vector, size in zip(graph.category.tolist(), found, room.size, strict=True):
-            out.append(piece_scores(solids(words[number], *piece_of(vector), np.asarray(size)), np.asarray(size))[1])
-    return out
 
 
 def style_scores(
@@ -100,7 +85,7 @@ def usual_size(category: str, rng: np.random.Generator) -> np.ndarray:
     return np.clip(sample_size(category, rng), *map(np.array, size_range(category)))
 
 
-def sampled(model: EchoModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> Tensor:
+def sampled(model: FurnitureModel, graph: GraphBatch, sizes: np.ndarray, generator: torch.Generator) -> Tensor:
     """(N, D) float32 descriptions of the furniture of a graph in boxes `sizes` (N, 3), metres."""
     count = graph.num_nodes
     boxes = Boxes(torch.from_numpy(sizes).float(), torch.zeros(count, 3), torch.zeros(count))

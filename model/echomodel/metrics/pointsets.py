@@ -104,10 +104,14 @@ def one_nearest_neighbour(within_first: Tensor, between: Tensor, within_second: 
 def compare_sets(
     samples: Tensor, references: Tensor, matrix: Callable[[Tensor, Tensor], Tensor] = chamfer_matrix
 ) -> dict[str, float]:
-    """All of the above for two lists of point sets, samples (S, P, 3) and references (R, P, 3) float32."""
+    """All of the above for two lists of point sets, samples (S, P, 3) and references (R, P, 3) float32.
+
+    And `variety`: mean distance of two samples.
+    """
     between = matrix(samples, references)
     within = matrix(references, references), matrix(samples, samples)
-    return coverage(between) | one_nearest_neighbour(within[0], between.t(), within[1])
+    variety = float(within[1].sum() / max(len(samples) * (len(samples) - 1), 1))
+    return coverage(between) | one_nearest_neighbour(within[0], between.t(), within[1]) | {"variety": variety}
 
 
 def _small(one: Tensor, others: Tensor) -> bool:

@@ -21,6 +21,7 @@ from echomodel.vocabulary import vocabulary
 COMPONENTS = 12  # principal components of the reference that layout features are told in
 SUBSETS, PART = 60, 0.8  # random parts of both sets that give a figure its interval
 FOLDS, TREES, LEAF = 4, 150, 3
+AXES = ("width", "height", "depth")
 SCORES = 3.0  # standard scores beyond which a size is told no further
 WORDS = 2  # the last columns of what is measured of an object are words
 
@@ -113,10 +114,10 @@ def neighbours(ours: np.ndarray, theirs: np.ndarray) -> dict[str, float]:
 
 def frechet_distance(first: np.ndarray, second: np.ndarray) -> float:
     """|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) of (A, D) and (B, D) (Heusel et al. 2017); features as they are."""
-    means = [np.mean(part, 0) for part in (first, second)]
-    spreads = [np.atleast_2d(np.cov(part, rowvar=False)) for part in (first, second)]
-    root = np.sqrt(np.linalg.eigvals(spreads[0] @ spreads[1]).real.clip(0)).sum()  # trace of the square root
-    return float(np.sum((means[0] - means[1]) ** 2) + np.trace(spreads[0]) + np.trace(spreads[1]) - 2 * root)
+    means = [part.mean(0) for part in (first, second)]
+    a, b = ((part - m) / np.sqrt(len(part) - 1) for part, m in zip((first, second), means, strict=True))
+    root = np.linalg.svd(a @ b.T, compute_uv=False).sum()  # C1 = a'a, C2 = b'b: the trace of the square root
+    return float(((means[0] - means[1]) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * root)
 
 
 def kernel_distance(first: np.ndarray, second: np.ndarray) -> float:
@@ -174,16 +175,18 @@ def told_apart(
     return Figure(float(roc_auc_score(truth, score)), float(low), float(high), len(made))
 
 
+def size_scores(rooms: Sequence[RoomBoxes]) -> np.ndarray:
+    """(n, 3) standard scores of width, height and depth within the classes, to a thousandth."""
+    rows = [size_score(w, room.size[k : k + 1]) for room in rooms for k, w in enumerate(room.categories)]
+    return np.round(np.concatenate(rows), 3)
+
+
 def size_distances(rooms: Sequence[RoomBoxes], reference: Sequence[RoomBoxes]) -> dict[str, float]:
-    """Kolmogorov-Smirnov distances of the standard scores of sizes within their classes, axis by axis."""
+    """Kolmogorov-Smirnov distances of `size_scores`, axis by axis."""
     from scipy.stats import ks_2samp
 
-    def scores(part: Sequence[RoomBoxes]) -> np.ndarray:
-        return np.concatenate([size_score(w, r.size[k : k + 1]) for r in part for k, w in enumerate(r.categories)])
-
-    ours, theirs = (np.round(scores(part), 3) for part in (rooms, reference))
-    names = ("width", "height", "depth")
-    return {n: float(ks_2samp(ours[:, k], theirs[:, k], method="asymp").statistic) for k, n in enumerate(names)}
+    pairs = zip(AXES, size_scores(rooms).T, size_scores(reference).T, strict=True)
+    return {name: float(ks_2samp(ours, theirs, method="asymp").statistic) for name, ours, theirs in pairs}
 
 
 def layout_distance(one: RoomBoxes, other: RoomBoxes) -> float:

@@ -1,4 +1,4 @@
-"""Scores of shapes: reconstruction (F-score, IoU, Chamfer), sets (MMD, COV, 1-NNA), watertightness, style likeness.
+"""Scores of shapes: reconstruction (F-score, IoU, Chamfer) and sets (MMD, COV, 1-NNA).
 
 All distances are measured in the box frame, in which a shape fills the unit box; one voxel of the grid is 1/60 there,
 and the F-score's threshold is 1/64.
@@ -95,42 +95,6 @@ def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
 
 
-def style_likeness(points: np.ndarray, groups: Sequence[tuple[str, object]]) -> dict[str, float]:
-    """Chamfer distance between shapes of one style group beside that between shapes of the class at large.
-
-    Arguments:
-        points: (n, p, 3) float32 surface points.
-        groups: (class, group) per shape; shapes with equal pairs belong to one style group.
-
-    Returns:
-        `within` and `between`, means over classes that have both kinds of pairs; their `ratio`; the number of pairs
-        `within_n`. Empty when no class has both.
-    """
-    import torch
-
-    from echomodel.metrics.pointsets import chamfer_matrix
-
-    members: dict[str, list[int]] = defaultdict(list)
-    for i, (label, _) in enumerate(groups):
-        members[label].append(i)
-    within, between, pairs = [], [], 0
-    for indices in members.values():
-        if len(indices) < 3:
-            continue
-        chosen = torch.as_tensor(points[indices])
-        matrix = chamfer_matrix(chosen, chosen).numpy()
-        same = np.array([[groups[i][1] == groups[j][1] for j in indices] for i in indices])
-        upper = np.triu(np.ones_like(same), 1).astype(bool)
-        if (same & upper).any() and (~same & upper).any():
-            within.append(matrix[same & upper].mean())
-            between.append(matrix[~same & upper].mean())
-            pairs += int((same & upper).sum())
-    if not within:
-        return {}
-    inside, outside = float(np.mean(within)), float(np.mean(between))
-    return {"within": inside, "between": outside, "ratio": inside / max(outside, 1e-12), "within_n": float(pairs)}
-
-
 def set_scores(
     generated: Mapping[str, np.ndarray], references: Mapping[str, np.ndarray], least: int = 4, *, points: int = 0
 ) -> dict[str, dict[str, float]]:
@@ -170,8 +134,3 @@ def reference_points(
         if len(chosen):
             found[name] = np.stack([points(shapes[int(i)]) for i in chosen])
     return found
-
-
-def watertight_share(meshes: Sequence[trimesh.Trimesh]) -> float:
-    """Share of meshes that are closed with consistent winding."""
-    return float(np.mean([mesh.is_watertight and mesh.is_winding_consistent for mesh in meshes]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,30 +55,6 @@ class Task:
         return GraphBatch.from_room(self.room, triplets=torch.from_numpy(self.told))
 
 
-def with_known_words(rooms: Iterable[RoomBoxes]) -> list[RoomBoxes]:
-    """The rooms in the vocabulary's words, without the objects that it does not hold."""
-    out = []
-    for room in rooms:
-        rows = [vocabulary().known_category(word) for word in room.categories]
-        keep = [k for k, row in enumerate(rows) if row is not None]
-        styles = room.styles or (-1,) * len(room)
-        models = room.models or ("",) * len(room)
-        out.append(
-            replace(
-                room,
-                room_type=vocabulary().room_type(room.room_type).name,
-                categories=tuple(row.name for row in rows if row is not None),
-                size=room.size[keep],
-                position=room.position[keep],
-                yaw=room.yaw[keep],
-                models=tuple(models[k] for k in keep),
-                styles=tuple(styles[k] for k in keep),
-                relations=None,
-            )
-        )
-    return out
-
-
 def tasks_of(
     rooms: Sequence[RoomBoxes], seed: int, *, rules: str = "strict", told: float | None = None, drop: float = 0.5
 ) -> list[Task]:
@@ -86,13 +62,15 @@ def tasks_of(
 
     Arguments:
         rooms: in the vocabulary's words (`with_known_words`). seed: of what is told.
-        told: relations an object, near pairs first, as people write; None = all that the rules find but for `drop` of
-            them, as published.
+        told: relations an object, near pairs first, as people write; None = those that a room has, as published
+            graphs do, else all that the rules find but for `drop` of them.
     """
     rng = np.random.default_rng([seed, 11])
     labels = label_rooms(rooms, rules=rules, drop=drop if told is None else 0.0, rng=rng)
     if told is not None:
         labels = [told_of_room(edges, room, told, seed) for edges, room in zip(labels, rooms, strict=True)]
+    else:
+        labels = [edges if r.relations is None else r.relations for edges, r in zip(labels, rooms, strict=True)]
     return [Task(room, np.asarray(edges, np.int64), rules=rules) for room, edges in zip(rooms, labels, strict=True)]
 
 
