@@ -18,7 +18,7 @@ from echomodel.graph import GraphBatch
 from echomodel.loading import load_model
 from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usual_size
 from echomodel.metrics.pointsets import chamfer_matrix
-from echomodel.metrics.shapes import reconstruction_scores, reference_points, set_scores, surface_points
+from echomodel.metrics.shapes import reconstruction_scores, set_scores, surface_points
 from echomodel.metrics.statistics import Counts, Figure, figure, interval
 from echomodel.protocols import RoomModel, furnishes
 from echomodel.tsdf import mesh_from_tsdf
@@ -61,7 +61,9 @@ def shapes(run: Run) -> list[Table]:
     made["programs"] = programs(sizes, [seed, 21, 1])
     against = {word: clouds(row) for word, row in programs(sizes, [seed, 21, 2]).items()}
     if run.settings.shapes:
-        against = _set_clouds(run.settings.shapes, count, seed)
+        folder = Path(run.settings.shapes)
+        held = ShapeSet(folder / "shapes" if (folder / "shapes").is_dir() else folder)
+        against = _set_clouds(held, count, seed)
     ours = {name: {word: clouds(row[word]) for word in against} for name, row in made.items()}
     scored = {
         (name, distance): set_scores(by_class, against, points=points)
@@ -86,7 +88,7 @@ def shapes(run: Run) -> list[Table]:
             tables.append(Table("shapes", f"{FIGURES[key]} by class, {distance}", "", by, plain=True))
     tables.append(_consistency(models, sizes, seed))
     if run.settings.shapes:
-        return [*tables, _reconstruction(run.settings.shapes, seed)]
+        return [*tables, _reconstruction(held, run.settings.shapes, seed)]
     run.missing.append("reconstruction of held-out shapes: name a set with --shapes (echousd data build, data meshes)")
     return tables
 
@@ -173,24 +175,21 @@ def _consistency(models: dict[str, RoomModel], sizes: Mapping[str, np.ndarray], 
     return Table("shapes", "Consistency", note, rows)
 
 
-def _shape_set(folder: str) -> ShapeSet:
-    path = Path(folder)
-    return ShapeSet(path / "shapes" if (path / "shapes").is_dir() else path)
+def _set_clouds(found: ShapeSet, count: int, seed: int) -> dict[str, np.ndarray]:
+    rng, out = np.random.default_rng([seed, 22]), {}
+    for word in PUBLISHED:
+        if word in found.categories:
+            chosen = rng.permutation(np.flatnonzero(found.category == found.categories.index(word)))[:count]
+            out[word] = clouds([mesh_from_tsdf(found[int(i)]) for i in chosen])
+    return out
 
 
-def _set_clouds(folder: str, count: int, seed: int) -> dict[str, np.ndarray]:
-    found, rng = _shape_set(folder), np.random.default_rng([seed, 22])
-    wanted = {word: range(count) for word in PUBLISHED if word in found.categories}
-    return reference_points(found, wanted, rng, lambda grid: clouds([mesh_from_tsdf(grid)])[0])
-
-
-def _reconstruction(folder: str, seed: int) -> Table:
+def _reconstruction(found: ShapeSet, name: str, seed: int) -> Table:
     """Held-out shapes through the autoencoder."""
-    found, model = _shape_set(folder), EchoModel.load()
-    held = np.random.default_rng(seed).permutation(np.flatnonzero(found.held_out))[:HELD]
+    model, held = EchoModel.load(), np.random.default_rng(seed).permutation(np.flatnonzero(found.held_out))[:HELD]
     scores = reconstruction_scores(
-        lambda i: found[int(held[i])], [found.categories[found.category[i]] for i in held],
+        [found[int(i)] for i in held], [found.categories[found.category[i]] for i in held],
         lambda grid: model.reconstruct(torch.from_numpy(grid)[None])[0].cpu().numpy(),
     )  # fmt: skip
     rows = {name: {key: Figure(row[key]) for key in ("f_score", "iou", "chamfer")} for name, row in scores.items()}
-    return Table("shapes", "Held-out shapes there and back", f"{len(held)} shapes of {folder}.", rows)
+    return Table("shapes", "Held-out shapes there and back", f"{len(held)} shapes of {name}.", rows)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -141,7 +142,8 @@ def run_systems(
     made: dict[str, list[RoomBoxes]] = {}
     seconds: dict[str, float] = {}
     bases: dict[tuple[str, int], tuple[list[RoomBoxes], float]] = {}
-    with Workers(settings.workers) as pool:
+    several = settings.workers > 1
+    with ProcessPoolExecutor(settings.workers, get_context("spawn")) if several else nullcontext() as pool:
         for number, system in enumerate(systems):
             drafts, spent = [], 0.0
             for draft in range(settings.drafts if system.finish == "half" else 1):
@@ -151,7 +153,8 @@ def run_systems(
                     bases[system.base, draft] = found, time.process_time() - began
                 drafts.append(bases[system.base, draft][0])
                 spent += bases[system.base, draft][1]
-            done = pool.map(_finished, [(system, *row) for row in zip(tasks, zip(*drafts, strict=True), strict=True)])
+            asked = [(system, *row) for row in zip(tasks, zip(*drafts, strict=True), strict=True)]
+            done = list(pool.map(_finished, asked, chunksize=2) if pool else map(_finished, asked))
             made[system.name] = [room for room, _ in done]
             seconds[system.name] = (spent + sum(took for _, took in done)) / len(tasks)
             if progress:
@@ -162,24 +165,6 @@ def run_systems(
 def _finished(asked: tuple[System, Task, Sequence[RoomBoxes]]) -> tuple[RoomBoxes, float]:
     began = time.process_time()
     return finished(*asked), time.process_time() - began
-
-
-class Workers:
-    """A map over so many processes, in order; none of them where one is enough."""
-
-    def __init__(self, count: int) -> None:
-        self.pool = ProcessPoolExecutor(count, get_context("spawn")) if count > 1 else None
-
-    def __enter__(self) -> Workers:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.pool:
-            self.pool.shutdown()
-
-    def map(self, function: Callable, rows: Sequence) -> list:
-        """The function of every row."""
-        return list(self.pool.map(function, rows, chunksize=2) if self.pool else map(function, rows))
 
 
 def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[str]]:

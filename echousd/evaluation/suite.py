@@ -21,6 +21,7 @@ from echousd.evaluation.runs import HONEST, SECTIONS, Run, SuiteSettings, rooms_
 from echousd.evaluation.sections import RUNNERS
 from echousd.evaluation.systems import System, described
 
+OWN = {"relations", "shapes"}  # sections that ask by tasks of their own
 LIBRARIES = ("numpy", "scipy", "torch", "scikit-learn", "echousd")
 
 
@@ -37,13 +38,14 @@ def evaluate(settings: SuiteSettings, progress: StageListener | None = None) -> 
     theirs = {system.name: rooms_of(system, settings) for system in systems if system.foreign}
     rooms, others = rooms_against(settings)
     tasks = tasks_of(rooms, settings.seed, told=settings.told)
-    asked, seconds = run_systems([s for s in systems if not s.foreign], tasks, settings, progress)
-    made = {s.name: asked.get(s.name) or [task.room for task in theirs[s.name][0]] for s in systems}
+    chosen = [name for name in SECTIONS if name in (settings.only or SECTIONS)]
+    able = [s for s in systems if not s.foreign and {*chosen} - OWN]
+    asked, seconds = run_systems(able, tasks, settings, progress)
+    made = {s.name: asked.get(s.name) or [t.room for t in theirs[s.name][0]] for s in systems if s.foreign or asked}
     of = {s.name: theirs[s.name][0] if s.foreign else tasks for s in systems}
     run = Run(
         settings, systems, tasks, others, made, of, seconds, [note for _, notes in theirs.values() for note in notes]
     )
-    chosen = [name for name in SECTIONS if name in (settings.only or SECTIONS)]
     tables = []
     for number, name in enumerate(chosen):
         tables += RUNNERS[name](run)

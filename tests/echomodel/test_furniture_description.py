@@ -9,8 +9,8 @@ from echomodel.furniture import Choices, Style, mesh_of, sample_size, solids
 from echomodel.furniture.assembly import pieces_of
 from echomodel.furniture.choices import OPEN
 from echomodel.furniture.description import GROUPS, STYLE, WIDTH, described, draw_styles, piece_of
+from echomodel.furniture.joined import loose_solids
 from echomodel.furniture.solids import FINEST
-from echomodel.metrics.pieces import loose_solids
 from echomodel.vocabulary import vocabulary
 
 CATEGORIES = [category.name for category in vocabulary().categories]

@@ -156,6 +156,7 @@ def test_sets_on_closed_forms():
 def test_a_forest_tells_what_differs_and_nothing_else(rooms):
     wild = [replace(r, position=np.roll(r.position, 1, axis=0)) for r in rooms[:20]]
     assert told_apart(wild, rooms[:20], 0, paired=True).value > 0.85
+    assert told_apart(wild[:3], rooms[:3], 0, paired=True).value is None
     nothing = told_apart(rooms[:20], rooms[20:], 0)
     assert nothing.low < 0.5 < nothing.high
     digits = [replace(r, position=r.position + 1e-4, yaw=r.yaw + 1e-4) for r in rooms[:20]]

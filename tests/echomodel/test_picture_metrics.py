@@ -1,4 +1,4 @@
-"""Rooms from above: where things lie in them, how bright they are, and what is seen in them by weights from the disk."""
+"""Rooms from above: where things lie in them, how bright they are, and what weights from the disk see in them."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def test_it_shines_as_the_published_shader_says():
     # light, camera and normal in one line: Fresnel 0.04 * 0.8 + 0.3 * 0.2, spread 1 / (pi 0.64^2), nothing masked
     fresnel, spread = 0.092, 1 / (np.pi * 0.64**2)
     light = (2 + 20 / 6**2) * ((1 - fresnel) * 0.3 * 0.96 * 0.8 / np.pi + fresnel * spread / 4.001)
-    hue = np.array([0.86, 0.34, 0.5371])  # the 14th of 14 hues of seaborn: 13 / 14 + 0.01, lightness 0.6, saturation 0.65
+    hue = np.array([0.86, 0.34, 0.5371])  # the 14th of 14 hues of seaborn, lightness 0.6, saturation 0.65
     assert shown[128, 128] == pytest.approx(255 * (light * hue) ** (1 / 2.2), abs=3)
 
 
@@ -81,7 +81,7 @@ def test_their_distances_have_closed_forms():
     assert found["FID"].low <= found["FID"].value * 1.1
     assert picture_figures(a, b, ("FID-CLIP",), 0)["FID-CLIP"] == found["FID"]
     ones, zeros = np.ones((9, 4)), np.zeros((9, 4))
-    assert picture_figures(ones, zeros, ("FID", "KID x 1000"), 0)["KID x 1000"].value == pytest.approx(7000)  # 8 + 1 - 2
+    assert picture_figures(ones, zeros, ("FID", "KID x 1000"), 0)["KID x 1000"].value == pytest.approx(7000)
     wide = rng.normal(0, 1, (12, 300))  # fewer pictures than numbers: by the matrix product of Heusel et al.
     other = wide @ rng.normal(0, 0.1, (300, 300))
     product = np.linalg.eigvals(np.cov(wide, rowvar=False) @ np.cov(other, rowvar=False))

@@ -12,9 +12,9 @@ from torch import Tensor
 from echomodel.boxes import Boxes
 from echomodel.furniture import mesh_of, sample_size
 from echomodel.furniture.description import GROUPS, HOT, STYLE
+from echomodel.furniture.joined import loose_solids
 from echomodel.furniture.solids import Solid
 from echomodel.graph import GraphBatch
-from echomodel.metrics.pieces import loose_solids
 from echomodel.objective.sizes import size_range
 from echomodel.protocols import FurnitureModel
 from echomodel.vocabulary import vocabulary

@@ -147,7 +147,8 @@ def told_apart(
 ) -> Figure:  # fmt: skip
     """Area under the curve of a random forest that tells made rooms from real ones, by their objects; 0.5 = it cannot.
 
-    It judges rooms that it was not trained on; a room's score is the mean over its objects.
+    It judges rooms that it was not trained on; a room's score is the mean over its objects. Fewer rooms than there are
+    folds of them are not told apart: no value.
 
     Arguments:
         paired: the n-th of both are the same furniture, and judged by the same fold.
@@ -156,6 +157,8 @@ def told_apart(
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import GroupKFold
 
+    if min(len(made), len(real)) < FOLDS:
+        return Figure(None)
     rooms = [*made, *real]
     tables = [object_features(room) for room in rooms]
     x, room = np.concatenate(tables), np.repeat(np.arange(len(rooms)), [len(table) for table in tables])

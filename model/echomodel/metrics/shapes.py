@@ -7,18 +7,15 @@ and the F-score's threshold is 1/64.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence, Sized
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import torch
 import trimesh
 from scipy.spatial import cKDTree
 
-from echomodel.progress import StepListener
+from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, earth_mover_matrix
 from echomodel.tsdf import mesh_from_tsdf
-
-if TYPE_CHECKING:
-    from echomodel.data.shapeset import ShapeSet
 
 THRESHOLD = 1 / 64
 SAMPLES = 8_000  # points whose distance is scored
@@ -67,27 +64,18 @@ def _distances(mesh: trimesh.Trimesh, target: trimesh.Trimesh) -> np.ndarray:
 
 
 def reconstruction_scores(
-    grids: Callable[[int], np.ndarray],
-    labels: Sequence[str],
-    reconstruct: Callable[[np.ndarray], np.ndarray],
-    progress: StepListener | None = None,
+    grids: Sequence[np.ndarray], labels: Sequence[str], reconstruct: Callable[[np.ndarray], np.ndarray]
 ) -> dict[str, dict[str, float]]:
     """Mean `surface_scores` of reconstructions, per label and under "all" (mean over shapes), with their number `n`.
 
     Arguments:
-        grids: shape number -> (64, 64, 64) float32.
-        labels: a class per shape.
-        reconstruct: grid -> grid.
-        progress: called with (done, all).
+        grids: (64, 64, 64) float32 each, with a class of `labels` each. reconstruct: grid -> grid.
     """
     found: dict[str, list[dict[str, float]]] = defaultdict(list)
-    for i, label in enumerate(labels):
-        grid = grids(i)
+    for label, grid in zip(labels, grids, strict=True):
         scores = surface_scores(reconstruct(grid), grid)
         found[label].append(scores)
         found["all"].append(scores)
-        if progress:
-            progress(i + 1, len(labels))
     return {label: {**_means(rows), "n": float(len(rows))} for label, rows in sorted(found.items())}
 
 
@@ -105,10 +93,6 @@ def set_scores(
         least: classes with fewer shapes on either side are left out.
         points: by the earth mover's distance of so many points each; 0 = by the Chamfer distance of all.
     """
-    import torch
-
-    from echomodel.metrics.pointsets import chamfer_matrix, compare_sets, earth_mover_matrix
-
     matrix = earth_mover_matrix if points else chamfer_matrix
 
     scores: dict[str, dict[str, float]] = {}
@@ -121,16 +105,3 @@ def set_scores(
     if scores:
         scores["mean"] = _means(list(scores.values()))
     return scores
-
-
-def reference_points(
-    shapes: ShapeSet, made: Mapping[str, Sized], rng: np.random.Generator, points: Callable[[np.ndarray], np.ndarray]
-) -> dict[str, np.ndarray]:
-    """`points` of the grids of a set, class -> (n, p, 3): as many shapes as were made, where the set has them."""
-    found: dict[str, np.ndarray] = {}
-    for name, own in made.items():
-        members = np.flatnonzero(shapes.category == shapes.categories.index(name))
-        chosen = rng.permutation(members)[: len(own)]
-        if len(chosen):
-            found[name] = np.stack([points(shapes[int(i)]) for i in chosen])
-    return found
