@@ -21,6 +21,7 @@ import numpy as np
 import torch
 
 SAMPLE = Path(__file__).parents[1] / "samples" / "living_room.usda"
+HOME = "kitchen open_to living, hall door living, hall door bedroom*2, hall door bathroom"
 READ = 512e6  # bytes of a read
 
 
@@ -32,9 +33,12 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
     from echomodel.metrics.tasks import tasks_of
     from echomodel.rooms.generator import generate_rooms
     from echousd.checks import check
-    from echousd.draw.rendering import render_stage
+    from echousd.draw.rendering import render
     from echousd.evaluation.systems import BASES, System, finished
     from echousd.exporting import export
+    from echousd.home.graph import home_of_words
+    from echousd.home.plan import plan_home
+    from echousd.settle import settle
 
     task = tasks_of(generate_rooms(1, 770_000, room_type="living_room"), 0, told=1.0)[0]
     load_model(None)
@@ -54,7 +58,9 @@ def areas(folder: Path) -> dict[str, Callable[[], object]]:
         "a room generated": made,
         "a room written": lambda: held["room"].save(root.parent, preview=False),  # type: ignore[attr-defined]
         "a room checked": lambda: check(root),
-        "a picture": lambda: render_stage(root, size=512),
+        "a room simulated": lambda: settle(root),
+        "a picture": lambda: render(root),
+        "a home of six rooms planned": lambda: plan_home(home_of_words(HOME, area=75)),
         "a glb": lambda: export(root, folder / "room.glb", force=True),
     }
 

@@ -20,7 +20,7 @@ from echomodel.metrics.furniture import piece_scores, sampled, style_scores, usu
 from echomodel.metrics.pointsets import chamfer_matrix
 from echomodel.metrics.shapes import reconstruction_scores, set_scores, surface_points
 from echomodel.metrics.statistics import Counts, Figure, figure, interval
-from echomodel.protocols import RoomModel, furnishes
+from echomodel.protocols import FurnitureModel, RoomModel, furnishes
 from echomodel.tsdf import mesh_from_tsdf
 from echomodel.vocabulary import vocabulary
 from echousd.evaluation.runs import Run, Table
@@ -138,41 +138,41 @@ def clouds(meshes: Sequence[trimesh.Trimesh]) -> np.ndarray:
     return np.stack([surface_points(unit, POINTS) for unit in units])
 
 
-def _consistency(models: dict[str, RoomModel], sizes: Mapping[str, np.ndarray], seed: int) -> Table:
+def _consistency(models: Mapping[str, RoomModel], sizes: Mapping[str, np.ndarray], seed: int) -> Table:
     """Table 3: Chamfer distances of pieces of one class that are told to be of one style."""
-    rows: dict[str, dict[str, Figure]] = {}
-    alone = {"independent shapes": models["network"]}
-    for name, model in (models | alone).items():
-        rows[name] = {}
+    rows: dict[str, dict[str, Figure]] = {"random": {f"{word} x 1000": Figure(0.0) for word in CONSISTENT}}
+    for name, model in {**models, "independent shapes": models["network"]}.items():
+        told = "same_style_as" if name in models else ""
+        rows[name] = _styles(model, bool(told), seed) if furnishes(model) else {}
         for word in CONSISTENT:
-            pair, doubled = [word] * 2, np.repeat(sizes[word][:PAIRS], 2, axis=0)
-            scenes = [[word]] * len(doubled) if name in alone else [pair] * (len(doubled) // 2)
-            found = clouds(
-                [m for m, _ in pieces(model, scenes, doubled, seed, "" if name in alone else "same_style_as")]
-            )
+            doubled = np.repeat(sizes[word][:PAIRS], 2, axis=0)
+            scenes = [[word] * 2] * (len(doubled) // 2) if told else [[word]] * len(doubled)
+            found = torch.from_numpy(clouds([mesh for mesh, _ in pieces(model, scenes, doubled, seed, told)]))
             apart = [
-                float(chamfer_matrix(*torch.from_numpy(two)[:, None])[0, 0]) for two in found.reshape(-1, 2, POINTS, 3)
+                float(chamfer_matrix(one[None], other[None]))
+                for one, other in zip(found[::2], found[1::2], strict=True)
             ]
-            rows[name][f"{word} x 1000"] = figure(Counts.of([(1000 * d, 1.0) for d in apart]), seed)
-        if furnishes(model):
-            by: list = [model, torch.Generator().manual_seed(seed)]
-
-            def drawn(
-                graph: GraphBatch, wanted: np.ndarray, by: list = by, apart: bool = name in alone
-            ) -> torch.Tensor:
-                scenes = [GraphBatch.single([c]) for c in graph.category.tolist()]
-                return sampled(by[0], GraphBatch.pack(scenes) if apart else graph, wanted, by[1])
-
-            told = style_scores(drawn, len(vocabulary().categories), SUITES, seed)
-            rows[name] |= {f"style distance, {key}": Figure(value) for key, value in told.items()}
-    rows["random"] = {f"{word} x 1000": Figure(0.0) for word in CONSISTENT}
+            rows[name][f"{word} x 1000"] = figure(Counts.of([(1000 * value, 1.0) for value in apart]), seed)
     note = (
         "Chamfer distance of two pieces of a class told to be of one style, in the unit box (the paper's are raw "
         "shapes of one model); `independent shapes` hear nothing of each other. Our network makes such pieces equal by "
         "its wiring and bare boxes (`random`) are equal, too: 0 alone says nothing of quality. Style distance of "
         "pieces of different classes: told to be of one style, nothing told, of other suites."
     )
-    return Table("shapes", "Consistency", note, rows)
+    return Table(
+        "shapes", "Consistency", note, {name: rows[name] for name in [*models, "independent shapes", "random"]}
+    )
+
+
+def _styles(model: FurnitureModel, together: bool, seed: int) -> dict[str, Figure]:
+    generator = torch.Generator().manual_seed(seed)
+
+    def drawn(graph: GraphBatch, wanted: np.ndarray) -> torch.Tensor:
+        alone = [GraphBatch.single([category]) for category in graph.category.tolist()]
+        return sampled(model, graph if together else GraphBatch.pack(alone), wanted, generator)
+
+    found = style_scores(drawn, len(vocabulary().categories), SUITES, seed)
+    return {f"style distance, {key}": Figure(value) for key, value in found.items()}
 
 
 def _set_clouds(found: ShapeSet, count: int, seed: int) -> dict[str, np.ndarray]:

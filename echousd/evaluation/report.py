@@ -100,9 +100,12 @@ def cell(found: Figure | None) -> str:
 
 def _rendered(name: str, content: Mapping[str, Any], *, escaped: bool) -> str:
     from jinja2 import Environment
+    from markupsafe import Markup, escape
 
+    environment = Environment(autoescape=escaped)
+    environment.filters["code"] = lambda text: Markup(re.sub("`(.*?)`", r"<code>\1</code>", str(escape(text))))
     text = resources.files("echousd.evaluation").joinpath("templates", name).read_text("utf-8")
-    return Environment(autoescape=escaped).from_string(text).render(**content) + "\n"
+    return environment.from_string(text).render(**content) + "\n"
 
 
 def plot(table: Table) -> str:

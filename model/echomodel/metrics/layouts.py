@@ -108,8 +108,8 @@ def strata_of(task: Task) -> Mapping[str, str]:
     objects, told = len(task.room), len(task.told) / max(len(task.room), 1)
     return {
         "room type": task.room.room_type,
-        "objects": "up to 6" if objects <= 6 else "7 to 10" if objects <= 10 else "more than 10",
-        "told an object": "below 1" if told < 0.95 else "1 to 5" if told <= 5 else "more than 5",
+        "objects": "1 to 6" if objects <= 6 else "7 to 10" if objects <= 10 else "over 10",
+        "told an object": "0 to 1" if told < 0.95 else "1 to 5" if told <= 5 else "over 5",
     }
 
 

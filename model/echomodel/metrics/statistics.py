@@ -41,7 +41,7 @@ class Figure:
     """A value with its interval, and how it compares with a reference on the same rooms.
 
     Arguments:
-        low, high: bootstrap interval of 95 % over rooms. rooms: in which something was measured.
+        low, high: bootstrap interval of 95 % over rooms, None for one alone. rooms: in which something was measured.
         p: of a paired permutation test that nothing differs, None = not compared.
         detects: difference that four of five repetitions would find with so many rooms.
     """
@@ -57,8 +57,8 @@ class Figure:
 def figure(counts: Counts, seed: int, reference: Counts | None = None) -> Figure:
     """The value of a figure, its interval, and the paired test against a reference on the same rooms."""
     asked = int((counts.whole > 0).any(1).sum())
-    if counts.value is None:
-        return Figure(None)
+    if counts.value is None or asked < 2:
+        return Figure(counts.value, rooms=asked)
     drawn = _resampled(len(counts.whole), seed)
     ratio = _ratio(counts.part[drawn].sum(1), counts.whole[drawn].sum(1))
     low, high = np.nanquantile(ratio, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])

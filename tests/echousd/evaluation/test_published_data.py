@@ -25,12 +25,12 @@ SIZES = {
     "layout_width": 128, "layout_mult": [1, 1], "shape_width": 32, "shape_mult": [1, 1], "blocks": 1,
     "vq_channels": 4, "vq_codes": 16, "grid": 8,
 }  # fmt: skip
-RUN = ["text=random", "steps=2", "scenes=2", "shapes_per_batch=40", "validate_every=2", "log_every=1"]
+RUN = ["text=random", "steps=2", "scenes=2", "shapes_per_batch=10", "validate_every=2", "log_every=1"]
 
 
 @pytest.fixture
 def folder(tmp_path):
-    rooms = generate_rooms(28, 3)
+    rooms = [room for room in generate_rooms(80, 3) if 2 < len(room) < 8][:28]
     write_sgfront(tmp_path / "front", rooms[:22], seed=1)
     write_sgfront(tmp_path / "front", rooms[22:], split="test", seed=2)
     models = {name for room in PublishedRooms(tmp_path / "front").rooms for name in room.models if name}

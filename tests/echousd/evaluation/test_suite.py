@@ -25,6 +25,10 @@ def rooms():
 def quick(monkeypatch):
     """Only rows that cost nothing."""
     monkeypatch.setattr(suite, "HONEST", ("random", "retrieval", "real"))
+    monkeypatch.setattr("echousd.evaluation.pieces.PUBLISHED", ("wardrobe", "nightstand"))
+    monkeypatch.setattr("echousd.evaluation.pieces.CONSISTENT", ("wardrobe",))
+    monkeypatch.setattr("echousd.evaluation.sections.SWEPT", (2, 4))
+    monkeypatch.setattr("echousd.evaluation.sections.SETTLED", 1)
 
 
 def test_every_table_holds_the_honest_rows_and_two_runs_are_equal(rooms, tmp_path, quick, capsys):
