@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
     import trimesh
 
+    from echomodel.data.figures import Row
     from echomodel.roomboxes import RoomBoxes
-    from echomodel.rooms.figures import Row
 
 data_app = typer.Typer(help="Rooms and furniture to learn from.", no_args_is_help=True)
 
@@ -147,8 +147,8 @@ def report(
 
     Example: echousd data report --count 2000 --worst 20
     """
+    from echomodel.data.figures import compare, left_out, section_means
     from echomodel.data.roomset import load_rooms
-    from echomodel.rooms.figures import compare, left_out, section_means
     from echomodel.rooms.generator import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)

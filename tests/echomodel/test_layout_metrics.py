@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from echomodel.data.figures import compare, ray_lengths, room_figures, section_means
 from echomodel.data.roomset import with_known_words
 from echomodel.metrics.bodies import bodies, body_scores, collisions, out_of_bounds
 from echomodel.metrics.layouts import HALVES, clearance, fullness, layout_scores, navigability
@@ -31,7 +32,6 @@ from echomodel.metrics.tasks import (
 )
 from echomodel.openings import Opening
 from echomodel.roomboxes import RoomBoxes
-from echomodel.rooms.figures import compare, ray_lengths, room_figures, section_means
 from echomodel.rooms.generator import generate_rooms
 
 FLOOR = np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]], float)

@@ -7,10 +7,10 @@ import pytest
 from shapely import affinity
 from shapely.geometry import Polygon, box
 
+from echomodel.data.figures import room_figures
 from echomodel.metrics.layouts import layout_scores
 from echomodel.metrics.tasks import Task
 from echomodel.rooms.builder import Item, overlaps
-from echomodel.rooms.figures import room_figures
 from echomodel.rooms.floor import sample_floor
 from echomodel.rooms.generator import generate_room, generate_rooms
 from echomodel.rooms.recipes import SOFA_KINDS

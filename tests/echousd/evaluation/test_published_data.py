@@ -71,9 +71,11 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
         monkeypatch.setattr(f"echousd.evaluation.pieces.{name}", ("wardrobe",))
     small = [f"paper.{name}={json.dumps(value).replace(' ', '')}" for name, value in SIZES.items()]
     settings = " ".join(f"--set {shlex.quote(word)}" for word in [*RUN, *small])
-    given = [f"SGFRONT={folder}", f"PAPER={tmp_path / 'paper'}", f"SETTINGS={settings}", "BIN=bin", "STAMP=Makefile"]
+    given = [f"SGFRONT={folder}", f"PAPER={tmp_path / 'paper'}", f"SETTINGS={settings}", "BIN=bin"]
     given.append("ASKED=--only relations,shapes --samples 3 --workers 1")
-    lines = subprocess.run(["make", "-n", "paper", *given], capture_output=True, text=True, check=True).stdout
+    lines = subprocess.run(
+        ["make", "-n", "-o", ".venv/.installed", "paper", *given], capture_output=True, text=True, check=True
+    ).stdout
     commands = [shlex.split(line) for line in lines.splitlines()]
     assert [words[1] for words in commands] == ["train", "train", "eval"]
     for words in commands:
