@@ -116,7 +116,7 @@ def frechet_distance(first: np.ndarray, second: np.ndarray) -> float:
     """|m1 - m2|^2 + tr(C1 + C2 - 2 (C1 C2)^(1/2)) of (A, D) and (B, D) (Heusel et al. 2017); features as they are."""
     means = [part.mean(0) for part in (first, second)]
     pairs = zip((first, second), means, strict=True)
-    a, b = (np.linalg.qr((part - m) / np.sqrt(len(part) - 1), mode="r") for part, m in pairs)
+    a, b = (np.asarray(np.linalg.qr((part - m) / np.sqrt(len(part) - 1), mode="r")) for part, m in pairs)
     root = np.linalg.svd(a @ b.T, compute_uv=False).sum()  # C1 = a'a, C2 = b'b: the trace of the square root
     return float(((means[0] - means[1]) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * root)
 
