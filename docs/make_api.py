@@ -17,6 +17,10 @@ from echousd.checks import CheckReport, Collision, Fault, MeasuredRelation, Misp
 from echousd.checks.report import LayoutReport
 from echousd.graph.difference import GraphDiff
 from echousd.graph.nodes import PlainModel
+from echousd.home.assemble import Made
+from echousd.home.graph import HomeRelation, HomeRoom
+from echousd.home.importing.homes import Imported
+from echousd.home.plan import Plan
 from echousd.options import GROUPS, OF_NEW, RoomOptions, limits_of, words_of
 from echousd.place.living import LivingFault
 from echousd.room import LayoutOutcome, Provenance, Verdict
@@ -24,11 +28,16 @@ from echousd.settle import Motion, SettleReport
 from echousd.shapes.finishes.harmonies import HARMONIES
 
 PAGE = Path(__file__).with_name("API.md")
-ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "check", "render", "export", "load_model")
+ORDER = ("SceneGraph", "generate", "Room", "RoomOptions", "edit", "check", "render", "export", "load_model",
+         "HomeGraph", "plan_home", "generate_home", "import_plan")  # fmt: skip
 # what a name gives that has no public name of its own
 GIVES = {
     "SceneGraph": (GraphDiff,),
     "Room": (LayoutOutcome, Verdict, Provenance),
+    "HomeGraph": (HomeRoom, HomeRelation),
+    "plan_home": (Plan,),
+    "generate_home": (Made,),
+    "import_plan": (Imported,),
     "check": (
         CheckReport, LayoutReport, MeasuredRelation, Collision, Misplacement, LivingFault, Fault, SettleReport, Motion,
     ),
@@ -67,6 +76,15 @@ for fault in (*report.collisions, *report.placement, *report.errors):
 for one in report.relations:
     print(one.relation, one.kept, one.margin)
 print(report.ok, report.good(strict=True), sorted(report.to_json()))
+""",
+    "generate_home": r"""
+import echousd
+
+home = echousd.HomeGraph.from_words("hall open_to living, hall door bedroom", area=44).relate("bedroom north of hall")
+plan = echousd.plan_home(home, seed=3)
+print({name: round(area, 1) for name, area in plan.areas.items()}, plan.broken())
+made = echousd.generate_home(plan, "out/flat", seed=3, shapes="boxes", dress="none", preview=False)
+print(made.root, {name: row["objects"] for name, row in made.rooms.items()}, made.failed)
 """,
 }
 

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from echousd.draw.rendering import render
     from echousd.exporting import export
     from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
+    from echousd.home.assemble import generate_home
+    from echousd.home.graph import HomeGraph
+    from echousd.home.importing.formats import import_plan
+    from echousd.home.plan import plan_home
     from echousd.make.edit import edit
     from echousd.make.finished import Room
     from echousd.make.pipeline import generate
@@ -34,6 +38,7 @@ __version__ = "0.1.0"
 # `import echousd` loads neither pxr nor torch. docs/API.md is made of them.
 _HOME = {
     "GraphError": "echousd.graph",
+    "HomeGraph": "echousd.home.graph",
     "Node": "echousd.graph",
     "Relation": "echousd.graph",
     "RoomSpec": "echousd.graph",
@@ -47,6 +52,9 @@ _HOME = {
     "Room": "echousd.make.finished",
     "batch": "echousd.batches.batch",
     "generate": "echousd.make.pipeline",
+    "generate_home": "echousd.home.assemble",
+    "import_plan": "echousd.home.importing.formats",
+    "plan_home": "echousd.home.plan",
     "generate_many": "echousd.batches.batch",
     "RoomOptions": "echousd.options",
     "check": "echousd.checks",
@@ -60,6 +68,7 @@ _HOME = {
 }
 __all__ = [
     "GraphError",
+    "HomeGraph",
     "Node",
     "Relation",
     "Room",
@@ -72,9 +81,12 @@ __all__ = [
     "export",
     "export_texture_job",
     "generate",
+    "generate_home",
     "generate_many",
+    "import_plan",
     "import_texture_job",
     "load_model",
+    "plan_home",
     "read_dressing",
     "read_graph",
     "read_rooms",

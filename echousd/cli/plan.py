@@ -68,31 +68,26 @@ def import_(
 
     Rooms without furniture get what such rooms usually hold.
     """
-    from echousd.graph import GraphError
     from echousd.graph.files import STAGE_FORMS
     from echousd.home.draw import PICTURES, draw_plans
-    from echousd.home.importing.formats import read_plan, unit_of
-    from echousd.home.importing.homes import imported
+    from echousd.home.importing.formats import import_plan
     from echousd.home.stages import write_home
 
     started = time.perf_counter()
     _writable(output, STAGE_FORMS[:-1], force)
     if picture is not None:
         _writable(picture, PICTURES, force)
-    name, found = read_plan(source, form, unit_of(unit))
-    try:
-        made = imported(found, storey, lenient=lenient)
-    except GraphError as error:
-        raise GraphError(f"{source}: {error}") from None
+    made = import_plan(source, format=form, unit=unit, storey=storey, lenient=lenient)
+    found = made.found
     write_home(made.plan.home, output, made.plan)
     if picture is not None:
         draw_plans(
             [made.plan], picture, found.lines or [room.corners[[*range(len(room.corners)), 0]] for room in found.rooms]
         )
     told = ", ".join(f"{count} {what}" for what, count in made.counts.items())
-    lines = [f"wrote {output}", f"format   {name}: {found.frame}", f"found    {told}, {made.plan.area:.1f} m²"]
+    lines = [f"wrote {output}", f"format   {found.format}: {found.frame}", f"found    {told}, {made.plan.area:.1f} m²"]
     lines += [f"ignored  {count} x {what}" for what, count in made.ignored.items()]
-    facts = {"format": name, "frame": found.frame, "found": made.counts, "ignored": made.ignored}
+    facts = {"format": found.format, "frame": found.frame, "found": made.counts, "ignored": made.ignored}
     say_done(json, [output, *([picture] if picture else [])], started, lines, facts)
 
 

@@ -22,6 +22,7 @@ from echousd.batches.options import BatchOptions
 from echousd.batches.run import MEMORY
 from echousd.batches.work import Job, room
 from echousd.folder.manifest import find_manifest
+from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import Plan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
@@ -51,6 +52,28 @@ class Made:
     root: Path
     rooms: Mapping[str, Mapping[str, Any] | None]
     failed: Mapping[str, str]
+
+
+def generate_home(
+    home: HomeGraph | Plan,
+    output: str | Path,
+    *,
+    force: bool = False,
+    workers: int | None = None,
+    **options: Any,
+) -> Made:
+    """Plan a home, furnish its rooms side by side and write them to a folder, from whose plan a new one begins.
+
+    Arguments:
+        home: its graph, or a plan that it has. workers: processes, None = one for each core.
+        options: of its rooms, as for `echousd.generate`.
+
+    Raises `GraphError` where no plan keeps the graph, ValueError for a folder that holds something else.
+    """
+    asked, folder = RoomOptions(**options), Path(output)
+    if isinstance(home, HomeGraph):
+        home = next_plan(home, seed=asked.seed, before=earlier(folder, asked.seed))
+    return write_rooms(home, folder, asked, force=force, workers=workers)
 
 
 def jobs_of(plan: Plan, output: Path, options: RoomOptions, outside: Sequence[str] = ()) -> dict[str, Job]:
@@ -89,13 +112,19 @@ def write_rooms(
     Arguments:
         tell: called with how many rooms are done, and of how many.
 
-    Raises ValueError for a folder that holds something else.
+    Raises ValueError for a folder that holds something else, and where edits of a room would be lost.
     """
     root = output / ROOT_FILE
     check_root(root, force=force)
     jobs = jobs_of(plan, output, options, outside)
     digests = {name: digest_of(job) for name, job in jobs.items()}
     wanted = [jobs[name] for name in stale(plan, output, options, outside)]
+    edited = [job.id for job in wanted if (find_manifest(Path(job.folder)) or {}).get("history")]
+    if edited and not force:
+        raise ValueError(
+            f"{output}: {', '.join(edited)} would be made anew, which gives up what was edited in it since; allowed: "
+            "--force, or the same edit in the home's graph"
+        )
     done: dict[str, Mapping[str, Any] | None] = dict.fromkeys(jobs)
     failed: dict[str, str] = {}
     for name, value, error in _run(wanted, workers):

@@ -121,6 +121,15 @@ class HomeGraph(PlainModel):
             raise GraphError(f"entrance {self.entrance!r} is no room, allowed: {', '.join(names)}", ("home",))
         return self
 
+    @classmethod
+    def from_words(cls, text: str, **fields: Any) -> HomeGraph:
+        """The home that `kitchen open_to living, hall door bedroom*2, balcony` describes; raises `GraphError`.
+
+        A room's name is its type with or without a number (`bedroom_2`), it holds what such rooms do; `*2` makes two of
+        it, each related so.
+        """
+        return home_of_words(text, **fields)
+
     def room(self, name: str) -> HomeRoom:
         """The room called `name`; raises `GraphError`."""
         found = next((room for room in self.rooms if room.name == name), None)
@@ -207,12 +216,7 @@ def relation_of(sentence: Any) -> HomeRelation:
 
 
 def home_of_words(text: str, **fields: Any) -> HomeGraph:
-    """The home that `kitchen open_to living, hall door bedroom*2, balcony` describes; rooms hold what such rooms do.
-
-    A room's name is its type with or without a number (`bedroom_2`); `*2` makes two of it, each related so.
-
-    Raises `GraphError`.
-    """
+    """As `HomeGraph.from_words`."""
     names: dict[str, None] = {}
     relations: list[HomeRelation] = []
 

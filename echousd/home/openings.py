@@ -23,6 +23,7 @@ from echousd.home.graph import HomeGraph
 
 DOOR, FRONT_DOOR = (0.9, 2.0), (1.0, 2.1)  # metres, width and height
 PASSAGE = (3.0, 2.3)  # at most
+PASSAGE_SHARE = 0.6  # of the wall that two rooms share: furniture needs the rest
 JAMB = 0.12  # metres from a corner to a hole
 PIER = 0.3  # metres from a corner, or a door, to a window
 WINDOWS = {"": (0.9, 1.3, 2.0), "wet": (1.2, 1.0, 1.2), "outdoor": ()}  # by use: sill, height, width at most
@@ -149,10 +150,11 @@ def _passage_options(home: HomeGraph, floors: dict[str, Floor], one: str, other:
     out: list[_Hole] = []
     for facing in facings(floors[one], floors[other]):
         if predicate == "open_to":
-            width = min(facing.high - facing.low - 2 * JAMB, PASSAGE[0])
-            if width > 0.8:
-                middle = (facing.low + facing.high - width) / 2
-                mine = Opening("passage", "passage", facing.edge, round(middle, 3), round(width, 3), PASSAGE[1])
+            span = facing.high - facing.low - 2 * JAMB
+            width = min(span, PASSAGE[0], max(PASSAGE_SHARE * span, DOOR[0] + JAMB))
+            ends = (facing.low + JAMB, facing.high - JAMB - width)  # which leaves one whole wall beside it
+            for offset in ends if width > 0.8 else ():
+                mine = Opening("passage", "passage", facing.edge, round(offset, 3), round(width, 3), PASSAGE[1])
                 out.append(_Hole(((one, mine), (other, facing.across(mine))), -width))
             continue
         for into in facings(floors[one], floors[other]), facings(floors[other], floors[one]):

@@ -10,8 +10,10 @@ from echousd.graph import SceneGraph
 from echousd.graph.consistency import GraphError
 from echousd.graph.floors import check_space
 from echousd.make.verdicts import colliding
+from echousd.place.living import living_faults
 
 LEAST_FIRST = ("decor", "light", "seat", "screen", "storage", "board", "sofa", "bed")  # what a room misses least
+IN_THE_WAY = 0.1  # metres into the swing of a door or the way through a passage
 Layout = tuple[Boxes, tuple[str, ...]]
 
 
@@ -34,7 +36,7 @@ def with_space(graph: SceneGraph) -> tuple[SceneGraph, tuple[str, ...]]:
 
 
 def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple[SceneGraph, Layout, tuple[str, ...]]:
-    """The graph and its layout without the pieces that collide in the best one, and a sentence for each of them.
+    """The graph and its layout without the pieces that collide or stand in a door, and a sentence for each of them.
 
     Arguments:
         arranged: makes the best layout of a graph.
@@ -44,11 +46,29 @@ def fitted(graph: SceneGraph, arranged: Callable[[SceneGraph], Layout]) -> tuple
         layout = arranged(graph)
         hits = colliding(graph, layout[0])
         out = _dispensable(graph, [name for hit in hits[:1] for name in (hit.first, hit.second)])
+        if out is not None:
+            other = hits[0].second if out == hits[0].first else hits[0].first
+            why = f"{hits[0].depth:.2f} m deep in {other}"
+        else:
+            out, why = _in_a_way(graph, layout[0])
         if out is None:
             return graph, layout, tuple(said)
-        other = hits[0].second if out == hits[0].first else hits[0].first
         graph = graph.remove_node(out)
-        said.append(f"left out: {out}, no place for it but {hits[0].depth:.2f} m deep in {other}")
+        said.append(f"left out: {out}, no place for it but {why}")
+
+
+def _in_a_way(graph: SceneGraph, boxes: Boxes) -> tuple[str | None, str]:
+    """A piece that stands in the way of a door or passage and may be left out, and how; what a room is for stays."""
+    kind = vocabulary().room_type(graph.room.type)
+    spared = {name for name, _ in kind.contents[:1]} if kind.use != "wet" else {name for name, _ in kind.contents}
+    for fault in living_faults(graph, boxes) if graph.room.openings else ():
+        if (
+            fault.rule == "door_free"
+            and abs(fault.margin) > IN_THE_WAY
+            and graph.node(fault.object).category not in spared
+        ):
+            return _dispensable(graph, [fault.object]), "in the way of a door"
+    return None, ""
 
 
 def _dispensable(graph: SceneGraph, names: tuple[str, ...] | list[str]) -> str | None:

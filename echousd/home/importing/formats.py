@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from echomodel.files import read_bounded, within_memory
 from echousd.graph import GraphError
 from echousd.home.importing.drawings import read_dxf, read_svg
 from echousd.home.importing.found import Found
+from echousd.home.importing.homes import Imported, imported
 from echousd.home.importing.ifc import read_ifc
 from echousd.home.importing.scans import read_roomplan, read_sweethome
 from echousd.home.importing.simulators import read_infinigen, read_procthor, read_sage, read_scenesmith
@@ -71,6 +72,30 @@ def unit_of(text: str | None) -> float | None:
     if not 1e-6 <= metres <= 1e4:
         raise GraphError(f"--unit {text!r}, allowed: {', '.join(UNITS)} or metres of one unit")
     return metres
+
+
+def import_plan(
+    path: str | Path,
+    *,
+    format: str | None = None,
+    unit: str | None = None,
+    storey: str | None = None,
+    lenient: bool = False,
+) -> Imported:
+    """The home in somebody's floor plan: DXF, SVG, IFC, Sweet Home 3D, or JSON of RoomPlan and simulators.
+
+    Arguments:
+        format: its format, where that is not to be found out.
+        unit: m, cm, mm, in, ft or metres of one unit, where the file does not say.
+        storey: one of several, None = the lowest. lenient: leave out doors and windows that meet no wall.
+
+    Raises `GraphError` that names the file.
+    """  # fmt: skip
+    name, found = read_plan(Path(path), format, unit_of(unit))
+    try:
+        return imported(replace(found, format=name), storey, lenient=lenient)
+    except GraphError as error:
+        raise GraphError(f"{path}: {error}") from None
 
 
 def read_plan(path: Path, form: str | None = None, unit: float | None = None) -> tuple[str, Found]:

@@ -82,6 +82,7 @@ class Found:
     storeys: Sequence[str] = ("",)
     lines: Sequence[np.ndarray] = ()
     ignored: Counter[str] = field(default_factory=Counter)
+    format: str = ""
 
 
 def span(middle: np.ndarray, along: np.ndarray, width: float) -> np.ndarray:

@@ -55,12 +55,13 @@ class Imported:
     """A plan of somebody's as a home.
 
     Arguments:
-        counts: what was understood, by kind. ignored: what was not, and how often.
+        counts: what was understood, by kind. ignored: what was not, and how often. found: all that was read.
     """
 
     plan: Plan
     counts: dict[str, int]
     ignored: dict[str, int]
+    found: Found
 
 
 def imported(found: Found, storey: str | None = None, *, lenient: bool = False) -> Imported:
@@ -114,7 +115,9 @@ def imported(found: Found, storey: str | None = None, *, lenient: bool = False) 
     if not holes:
         plan = with_openings(replace(plan, home=plan.home.connected()))
     told = {"rooms": len(named), **{f"{kind}s": counts[kind] for kind in ("door", "window", "passage")}}
-    return Imported(plan, {**told, "fixed pieces": counts["fixed"]}, {what: n for what, n in ignored.items() if n})
+    return Imported(
+        plan, {**told, "fixed pieces": counts["fixed"]}, {what: n for what, n in ignored.items() if n}, found
+    )
 
 
 def room_kind(words: Sequence[str]) -> str | None:

@@ -130,6 +130,24 @@ def test_an_edit_follows_through(made, echousd_command):
     assert "home.usda: a home, which composes rooms; name one of them: rooms/bedroom/bedroom.usda" in done.err
 
 
+def test_edits_inside_a_room_are_not_lost_unsaid(made, tmp_path, echousd_command):
+    folder, _ = made
+    room = folder / "rooms" / "bedroom"
+    done = echousd_command("edit", room, "--add", "chair:chair")
+    assert done.code == 0, done.err
+    before = digests(folder)
+    done = echousd_command("generate", tmp_path / "flat.yaml", "-o", folder, *QUICK)
+    assert done.code == 0, done.err
+    assert done.out.count("kept     ") == 2
+    assert digests(folder) == before
+    done = echousd_command("edit", folder, "--relate", "living open to bedroom")
+    assert done.code == 2
+    assert "bedroom would be made anew, which gives up what was edited in it since" in done.err
+    assert digests(folder) == before
+    assert echousd_command("edit", folder, "--relate", "living open to bedroom", "--force").code == 0
+    assert digests(folder) != before
+
+
 def test_a_plan_is_drawn_with_what_stands_in_it(made, tmp_path, echousd_command):
     done = echousd_command("plan", "export", made[0], "-o", tmp_path / "flat.dxf")
     assert done.code == 0, done.err
