@@ -100,7 +100,10 @@ def hung_up(setting: Setting) -> None:
         size = usual_size(kind, rng)
         w, h, d = (float(side) for side in host.size)
         if kind == "coats":
-            count, high = max(1, int((w - 0.04) / size[0])), min(1.7, 0.9 * h) - float(size[1])
+            heights = host.geometry.mesh.vertices[:, 1]
+            hooks, seat = min(1.7, 0.9 * h), heights[heights < h / 2].max()  # of a bench or a board for shoes
+            size[1] = min(size[1], hooks - seat - 0.02)
+            count, high = max(1, int((w - 0.04) / size[0])), hooks - float(size[1])
             z = 0.0 if d > 2 * size[2] and _posts(host) else -d / 2 + 0.03 + float(size[2]) / 2
         else:
             size[0] = min(size[0], w - 0.1)

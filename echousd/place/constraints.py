@@ -18,6 +18,7 @@ from echousd.place.relations import relation_margins
 RELATION, COLLISION, FLOOR, WALL, SUPPORT, CEILING, OVERHANG, PLACEMENT = range(8)
 MANY = 60  # boxes beyond which constraints are sparse, and pairs far apart are none
 HANDLES = 0.05  # metres at the front of a box that handles and doors take, on which nothing can stand
+ROUNDED = 0.02  # metres at its back, where a top with rounded corners may end before its box
 LONGEST_STEP = 0.6  # of any number in one round, metres or ratio
 
 Matrix: TypeAlias = Any  # (r, m) float, an array of numpy or a sparse one
@@ -175,7 +176,7 @@ def _overhang_rows(
         reach = 0.5 * np.abs(u[k] @ u[i].T) @ size[i][[0, 2]]
         for axis in (0, 1):
             row, sign = 2 * at + axis, 1.0 if local[axis] >= 0 else -1.0
-            room = 0.5 * size[k, 2 * axis] - reach[axis] - (HANDLES if axis == 1 and sign > 0 else 0.0)
+            room = 0.5 * size[k, 2 * axis] - reach[axis] - (0.0 if axis == 0 else HANDLES if sign > 0 else ROUNDED)
             value[row] = max(room, 0.02) - abs(local[axis])
             gradient[row, i, [0, 2]] = -sign * u[k, axis]
             gradient[row, k, [0, 2]] = sign * u[k, axis]

@@ -49,6 +49,8 @@ class Category:
         usual: (low, high) of x, y and z in metres of most such pieces as sold, where the class's statistics mix several
             things or say too little of what people need (seats, room for knees); () = those of what it is `like`.
         sizes: 5th percentile, median and 95th percentile of (x, y, z) as sold, metres, where real rooms tell none.
+        bears: metres up to which its top is one plane where things stand on it; higher ones have a mirror, shelves or a
+            gable there. 0 = of any height.
         round: it is as wide as deep. aspect: least and greatest width over height, () = any.
         like: the category that weights take it for which do not know it, whose sizes and furniture it borrows where it
             has none of its own, and whose models in libraries may stand for it, "" = its SG-FRONT class.
@@ -83,6 +85,7 @@ class Category:
     admits: tuple[tuple[str, float], ...] = ()
     usual: tuple[tuple[float, float], ...] = ()
     sizes: tuple[tuple[float, ...], ...] = ()
+    bears: float = 0.0
     round: bool = False
     aspect: tuple[float, ...] = ()
     like: str = ""

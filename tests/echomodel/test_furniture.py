@@ -159,6 +159,16 @@ def test_legs_stand_under_the_body_that_a_lid_overhangs(category):
         assert np.abs(bounds(legs)[:, :, 0]).max() <= np.abs(bounds(sides)[:, :, 0]).max() + 1e-6, number
 
 
+def test_only_a_high_cabinet_for_children_has_a_gable():
+    for high, gabled in ((0.76, False), (1.5, True)):
+        size, found = np.array([0.6, high, 0.32]), set()
+        for style in range(12):
+            look = Style.draw(np.random.default_rng(style))
+            parts = solids("children_cabinet", look, Choices.draw(np.random.default_rng(style)), size)
+            found.add(any(part.role == "roof" for part in parts))
+        assert found == {gabled, False}
+
+
 def test_trestles_and_bows_hold_together():
     for number in range(20):
         table = solids("dining_table", *drawn(number, legs="trestle", round_tops=0.0), np.array([1.8, 0.75, 1.4]))

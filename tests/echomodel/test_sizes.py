@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shapely.geometry import MultiPoint
+from shapely.ops import unary_union
 
 from echomodel.furniture import Choices, solids
 from echomodel.furniture.assembly import pieces_of
@@ -50,6 +52,28 @@ def test_round_things_keep_their_volume_and_stated_ones_their_size():
     assert found[0, 0] == found[0, 2]
     assert found[0].prod() == pytest.approx(size[0].prod())
     assert np.array_equal(found[1:], size[1:])
+
+
+def test_what_stands_side_by_side_on_one_piece_has_room_there():
+    words, size = ["sideboard", "tv", "table_lamp"], np.array([(1.1, 0.9, 0.4), (1.1, 0.6, 0.2), (0.35, 0.6, 0.35)])
+    found = fitting_loads(words, size, np.array([-1, 0, 0]), np.ones(3, bool))
+    assert found[1:, 0].sum() == pytest.approx(1.1 - 2 * EDGE)
+    alone = fitting_loads(words[::2], size[::2], np.array([-1, 0]), np.ones(2, bool))
+    assert alone[1, 0] == pytest.approx(0.35)
+
+
+@pytest.mark.parametrize("word", [row.name for row in vocabulary().categories if row.bears])
+def test_what_carries_something_has_a_plane_top(word):
+    """A vanity without a lamp on it has its mirror."""
+    words, size = [word, "table_lamp"], np.array([(1.1, 1.5, 0.45), (0.3, 0.5, 0.3)])
+    carrying = fitting_loads(words, size, np.array([-1, 0]), np.ones(2, bool))[0]
+    assert (fitting_loads(words, size, np.array([-1, -1]), np.ones(2, bool)) == size).all()
+    for style in range(20):
+        rng = np.random.default_rng(style)
+        pieces = pieces_of(solids(word, Style.draw(rng), Choices.draw(rng), carrying), carrying, 0)
+        tops = [piece.vertices[piece.vertices[:, 1] > carrying[1] - 0.03][:, [0, 2]] for piece in pieces]
+        top = unary_union([MultiPoint(points).convex_hull.buffer(1e-4) for points in tops if len(points) > 2])
+        assert top.area > 0.8 * carrying[0] * carrying[2], style
 
 
 def test_a_screen_fits_its_stand_and_stays_a_screen():

@@ -112,7 +112,7 @@ def _rack(size: Size, rows: int, columns: int) -> list[Solid]:
 
 
 def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """Lighter than a bookshelf: boards on uprights, a ladder, or boards round one post."""
+    """Lighter than a bookshelf: boards on uprights, a ladder on posts, or boards round one post."""
     w, h, d = size
     rows = _count(h / choices.between("rows", 0.3, 0.45), ROWS)
     kind = choices.pick("kind", ["rack", "boards", "ladder", "steps"])
@@ -130,19 +130,21 @@ def shelf(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return parts + [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
     if kind == "ladder":
         lean = np.arctan2(d * 0.6, h)
+        half = h / 2 / np.cos(lean) - t * np.tan(lean)  # their lowest and highest corners end with the posts
         rails: list[Solid] = [
             replace(
-                box((-t, -h / 2 / np.cos(lean), -t), (t, h / 2 / np.cos(lean), t)),
+                box((-t, -half, -t), (t, half, t)),
                 centre=np.array([s * (w / 2 - t), h / 2, -d * 0.1]),
                 turn=rotation(x=-lean),
             )
             for s in (-1, 1)
         ]
+        posts: list[Solid] = [box((x - t, 0, -d / 2), (x + t, h, -d / 2 + 2 * t)) for x in (t - w / 2, w / 2 - t)]
         boards: list[Solid] = []
         for y in ys:
             z1 = d / 2 - (d * 0.6) * y / h
             boards.append(box((-w / 2, y, -d / 2), (w / 2, y + t, max(z1, -d / 2 + 0.12))))
-        return of_role("side", rails) + of_role("shelf", boards)
+        return of_role("side", rails + posts) + of_role("shelf", boards)
     xs = np.linspace(-w / 2, w / 2, rows + 2)
     parts = [box((-w / 2, y, -d / 2), (w / 2, y + t, d / 2), role="shelf") for y in ys]
     ends: list[Solid] = []

@@ -255,7 +255,7 @@ def chaise_longue_sofa(size: Size, style: Style, choices: Choices) -> list[Solid
 
 
 def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A bean bag: pear-shaped, a ball with a hollow, or a low folded chair."""
+    """A bean bag: pear-shaped, a bag with a back, or a low folded chair."""
     w, h, d = size
     kind = choices.pick("kind", ["pear", "lounger", "folded"])
     if kind == "pear":
@@ -279,7 +279,7 @@ def lazy_sofa(size: Size, style: Style, choices: Choices) -> list[Solid]:
         return [bag, *seams]
     if kind == "lounger":
         lounger: list[Solid] = [
-            ball((0, h * 0.27, d * 0.05), (w / 2, h * 0.27, d * 0.46), "fabric", power=2.8),
+            turned((0, 0, d * 0.04), (w / 2, d * 0.46), h * 0.54, rounding=h * 0.2, power=2.4, material="fabric"),
             ball((0, h * 0.55, -d * 0.27), (w * 0.46, h * 0.46, d * 0.2), "fabric", power=2.6, turn=rotation(x=-0.25)),
         ]
         return of_role("seat", lounger)

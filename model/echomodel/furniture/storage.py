@@ -13,6 +13,8 @@ from echomodel.furniture.fronts import case, front, sliding
 from echomodel.furniture.solids import Solid, rotation, turned
 from echomodel.furniture.style import Style
 
+GABLED = 1.2  # metres: on what is lower people put things, for which its top is flat
+
 
 def nightstand(size: Size, style: Style, choices: Choices) -> list[Solid]:
     """One to three drawers, or a drawer over an open cell, on legs or a plinth; rarely a drum."""
@@ -100,9 +102,9 @@ def cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
 
 
 def children_cabinet(size: Size, style: Style, choices: Choices) -> list[Solid]:
-    """A grid of cells, some with bins or drawers, sometimes with a gabled top."""
+    """A grid of cells, some with bins or drawers, a high one sometimes with a gabled top."""
     w, h, d = size
-    gable = choices.chance("form", 0.3)
+    gable = h > GABLED and choices.chance("form", 0.3)
     body = h * 0.8 if gable else h
     parts, (x0, y0, x1, y1, z) = carcass(
         np.array([w, body, d]), style, min(0.06, style.leg_height), kind="plinth", solid=False

@@ -135,15 +135,21 @@ def laid_tables(categories: Sequence[str], size: np.ndarray, anchor: np.ndarray,
 def fitting_loads(categories: Sequence[str], size: np.ndarray, carrier: np.ndarray, free: np.ndarray) -> np.ndarray:
     """(n, 3) float: sizes in which nothing reaches over the edge of what carries it, where its kind allows.
 
+    What carries something is low enough for a plane top, and its loads have room side by side there.
+
     Arguments:
         categories: n words. size: (n, 3) float, metres.
         carrier: (n,) int, what each stands on, negative = no other box. free: (n,) bool, sizes that may change.
     """
     out = size.copy()
+    for below in np.unique(carrier[carrier >= 0]).tolist():
+        if free[below] and kind_of(categories[below]).bears:
+            out[below, 1] = min(out[below, 1], kind_of(categories[below]).bears)
     for load in np.flatnonzero((carrier >= 0) & free).tolist():
         if kind_of(categories[load]).name:
-            low = np.array(size_range(categories[load])[0])
-            plan = np.minimum(out[load], np.maximum(out[carrier[load]] - 2 * EDGE, low))[[0, 2]]
+            low, room = np.array(size_range(categories[load])[0]), out[carrier[load]] - 2 * EDGE
+            room[0] *= size[load, 0] / size[carrier == carrier[load], 0].sum()
+            plan = np.minimum(out[load], np.maximum(room, low))[[0, 2]]
             if kind_of(categories[load]).aspect:
                 plan[1] = np.clip(FEET, plan[1], max(plan[1], out[carrier[load], 2] - 2 * EDGE))
             out[load, [0, 2]] = plan.min() if kind_of(categories[load]).round else plan

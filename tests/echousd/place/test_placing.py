@@ -340,16 +340,19 @@ def test_a_nightstand_touches_its_bed_at_most() -> None:
 
 
 @pytest.mark.parametrize("depth", [0.4, 0.24])
-def test_a_screen_keeps_from_the_handles_before_its_stand(depth: float) -> None:
-    """The front of a box is handles alone: what has room further back does not stand there."""
+@pytest.mark.parametrize(("side", "kept"), [(1, 0.05), (-1, 0.02)])
+def test_a_screen_keeps_from_the_handles_and_the_rounded_back_of_its_stand(
+    depth: float, side: int, kept: float
+) -> None:
+    """The front of a box is handles alone, its back corners may be round: what has room does not stand there."""
     size = np.array([[1.2, 1.2, depth], [0.9, 0.55, 0.18]])
-    position = np.array([[0, 0, -1.6], [0, 1.2, -1.6 + (depth - 0.18) / 2]])
+    position = np.array([[0, 0, -1.6], [0, 1.2, -1.6 + side * (depth - 0.18) / 2]])
     done = place_boxes(
         ["cabinet", "tv"], size, position, np.zeros(2), np.array([(1, vocabulary().predicate_id("standing_on"), 0)]),
         floor_polygon=FLOOR, height=2.7, config=PlaceConfig(arrange=False),
     )  # fmt: skip
-    (_, _, front), (_, _, own) = done.position + done.size * [0, 0, 0.5]
-    assert front - own > min(0.05, done.size[0, 2] / 2 - done.size[1, 2] / 2 - 0.02) - 1e-3
+    (_, _, edge), (_, _, own) = done.position + done.size * [0, 0, 0.5 * side]
+    assert side * (edge - own) > min(kept, done.size[0, 2] / 2 - done.size[1, 2] / 2 - 0.02) - 1e-3
 
 
 @pytest.mark.parametrize("word", ["pendant_lamp", "wall_lamp", "ceiling_lamp"])

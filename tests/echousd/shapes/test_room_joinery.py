@@ -6,13 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from shapely.geometry import MultiPoint, Point
 
+from echomodel.data.shapeset import piece as styled
 from echomodel.furniture import solids
 from echomodel.furniture.description import WIDTH, piece_of
+from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import FRAME, Origin
 from echousd.shapes.joinery import COLLIDERS, assembled, convex_pieces, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
+STANDING = 6  # styles of each category: lounging bags on a point and shelves that lean on nothing are among them
 BENCHMARK = Path(__file__).parents[3] / "benchmarks" / "parts_cost.py"
 
 
@@ -40,6 +44,16 @@ def test_more_faces_are_finer_and_the_second_level_is_coarser():
     assert sum(len(part.mesh.faces) for part in made.coarse) < made.faces
     assert [part.name for part in made.coarse] == [part.name for part in made.parts]
     assert all(set(one.slots) == set(two.slots) for one, two in zip(made.coarse, made.parts, strict=True))
+
+
+@pytest.mark.parametrize("category", [row.name for row in vocabulary().categories if row.support in ("floor", "table")])
+def test_what_stands_stands_flat(category):
+    for style in range(STANDING):
+        _, size, parts = styled(5, style, category)
+        made = assembled(parts, size, faces=1500, origin=Origin("parts"), round=vocabulary().category(category).round)
+        corners = np.concatenate([collider.mesh.vertices for collider in made.colliders])
+        feet = MultiPoint(corners[corners[:, 1] < corners[:, 1].min() + 0.004][:, [0, 2]]).convex_hull
+        assert feet.contains(Point(made.mass.centre[[0, 2]])), (category, style)
 
 
 def test_colliders_are_convex_and_hold_the_geometry():
