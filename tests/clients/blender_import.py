@@ -38,6 +38,7 @@ for thing in bpy.data.objects:
                 else None,
                 "materials": [material.name for material in mesh.materials if material] if mesh else [],
                 "hidden": thing.hide_render,
+                "light": list(thing.data.color) if thing.type == "LIGHT" else None,
                 "lens": [thing.data.lens, thing.data.sensor_width] if thing.type == "CAMERA" else None,
             }
         )

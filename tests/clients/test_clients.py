@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from environments import RELEASES, python_of, run, three
-from pxr import Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade
 
 import echousd
 from echousd.exporting import export
@@ -167,7 +167,14 @@ def check_blender(file: Path, room: Path, client: str = "blender") -> None:
         assert set(part["materials"]) == bound_looks(mesh), path
     cameras = {thing["name"]: thing for thing in things.values() if thing["type"] == "CAMERA"}
     assert set(cameras) == {"perspective", "top"}
-    assert 10 < cameras["perspective"]["lens"][0] < 60  # millimetres
+    lens, sensor = cameras["perspective"]["lens"]
+    assert 24 - 0.1 < lens * 36 / sensor < 35 + 0.1  # millimetres, of a picture as wide as film
+    lights = {name.rpartition("/")[2]: thing["light"] for name, thing in things.items() if thing["type"] == "LIGHT"}
+    for prim in stage.GetPrimAtPath("/Room/Lights").GetChildren():
+        if prim.GetName() in lights:  # the sky is Blender's world
+            colour = UsdLux.LightAPI(prim).GetColorAttr().Get()
+            np.testing.assert_allclose(lights[prim.GetName()], list(colour), atol=1e-5, err_msg=prim.GetName())
+    assert len(lights) >= 2
     box = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_]).ComputeWorldBound(stage.GetDefaultPrim())
     up = 2 if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else 1
     wide, deep = (box.ComputeAlignedRange().GetSize()[axis] for axis in (0, 3 - up))

@@ -227,6 +227,24 @@ def test_stated_sizes_that_no_such_furniture_has_are_kept_and_said():
     assert room.notes == ("bed is 0.18 m wide as stated; such furniture: 1.32 to 3.28 m",)
 
 
+def test_python_and_the_command_make_the_same_room(tmp_path, echousd_command, monkeypatch):
+    monkeypatch.setattr("echousd.make.pipeline.load_model", lambda *_, **__: StandIn())
+    echousd.write_graph(small_graph(), tmp_path / "graph.usda")
+    done = echousd_command("generate", tmp_path / "graph.usda", "-o", tmp_path / "told/room", "--shapes", "boxes")
+    assert done.code in (0, 1), done.err
+    echousd.generate(tmp_path / "graph.usda", shapes="boxes").save(tmp_path / "called/room")
+    told, called = (
+        {
+            str(file.relative_to(tmp_path / way)): file.read_bytes()
+            for file in (tmp_path / way).rglob("*")
+            if file.is_file()
+        }
+        for way in ("told", "called")
+    )
+    assert {"room/layers/dressing.usda", "room/room.usda"} <= set(told)
+    assert [path for path in sorted(told.keys() | called.keys()) if told.get(path) != called.get(path)] == []
+
+
 def test_a_lock_of_the_last_generation_stays(tmp_path):
     """A source that says nothing of a place does not undo what an edit or an update has locked there."""
     room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", place=False, **BARE)
