@@ -16,6 +16,7 @@ from echousd.make.adopting import adopted, seen_in_theirs
 from echousd.make.reading import read_room
 from echousd.place.living import living_faults
 from echousd.stage.files import open_stage
+from echousd.stage.foreign import SkippedPrims
 
 
 @pytest.fixture
@@ -71,7 +72,7 @@ def test_a_half_furnished_stage_is_completed_and_left_as_it_is(loft, tmp_path):
     bed = room.boxes.yaw[room.names.index("bed")]
     assert abs(np.cos(float(bed))) < 1e-4
     assert ours.GetPrimAtPath("/Room/Objects/bed/bed_placed/bed_model/form").IsA(UsdGeom.Mesh)
-    assert room.geometry["wardrobe"].origin.source == "boxes"
+    assert room.geometry["wardrobe"].origin.shapes == "boxes"
 
 
 def test_what_such_a_room_lacks_is_added(loft):
@@ -160,7 +161,9 @@ def test_a_column_without_a_label_stands_in_the_way_and_nowhere_better(tmp_path)
         ("column", chest(0.4, 2.6, 0.4), "", (2.2, 0, -0.5), 0),
         ("Wall", chest(0.2, 2.6, 0.9), "", (3, 0, 0), 0),
     )
-    graph = adopted(stage_of(tmp_path / "loft.usda", sofa, *pieces), room="living_room", add=["plant:plant"])
+    loft = stage_of(tmp_path / "loft.usda", sofa, *pieces)
+    with pytest.warns(SkippedPrims, match=r"fixed obstacles: 'column' \(1\)$"):
+        graph = adopted(loft, room="living_room", add=["plant:plant"])
     assert graph.names == ("sofa", "column", "plant")
     assert (graph.node("column").obstacle, graph.node("column").locked) == ("column", True)
     room = echousd.generate(graph, shapes="boxes", steps=2, drafts=1, **BARE)
@@ -172,7 +175,8 @@ def test_a_column_without_a_label_stands_in_the_way_and_nowhere_better(tmp_path)
 def test_an_obstacle_is_not_told_to_stand_at_a_wall(tmp_path):
     loft = stage_of(tmp_path / "loft.usda", ("sofa", seat(2.0, 0.8, 0.9), "sofa", (0, 0, 2.5), 180),
                     ("column", chest(0.4, 2.6, 0.4), "", (0.5, 0, -2), 0))  # fmt: skip
-    graph = adopted(loft, add=[]).replaced(room=RoomSpec("living_room", size=(8.0, 8.0)))
+    with pytest.warns(SkippedPrims, match="fixed obstacles: 'column'"):
+        graph = adopted(loft, add=[]).replaced(room=RoomSpec("living_room", size=(8.0, 8.0)))
     boxes = Boxes(*(torch.tensor([getattr(n, word) for n in graph.nodes]) for word in ("size", "position", "yaw")))
     assert "column" not in {fault.object for fault in living_faults(graph, boxes, all_blamed=True)}
     cabinet = graph.update_node("column", attributes={})
