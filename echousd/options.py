@@ -115,7 +115,7 @@ class RoomOptions(PlainModel, Look):
 
     seed: int = row(0, ROOM, "seed of all randomness", everyday=True, ge=0, le=MAX_SEED)
     shapes: Annotated[str, AfterValidator(_source)] | None = row(
-        None, ROOM, "parts, sdf, library, guided or boxes", everyday=True, words="source"
+        None, ROOM, "parts, sdf, library, guided or boxes", everyday=True, words="name"
     )  # fmt: skip
     layouts: int = row(1, ROOM, "arrangements, as variants", everyday=True, ge=1, le=1000)
     weights: File | None = row(None, ROOM, "weights file or folder, from convert or train; else those that ship")

@@ -31,7 +31,7 @@ def register(app: typer.Typer) -> None:
 
 @data_app.command("build")
 def build(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the data set.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the data set.")],
     recipe: Annotated[str, typer.Option(help="smoke (seconds), packed (at most 40 MB) or full.")] = "smoke",
     seed: Seed = 0,
 ) -> None:
@@ -65,7 +65,7 @@ def build(
 
 @data_app.command("rooms")
 def rooms_command(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Rooms file (JSON).")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Rooms file (JSON).")],
     count: Annotated[int, typer.Option(help="Number of rooms.")] = 100,
     seed: Seed = 0,
     room: Annotated[str | None, typer.Option(help="Room type; default a mixture.")] = None,
@@ -84,17 +84,17 @@ def rooms_command(
 
 @data_app.command("search")
 def search(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the rooms; run again to go on.")],
-    graphs: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the rooms; run again to go on.")],
+    count: Annotated[int, typer.Option(help="Graphs to search rooms of.", min=1)] = 20_000,
     seed: Seed = 0,
     drafts: Annotated[int, typer.Option(help="Drafts of the network a room, beside one arrangement.", min=0)] = 2,
     weights: Annotated[str | None, typer.Option(help="Weights that draw them; default: those that ship.")] = None,
-    jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
     minutes: Annotated[float | None, typer.Option(help="Begin nothing after so many minutes.")] = None,
 ) -> None:
     """Search rooms without a fault to train on, from several starts each; OUT/rooms.npz is the set.
 
-    Example: echousd data search --graphs 200 --seed 7 -o data/found
+    Example: echousd data search --count 200 --seed 7 -o data/found
     """
     from echousd.cli.terminal import Terminal
     from echousd.place.examples import GRAPHS, ExamplesPlan, search_examples
@@ -105,14 +105,14 @@ def search(
         console.print("  ".join(f"{name} {value}" for name, value in row.items()))
 
     plan = ExamplesPlan(seed, drafts, weights)
-    found = search_examples(out, plan, shards=-(-graphs // GRAPHS), jobs=jobs, minutes=minutes, report=report)
+    found = search_examples(out, plan, shards=-(-count // GRAPHS), workers=workers, minutes=minutes, report=report)
     console.print(f"{out}/rooms.npz: {len(found)} rooms, {int(found.counts.sum())} objects")
 
 
 @data_app.command("plot")
 def plot(
     rooms: Rooms,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Picture file.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
     limit: Annotated[int, typer.Option(help="Number of rooms.")] = 50,
     columns: Annotated[int, typer.Option(help="Rooms in a row.", min=1, max=1000)] = 10,
     room: Annotated[str | None, typer.Option(help="Only rooms of this type.")] = None,
@@ -134,7 +134,7 @@ def plot(
 @data_app.command("report")
 def report(
     rooms: Annotated[Path | None, typer.Argument(help="Rooms file or folder; default: newly generated rooms.")] = None,
-    real: Annotated[Path | None, typer.Option(help="Rooms to compare with; default: 896 real ones.")] = None,
+    against: Annotated[Path | None, typer.Option(help="Rooms to compare with; default: 896 real ones.")] = None,
     count: Annotated[int, typer.Option(help="Number of rooms to generate.")] = 2000,
     seed: Seed = 0,
     worst: Annotated[int, typer.Option(help="Rows to show, the most distant first; 0 = all.")] = 40,
@@ -152,7 +152,7 @@ def report(
     from echomodel.rooms.generator import generate_rooms
 
     drawn = generate_rooms(count, seed) if rooms is None else load_rooms(rooms)
-    others = None if real is None else load_rooms(real)
+    others = None if against is None else load_rooms(against)
     rows = compare(drawn, others)
     chosen = sorted((r for r in rows if r.section.startswith(section or "")), key=lambda row: -row.distance)
     _print_rows(rows, chosen[: worst or None], section_means(rows), left_out(drawn, others), json_out)
@@ -184,7 +184,7 @@ def meshes(
     sources: Annotated[
         list[Path] | None, typer.Argument(help="Libraries (.sh3f), a .deb that holds them, folders of OBJ, GLB or USD.")
     ] = None,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the set.")] = Path("meshes"),
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder of the set.")] = Path("meshes"),
     debian: Annotated[bool, typer.Option(help=f"Fetch the Debian package {PACKAGE} with apt.")] = False,
     table_only: Annotated[bool, typer.Option(help="Write OUT/table.csv for review and stop.")] = False,
     copies: Annotated[int, typer.Option(min=1, help="Stored shapes per training mesh: 1 as it is, 2 with mirror.")] = 2,
@@ -235,12 +235,12 @@ def meshes(
 
 @data_app.command("sheet")
 def sheet(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Picture file.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Picture file.")],
     categories: Annotated[list[str] | None, typer.Argument(help="Categories; default all.")] = None,
     count: Annotated[int, typer.Option(help="Samples per category.")] = 12,
     seed: Annotated[int, typer.Option(help="Seed of the world.")] = 0,
     shapes: Annotated[Path | None, typer.Option("--set", help="Draw the shapes of this set instead.")] = None,
-    pixels: Annotated[int, typer.Option(help="Side of one picture.")] = 120,
+    size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 120,
 ) -> None:
     """Draw samples of every category in a grid: parametric pieces of styles 0, 1, ... or the shapes of a set.
 
@@ -268,13 +268,13 @@ def sheet(
             mesh.apply_scale(stored.size[i])
         if drawn:
             rows.append((f"{name} ({len(drawn)})", drawn))
-    write_picture(out, contact_sheet(rows, pixels))
+    write_picture(out, contact_sheet(rows, size))
 
 
 @data_app.command("to-usd")
 def to_usd(
     rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the stages, one per room.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the stages, one per room.")],
     limit: Annotated[int | None, typer.Option(help="Only the first rooms.")] = None,
     rules: Annotated[str, typer.Option(help="Label rooms without relations: strict, sgfront or none.")] = "strict",
     known: Annotated[bool, typer.Option(help="Leave out objects that the vocabulary does not hold.")] = True,
@@ -307,7 +307,7 @@ def _with_relations(room: RoomBoxes, relations: np.ndarray | None) -> RoomBoxes:
 @data_app.command("import")
 def import_rooms(
     sources: Annotated[list[Path], typer.Argument(help="Rooms files, sets, stages, or folders of stages or SG-FRONT.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="A set to train on (.npz), or a rooms file (.json).")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="A set to train on (.npz), or a rooms file (.json).")],
     room: Annotated[str, typer.Option(help="Of SG-FRONT: bedroom, livingroom, diningroom, library or all.")] = "all",
     split: Annotated[str, typer.Option(help="Of SG-FRONT: trainval or test.")] = "trainval",
 ) -> None:
@@ -347,7 +347,7 @@ def import_rooms(
 @data_app.command("to-sgfront")
 def to_sgfront(
     rooms: Annotated[Path, typer.Argument(help="Rooms file (JSON) or folder of a room set.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the files.")],
+    out: Annotated[Path, typer.Option("-o", "--output", help="Folder for the files.")],
     split: Annotated[str, typer.Option(help="trainval or test.")] = "trainval",
     drop: Annotated[float, typer.Option(help="Share of the relations that is left out.")] = 0.5,
     seed: Annotated[int, typer.Option(help="Seed of the dropping.")] = 0,

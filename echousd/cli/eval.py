@@ -22,7 +22,7 @@ eval_app = typer.Typer(help="Scores of whoever lays out rooms, and studies with 
 Against = Annotated[
     str, typer.Option(help="Rooms file, room set or SG-FRONT folder; generated: held-out rooms of the generator.")
 ]
-Samples = Annotated[int, typer.Option(help="Rooms that every system lays out.", min=2)]
+Count = Annotated[int, typer.Option(help="Rooms that every system lays out.", min=2)]
 Seed = Annotated[int, typer.Option(help="Seed of every draw.")]
 
 
@@ -44,9 +44,11 @@ def suite(
     against: Against = "generated",
     out: Annotated[Path, typer.Option("-o", "--output", help="REPORT: gets .md, .json and .html.")] = Path("report"),
     only: Annotated[str, typer.Option(help="Sections, with commas; default: all.")] = "",
-    samples: Samples = 24,
+    count: Count = 24,
     seed: Seed = 0,
-    told: Annotated[float, typer.Option(help="Relations an object that are told, where people would tell them.")] = 1.0,
+    relations: Annotated[
+        float, typer.Option(help="Relations an object that are told, where people would tell them.")
+    ] = 1.0,
     shapes: Annotated[Path | None, typer.Option(help="Set of shapes to compare with, real meshes for example.")] = None,
     inception: Annotated[Path | None, typer.Option(help="Weights of FID and KID: inception-2015-12-05.pt.")] = None,
     clip: Annotated[Path | None, typer.Option(help="Weights of FID-CLIP: OpenAI's ViT-B-32 (extra text).")] = None,
@@ -66,10 +68,10 @@ def suite(
     asked = tuple(systems) if systems else SYSTEMS
     files = {"shapes": shapes, "inception": inception, "clip": clip}
     named = [None if path is None else str(path) for path in files.values()]
-    settings = replace(SuiteSettings(asked, against, samples, seed, chosen, told), workers=workers)
+    settings = replace(SuiteSettings(asked, against, count, seed, chosen, relations), workers=workers)
     settings = replace(settings, shapes=named[0], inception=named[1], clip=named[2])
-    command = f"echousd eval suite {' '.join(asked)} --against {against} --samples {samples} --seed {seed}"
-    command += f" --told {told:g}" * (told != 1.0) + f" --only {','.join(chosen)}" * bool(chosen)
+    command = f"echousd eval suite {' '.join(asked)} --against {against} --count {count} --seed {seed}"
+    command += f" --relations {relations:g}" * (relations != 1.0) + f" --only {','.join(chosen)}" * bool(chosen)
     command += "".join(f" --{name} {path}" for name, path in files.items() if path is not None)
     with _progress() as told_to:
         found, run = evaluate(settings, told_to)
@@ -82,19 +84,19 @@ def study(
     systems: Annotated[list[str], typer.Argument(help="Two or more systems, as for suite.")],
     out: Annotated[Path, typer.Option("-o", "--output", help="The page (.html).")] = Path("study.html"),
     against: Against = "generated",
-    samples: Samples = 12,
+    count: Count = 12,
     seed: Seed = 0,
     json: Written = False,
 ) -> None:
     """Write a page that shows people pairs of rooms and records which they prefer, offline.
 
-    Example: echousd eval study default generator+search real -o study.html --samples 12
+    Example: echousd eval study default generator+search real -o study.html --count 12
     """
     from echousd.evaluation.study import write_study
 
     started = time.perf_counter()
     with _progress() as told_to:
-        path = write_study(systems, against, samples, seed, out, told_to)
+        path = write_study(systems, against, count, seed, out, told_to)
     say_done(json, [path], started, [str(path)])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
 from typing import Annotated
@@ -43,7 +42,7 @@ def render(
         bool, typer.Option("--cameras", help="A picture through each camera of the stage, named after it.")
     ] = False,
     size: Annotated[int, typer.Option(help="Pixels across a picture.")] = 512,
-    samples: Annotated[int, typer.Option(help="Rays through a pixel, a square number.", min=1, max=256)] = 9,
+    rays: Annotated[int, typer.Option(help="Rays along each side of a pixel.", min=1, max=16)] = 3,
     frames: Annotated[int, typer.Option(help="Pictures of a turntable.", min=2, max=360)] = 24,
     colors: Annotated[str, typer.Option(help="materials, or class: one colour per category.")] = "materials",
     layout: Layout = None,
@@ -58,9 +57,7 @@ def render(
     from echousd.stage.files import write_all
 
     started = time.perf_counter()
-    room, rays = room_at(room), math.isqrt(samples)
-    if rays**2 != samples:
-        raise ValueError(f"--samples is {samples}, allowed: a square number, such as {rays**2} or {(rays + 1) ** 2}")
+    room = room_at(room)
     if view not in (*VIEWS, TURN):
         raise ValueError(f"--view is {view!r}, allowed: {', '.join((*VIEWS, TURN))}")
     if cameras:

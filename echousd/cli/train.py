@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 def train(
     recipe: Annotated[Path, typer.Argument(help="Recipe file (TOML), see model/recipes.")],
     settings: Annotated[list[str] | None, typer.Option("--set", help="Change a field: key.sub=value.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="The run's folder; default: runs/RECIPE.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--output", help="The run's folder; default: runs/RECIPE.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue from the folder's checkpoint.")] = False,
     minutes: Annotated[float | None, typer.Option(help="Stop (with a checkpoint) after so many minutes.")] = None,
 ) -> None:
@@ -32,7 +32,7 @@ def train(
     folder = out or Path("runs") / recipe.stem
     plan = read_recipe(recipe, settings)
     if not resume and (folder / "checkpoint.safetensors").exists():
-        raise ValueError(f"{folder}: holds a run already, continue it with --resume or choose another --out")
+        raise ValueError(f"{folder}: holds a run already, continue it with --resume or choose another --output")
 
     def report(step: int, values: dict[str, float]) -> None:
         console.print(f"step {step}/{plan.steps}  " + "  ".join(f"{k} {v:.4g}" for k, v in values.items()))

@@ -27,7 +27,7 @@ FRAMES = (2, 360)  # pictures that a turn may have
 
 
 def render(
-    path: str | Path,
+    room: str | Path,
     *,
     view: str = HERO,
     size: int = 512,
@@ -42,7 +42,7 @@ def render(
     from echousd.stage.files import open_stage
     from echousd.stage.layouts import showing_layout
 
-    stage = open_stage(path)
+    stage = open_stage(room)
     with showing_layout(stage, layout):
         return render_stage(stage, view=view, size=size, colors=colors, rays=rays)
 

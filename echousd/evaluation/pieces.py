@@ -40,7 +40,7 @@ Pieces = Sequence[tuple[trimesh.Trimesh, dict[str, float]]]
 
 def shapes(run: Run) -> list[Table]:
     """Tables 3 and 6: MMD, COV, 1-NNA by Chamfer and earth mover's distance, and whether told styles agree."""
-    seed, count = run.settings.seed, max(4, min(12, run.settings.samples // 2))
+    seed, count = run.settings.seed, max(4, min(12, run.settings.count // 2))
     rng = np.random.default_rng([seed, 20])
     sizes = {word: np.stack([usual_size(word, rng) for _ in range(count)]) for word in PUBLISHED}
     models: dict[str, RoomModel] = {"network": load_model(None), "shuffled": shuffled_model()}

@@ -38,8 +38,8 @@ class SuiteSettings:
         systems: as `System.parse` reads them; the first is what others are compared with.
         against: rooms file, room set (its held-out rooms), SG-FRONT folder (its test split), or `generated`: rooms of
             the room generator that no training saw.
-        samples: rooms that are laid out. seed: of every draw. only: sections, () = all.
-        told: relations an object where people would tell them. drafts: of `+half`, of which the best is kept.
+        count: rooms that are laid out. seed: of every draw. only: sections, () = all.
+        relations: an object where people would tell them. drafts: of `+half`, of which the best is kept.
         shapes: set of shapes to compare pieces with, None = the programs' own, drawn anew.
         inception, clip: files of weights of FID, KID and FID-CLIP, None = not measured.
         workers: processes that place rooms; they change nothing.
@@ -47,10 +47,10 @@ class SuiteSettings:
 
     systems: tuple[str, ...] = SYSTEMS
     against: str = "generated"
-    samples: int = 24
+    count: int = 24
     seed: int = 0
     only: tuple[str, ...] = ()
-    told: float = 1.0
+    relations: float = 1.0
     drafts: int = 3
     shapes: str | None = None
     inception: str | None = None
@@ -61,8 +61,8 @@ class SuiteSettings:
         wrong = [name for name in self.only if name not in SECTIONS]
         if wrong:
             raise ValueError(f"--only: no section {wrong[0]!r}, allowed: {', '.join(SECTIONS)}")
-        if self.samples < 2:
-            raise ValueError(f"--samples is {self.samples}, allowed: 2 or more; one room alone has no interval")
+        if self.count < 2:
+            raise ValueError(f"--count is {self.count}, allowed: 2 or more; one room alone has no interval")
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Run:
 
 def rooms_against(settings: SuiteSettings) -> tuple[list[RoomBoxes], list[RoomBoxes]]:
     """Rooms to lay out and, of the same source, as many others to compare with; raises ValueError for too few."""
-    wanted = 2 * settings.samples
+    wanted = 2 * settings.count
     path = Path(settings.against)
     published = (path / "classes_all.txt").exists()
     if settings.against == "generated":
@@ -187,7 +187,7 @@ def rooms_of(system: System, settings: SuiteSettings) -> tuple[list[Task], list[
             tasks.append(Task(new, told))
     if len(tasks) < 2:
         raise ValueError(f"{system.name}: {len(tasks)} rooms with known objects, 2 or more are needed for an interval")
-    count = min(settings.samples, len(tasks))
+    count = min(settings.count, len(tasks))
     return [tasks[number * len(tasks) // count] for number in range(count)], notes
 
 

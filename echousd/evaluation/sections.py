@@ -77,7 +77,7 @@ def faults(run: Run) -> list[Table]:
     first, seed = next(iter(scores)), run.settings.seed
     columns = ["told", "faults", "faults A", "faults B", "faultless", "physics"]
     note = (
-        f"{run.settings.told:g} relations an object told, as people write. Faults an object by the living and "
+        f"{run.settings.relations:g} relations an object told, as people write. Faults an object by the living and "
         "composition terms; A and B are halves of them. `+search` searches with the terms that count here: its own "
         "count flatters it, see the next section."
     )

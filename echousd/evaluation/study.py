@@ -30,14 +30,14 @@ QUESTION = "In which room would you rather live?"
 
 
 def write_study(
-    names: Sequence[str], against: str, samples: int, seed: int, out: Path, progress: StageListener | None = None
+    names: Sequence[str], against: str, count: int, seed: int, out: Path, progress: StageListener | None = None
 ) -> Path:
     """Write the page. Raises ValueError for fewer than two systems, and as the suite."""
     systems = [system for name in names if not (system := System.parse(name)).foreign]
     if len(systems) < 2:
         raise ValueError(f"{len(systems)} systems that can be asked the same rooms, allowed: 2 or more")
-    settings = SuiteSettings(tuple(names), against, samples, seed)
-    tasks = tasks_of(rooms_against(settings)[0], seed, told=settings.told)
+    settings = SuiteSettings(tuple(names), against, count, seed)
+    tasks = tasks_of(rooms_against(settings)[0], seed, told=settings.relations)
     made, _ = run_systems(systems, tasks, settings, progress)
     pictures = {
         f"{name}/{number}": sheet([replace(room, id="")], 1) for name, rooms in made.items()

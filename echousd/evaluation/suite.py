@@ -37,7 +37,7 @@ def evaluate(settings: SuiteSettings, progress: StageListener | None = None) -> 
     systems = list({system.name: system for system in systems}.values())
     theirs = {system.name: rooms_of(system, settings) for system in systems if system.foreign}
     rooms, others = rooms_against(settings)
-    tasks = tasks_of(rooms, settings.seed, told=settings.told)
+    tasks = tasks_of(rooms, settings.seed, told=settings.relations)
     chosen = [name for name in SECTIONS if name in (settings.only or SECTIONS)]
     able = [s for s in systems if not s.foreign and {*chosen} - OWN]
     asked, seconds = run_systems(able, tasks, settings, progress)

@@ -18,7 +18,7 @@ MAX_TEXT = 65_536  # characters in one string: what an attribute may hold before
 MAX_NODES = 5000  # of a graph
 MAX_CORNERS = 500  # of a floor: the work on walls and furniture grows with their square
 MAX_NAME = 100  # characters: names become file names of assets
-SOURCES = ("parts", "sdf", "boxes", "library", "guided", "independent", "own")  # of the geometry of one object
+SHAPES = ("parts", "sdf", "boxes", "library", "guided", "independent", "own")  # of the geometry of one object
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 Point: TypeAlias = tuple[float, float]
@@ -48,11 +48,9 @@ def title(value: Any) -> str:
     return unicodedata.normalize("NFC", value)
 
 
-def _source(value: Any) -> str:
-    if value == "box":
-        return "boxes"
-    if not isinstance(value, str) or value not in SOURCES:
-        raise ValueError(f"found {shown(value)}, allowed: {', '.join(SOURCES)}")
+def _shapes(value: Any) -> str:
+    if not isinstance(value, str) or value not in SHAPES:
+        raise ValueError(f"found {shown(value)}, allowed: {', '.join(SHAPES)}")
     return value
 
 
@@ -233,10 +231,10 @@ CategoryWord: TypeAlias = Annotated[str, _category[0], _category[1]]
 PredicateWord: TypeAlias = Annotated[str, _predicate[0], _predicate[1]]
 RoomTypeWord: TypeAlias = Annotated[str, _room_type[0], _room_type[1]]
 Style: TypeAlias = Annotated[str | None, _optional(_text)]
-Source: TypeAlias = Annotated[
+Shapes: TypeAlias = Annotated[
     str | None,
-    _optional(_source),
-    WithJsonSchema({"anyOf": [{"enum": list(SOURCES)}, {"type": "null"}]}),
+    _optional(_shapes),
+    WithJsonSchema({"anyOf": [{"enum": list(SHAPES)}, {"type": "null"}]}),
 ]
 Place: TypeAlias = Annotated[
     str | None,

@@ -165,7 +165,7 @@ class Node(PlainModel):
         place: where it stands in the room, against_wall or in_corner.
         between: names of two other objects that it stands between.
         locked: the object stays as it is when the room is generated again.
-        source: where its geometry comes from, one of `echousd.graph.fields.SOURCES`; None = as the room's.
+        shapes: where its geometry comes from, one of `echousd.graph.fields.SHAPES`; None = as the room's.
         asset: a model of one's own (a file, relative to that of the graph) or the id of one in a library.
         attributes: free data, identifiers to texts, numbers or booleans.
     """
@@ -180,7 +180,7 @@ class Node(PlainModel):
     place: field.Place = None
     between: field.Two = None
     locked: field.Flag = False
-    source: field.Source = None
+    shapes: field.Shapes = None
     asset: field.AssetName = None
     attributes: field.Attributes = Field(default_factory=dict)
 
@@ -188,13 +188,13 @@ class Node(PlainModel):
         super().__init__(name=name, category=category, **fields)
 
     @model_validator(mode="after")
-    def _sourced(self) -> Node:
+    def _has_shapes(self) -> Node:
         if self.name in (self.between or ()):
             raise GraphError("between names the object itself, allowed: two others", ("between",))
-        if self.asset is None and self.source == "own":
-            raise GraphError("source is 'own' without an asset, allowed: asset, the file of the model", ("source",))
-        if self.asset is not None and self.source not in (None, "own", "library"):
-            raise GraphError(f"asset is given, but source is {self.source!r}, allowed: own or library", ("source",))
+        if self.asset is None and self.shapes == "own":
+            raise GraphError("shapes is 'own' without an asset, allowed: asset, the file of the model", ("shapes",))
+        if self.asset is not None and self.shapes not in (None, "own", "library"):
+            raise GraphError(f"asset is given, but shapes is {self.shapes!r}, allowed: own or library", ("shapes",))
         return self
 
     @property

@@ -42,7 +42,7 @@ def adopted(
         raise ValueError(f"{file}: has a scene graph already; echousd generate and echousd update go on with it")
     graph, paths = foreign_pieces(stage, room, names=names)
     theirs = tuple(
-        node.replaced(locked=True, source=None, asset=joined(file.absolute().as_posix(), paths[node.name]))
+        node.replaced(locked=True, shapes=None, asset=joined(file.absolute().as_posix(), paths[node.name]))
         for node in graph.nodes
     )
     graph = graph.replaced(nodes=theirs)

@@ -50,10 +50,10 @@ if TYPE_CHECKING:
 
 @takes_options(OF_NEW)
 def edit(
-    root: str | Path,
+    room: str | Path,
     graph: SceneGraph,
     *,
-    model: RoomModel | str | Path | None = None,
+    model: RoomModel | None = None,
     outside: Sequence[str | Path] = (),
     progress: StageListener | None = None,
     **given: Any,
@@ -64,14 +64,14 @@ def edit(
     them) get new places.
 
     Arguments:
-        root: root layer of a room that `generate` made.
-        graph: what its graph (`read_room(root).graph`) shall become; a floor or openings that it leaves open stay
+        room: root layer of a room that `generate` made.
+        graph: what its graph (`read_room(room).graph`) shall become; a floor or openings that it leaves open stay
             those of the room.
         model, outside, progress: as for `generate`.
         given: options of what is new (`RoomOptions`); `shapes` and `faces` are those of the room where none are given.
 
     Raises ValueError as `generate` and `read_room` do, and for a room that other weights than those that ship made if
-    `model` is None. Warns where the weights are not those that made the room, and of
+    neither `model` nor `weights` is given. Warns where the weights are not those that made the room, and of
     faults as `generate` does.
     """
     if wrong := sorted(given.keys() - set(OF_NEW)):
@@ -80,24 +80,24 @@ def edit(
     RoomOptions(**given)  # what is not allowed is told before the room is read
     timer = StageTimer(progress)
     with timer.stage("read"):
-        saved = read_room(root)
+        saved = read_room(room)
     manifest = saved.manifest
     look = {name: manifest[name] for name in Look.model_fields}
     asked = RoomOptions(**{**look, **given})
-    wishes, shapes, model = partial(asked.wishes, outside), asked.shapes, asked.weights if model is None else model
-    check_objects(graph, str(root))
-    beside = Path(root).parent
+    wishes, shapes = partial(asked.wishes, outside), asked.shapes
+    check_objects(graph, str(room))
+    beside = Path(room).parent
     graph = with_plan_of(anchored(graph, beside), saved.graph)
     fresh, moving = touched(anchored(saved.graph, beside), graph)
-    check_files(graph, beside, outside, str(root), fresh)
+    check_files(graph, beside, outside, str(room), fresh)
     styles = style_groups(graph)
     model_used: RoomModel | None = None
     change: GraphEdit | None = None
     own = Retrieved()
     if fresh or moving:
         with timer.stage("load"), one_thread():
-            model_used = load_model(model, device=asked.device)
-            _compare(saved.manifest, model_used, given=model is not None, root=Path(root))
+            model_used = load_model(asked.weights, device=asked.device) if model is None else model
+            _compare(saved.manifest, model_used, given=bool(model or asked.weights), root=Path(room))
         if fresh:
             made_of = saved.manifest["shapes"]
             again = made_of in ("parts", "sdf") or (made_of in ("library", "guided") and asked.assets is not None)
@@ -152,7 +152,7 @@ def edit(
     if asked.place:
         with timer.stage("place"), one_thread():
             layouts, outcomes = cleared_layouts(pins, layouts, geometry, floor, walls=asked.walls)
-    room = Room(
+    after = Room(
         name=manifest["name"],
         graph=graph,
         boxes=layouts[0],
@@ -165,11 +165,11 @@ def edit(
         provenance=_provenance(manifest, model_used),
         options=asked.replaced(seed=manifest["seed"]),
         timings=timer.seconds,
-        edited=Path(root),
+        edited=Path(room),
         carried={asset: saved.carried[asset] for name, asset in names.items() if name not in fresh},
     )
-    warn_of_faults(room)
-    return room
+    warn_of_faults(after)
+    return after
 
 
 def touched(before: SceneGraph, after: SceneGraph) -> tuple[set[str], set[str]]:
@@ -190,7 +190,7 @@ def _placed_at(node: Node) -> tuple[object, ...]:
 
 
 def _made_of(node: Node) -> tuple[object, ...]:
-    return node.category, node.size, node.source, node.asset
+    return node.category, node.size, node.shapes, node.asset
 
 
 def graph_edit(before: SceneGraph, after: SceneGraph) -> GraphEdit:

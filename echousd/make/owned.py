@@ -29,5 +29,5 @@ def with_own_pieces(graph: SceneGraph, meshes: Mapping[str, str | Path]) -> Scen
     for name, file in meshes.items():
         if not Path(file).is_file():
             raise ValueError(f"meshes: object {name!r}: {file}: no such file")
-        graph = graph.update_node(name, asset=Path(file).absolute().as_posix(), source=None)
+        graph = graph.update_node(name, asset=Path(file).absolute().as_posix(), shapes=None)
     return graph

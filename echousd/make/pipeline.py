@@ -58,7 +58,7 @@ def generate(
     *,
     room: str | None = None,
     options: RoomOptions | None = None,
-    model: RoomModel | str | Path | None = None,
+    model: RoomModel | None = None,
     earlier: Path | None = None,
     outside: Sequence[str | Path] = (),
     boxes: Boxes | None = None,
@@ -77,8 +77,8 @@ def generate(
         room: prim path of one room where the file holds several.
         options: how the room is made and written; `given`, the same by name, comes first. Equal options give equal
             rooms.
-        model: a loaded model, a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`), or a
-            weights file; None = that of the option `weights`.
+        model: a loaded model, or a sampler of your own (any object that keeps `echomodel.protocols.RoomModel`); None =
+            the model of the option `weights`.
         earlier: folder or root layer of the last generation, where locked objects without a place are looked for.
         outside: folders besides those of the graph's file and of the library's index in which models may lie.
         boxes: layout of your own, n boxes in the order of the graph's nodes, metres and radians in the room's frame;
@@ -121,7 +121,7 @@ def generate(
     graph = with_own_boxes(with_own_pieces(graph, meshes or {}), boxes)
     check_objects(graph, file)
     with timer.stage("load"), one_thread():
-        echo = load_model(asked.weights if model is None else model, device=asked.device)
+        echo = load_model(asked.weights, device=asked.device) if model is None else model
         shapes = asked.shapes or default_source(echo)
         check_sources([shapes, *sources_of(graph, shapes).values()], echo)
     pieces = given_pieces(graph, shapes, wishes, timer=timer)

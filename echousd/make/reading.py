@@ -151,7 +151,7 @@ def _geometry(root: Usd.Prim, asset: str | None, category: str, manifest: Mappin
     if not parts or not colliders:
         return None
     told = manifest.get("meshes", {}).get(asset, {})
-    origin = Origin(told.get("source", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
+    origin = Origin(told.get("shapes", manifest["shapes"]), told.get("licence", LICENCE), told.get("credit", ""))
     return Geometry(
         tuple(parts),
         tuple(colliders),
@@ -221,7 +221,7 @@ def read_original(root: Usd.Prim, asset: str | None, category: str, manifest: Ma
         return None
     mesh = trimesh.Trimesh(np.concatenate(points), np.concatenate(faces), process=False)
     told = manifest["meshes"][asset]
-    words = (told.get("source", ""), told.get("licence", LICENCE), told.get("credit", ""))
+    words = (told.get("shapes", ""), told.get("licence", LICENCE), told.get("credit", ""))
     origin = Origin(*words, asset=told.get("asset", ""), sha256=told.get("sha256", ""))
     return Geometry(
         (Part("mesh", mesh, {}),), (hull_of(mesh, category),), origin, read_mass(root), original=_original(root, asset)

@@ -220,7 +220,7 @@ def _mesh_facts(geometry: Geometry) -> dict[str, Any]:
     credit = {"credit": origin.credit} if origin.credit else {}
     facts = {"faces": geometry.faces, "watertight": geometry.watertight}
     asset = {"asset": origin.asset, "sha256": origin.sha256} if origin.asset else {}
-    return {**facts, "source": origin.source, "licence": origin.licence, **credit, **asset}
+    return {**facts, "shapes": origin.shapes, "licence": origin.licence, **credit, **asset}
 
 
 def _digest(folder: Path, path: str) -> str:

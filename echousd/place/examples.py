@@ -54,13 +54,13 @@ class ExamplesPlan:
 
 
 def search_examples(
-    folder: Path, plan: ExamplesPlan, *, shards: int, jobs: int = 1, minutes: float | None = None,
+    folder: Path, plan: ExamplesPlan, *, shards: int, workers: int = 1, minutes: float | None = None,
     report: Callable[[dict[str, float]], None] | None = None,
 ) -> RoomSet:  # fmt: skip
     """Fill a folder with shards of rooms found by search, and join them in its `rooms.npz`; run again to go on.
 
     Arguments:
-        shards: how many there shall be; complete ones are kept. jobs: processes.
+        shards: how many there shall be; complete ones are kept. workers: processes.
         minutes: time after which no further shard is begun.
         report: called with each row of the folder's `log.csv`.
 
@@ -74,7 +74,7 @@ def search_examples(
     log = folder / "log.csv"
     if not log.exists():
         write_text(log, ",".join(COLUMNS) + "\n")
-    pool = get_context("spawn").Pool(jobs) if jobs > 1 else None
+    pool = get_context("spawn").Pool(workers) if workers > 1 else None
     try:
         for row in pool.imap_unordered(work, left) if pool else map(work, left):
             if row is not None:
@@ -197,6 +197,6 @@ if __name__ == "__main__":  # where the command line's libraries are not install
     import sys
 
     search_examples(
-        Path(sys.argv[1]), ExamplesPlan(int(sys.argv[4])), shards=1000, jobs=int(sys.argv[2]),
+        Path(sys.argv[1]), ExamplesPlan(int(sys.argv[4])), shards=1000, workers=int(sys.argv[2]),
         minutes=float(sys.argv[3]),
     )  # fmt: skip

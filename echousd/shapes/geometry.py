@@ -22,13 +22,13 @@ class Origin:
     """Where a piece of furniture comes from.
 
     Arguments:
-        source: name of the shape source, see `echousd.shapes.sources`.
+        shapes: name of the source of shapes, see `echousd.shapes.sources`.
         licence: SPDX identifier of its licence.
         credit: who must be named, empty where nobody must.
         asset: file or id of the model that it is, empty for what EchoUSD made. sha256: of the model's file.
     """
 
-    source: str
+    shapes: str
     licence: str = LICENCE
     credit: str = ""
     asset: str = ""

@@ -69,7 +69,7 @@ YAW = "echo:yaw"
 PLACE = "echo:place"
 BETWEEN = "echo:between"
 LOCKED = "echo:locked"
-SOURCE = "echo:source"
+SHAPES = "echo:shapes"
 ASSET = "echo:asset"
 NODE_FIELDS = {
     CATEGORY: "category",
@@ -79,10 +79,10 @@ NODE_FIELDS = {
     YAW: "yaw",
     PLACE: "place",
     LOCKED: "locked",
-    SOURCE: "source",
+    SHAPES: "shapes",
     ASSET: "asset",
 }
-DRESSING = "dressing"  # the source of small things, which are no furniture
+DRESSING = "dressing"  # the shapes of small things, which are no furniture
 FREE = "echo:attributes:"  # namespace of a node's free attributes
 
 _TYPES = Sdf.ValueTypeNames
@@ -112,7 +112,7 @@ VALUE_TYPES = {
     YAW: _TYPES.Double,
     PLACE: _TYPES.Token,
     LOCKED: _TYPES.Bool,
-    SOURCE: _TYPES.Token,
+    SHAPES: _TYPES.Token,
     ASSET: _TYPES.String,
     LABELS: _TYPES.TokenArray,
 }
@@ -159,7 +159,7 @@ def _stated(node: Node | SmallNode) -> dict[str, Any]:
 
 def small_values(node: SmallNode) -> dict[str, Any]:
     """The authored properties of a small thing that is a node, in USD's types."""
-    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SOURCE: DRESSING}
+    values: dict[str, Any] = {CATEGORY: node.category, LABELS: Vt.TokenArray([node.category]), SHAPES: DRESSING}
     return values | _stated(node)
 
 

@@ -200,7 +200,7 @@ def _read(stage: Usd.Stage, *, names: bool, columns: bool = False) -> _Found:
         taken.add(name)
         node = Node(
             name, category, size=box.size, position=box.position, yaw=box.yaw, locked=bool(told), attributes=told,
-            source="boxes" if told else None,
+            shapes="boxes" if told else None,
         )  # fmt: skip
         found.nodes.append((prim.GetPath(), node))
     _tell(stage, skipped, obstacles)

@@ -33,20 +33,20 @@ def read_graph(stage: Usd.Stage | str | os.PathLike[str], room: str | None = Non
         return room_graph(the_room(stage, room, rooms))
 
 
-def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.PathLike[str], root: str = "/Room") -> None:
-    """Author `graph` at the prim path `root` of a layer, of a stage's edit target (a variant's, too) or of a new file.
+def write_graph(graph: SceneGraph, target: Sdf.Layer | Usd.Stage | str | os.PathLike[str], room: str = "/Room") -> None:
+    """Author `graph` at the prim path `room` of a layer, of a stage's edit target (a variant's, too) or of a new file.
 
-    Where `root` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`); a
-    file at a path is replaced. Raises StageError for a root that is no absolute prim path and for a path that cannot be
+    Where `room` holds a graph already it is changed into `graph`, and only where the two differ (`update_graph`); a
+    file at a path is replaced. Raises StageError for a room that is no absolute prim path and for a path that cannot be
     written, nothing authored.
     """
-    path = prim_path(root)
+    path = prim_path(room)
     if isinstance(target, str | os.PathLike):
-        save_layer(graph_layer(graph, root=root), target)
+        save_layer(graph_layer(graph, root=room), target)
     elif _holds_graph(target, path):
         from echousd.stage.update import update_graph
 
-        update_graph(target, graph, room=root)
+        update_graph(target, graph, room=room)
     elif isinstance(target, Usd.Stage):
         edit_target = target.GetEditTarget()
         author(edit_target.GetLayer(), graph, edit_target.MapToSpecPath(path))

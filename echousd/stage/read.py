@@ -69,7 +69,7 @@ def find_rooms(stage: Usd.Stage) -> list[RoomPrims]:
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
         kind = kinds.get(prim.GetTypeName())
         if kind is None and usd.NODE_API in prim.GetPrimTypeInfo().GetAppliedAPISchemas():
-            kind = "small" if values.given(prim.GetAttribute(usd.SOURCE)) == usd.DRESSING else "nodes"
+            kind = "small" if values.given(prim.GetAttribute(usd.SHAPES)) == usd.DRESSING else "nodes"
         if kind:
             found[kind].append(prim)
     graphs = found.pop("graphs")

@@ -1,4 +1,4 @@
-"""One loader for the weights of every preset: the model that is given, or the one in a weights file.
+"""One loader for the weights of every preset.
 
 A loaded model can be pickled, but another process had better call `load_model` with the same path: each process keeps
 the last models that it loaded.
@@ -14,31 +14,23 @@ from safetensors import SafetensorError, safe_open
 
 from echomodel.protocols import RoomModel
 
-PRESETS = ("compact", "paper", "released")
 COMPACT, RUN = "echousd-compact-1", "weights.safetensors"  # a format, and what a training calls its weights
 # format of a weights file -> class whose `load(path, device=...)` gives the model; imported when asked for
 LOADERS = {COMPACT: "echomodel.echo:EchoModel", "echousd-released-1": "echoscene.echo:ReleasedEcho"}
 
 
-def load_model(model: RoomModel | str | Path | None, preset: str | None = None, *, device: str = "cpu") -> RoomModel:
-    """The model itself, or the one in a weights file (None: shipped), of the kind that the file says it is.
+def load_model(weights: str | Path | None = None, *, device: str = "cpu") -> RoomModel:
+    """The model in a weights file (None: shipped), of the kind that the file says it is.
 
     A file that did not change since is not read again.
 
     Arguments:
-        preset: that it must be of, None = any. device: where to load one, as torch calls it (`cpu`, `cuda`, `mps`).
+        device: where to load it, as torch calls it (`cpu`, `cuda`, `mps`).
 
-    Raises ValueError where there is none, or one of another preset than `preset`.
+    Raises ValueError where there is none.
     """
-    check_preset(model, preset)
-    if model is not None and not isinstance(model, str | Path):
-        found: RoomModel = model
-    else:
-        path = None if model is None else Path(model).absolute()
-        found = _loaded(path, _stamp(path), device)
-    if preset not in (None, found.preset):
-        raise ValueError(f"{model}: holds a model of the preset {found.preset!r}, asked for: {preset!r}")
-    return found
+    path = None if weights is None else Path(weights).absolute()
+    return _loaded(path, _stamp(path), device)
 
 
 @lru_cache(maxsize=2)
@@ -67,12 +59,3 @@ def _stamp(path: Path | None) -> tuple[tuple[str, int, int], ...]:
         return ()
     files = sorted(path.glob("*.safetensors")) if path.is_dir() else [path]
     return tuple((f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files if f.is_file())
-
-
-def check_preset(model: RoomModel | str | Path | None, preset: str | None) -> None:
-    """Raises ValueError for an unknown preset, or one without weights of its own where none are given."""
-    if preset not in (None, *PRESETS):
-        raise ValueError(f"preset is {preset!r}, allowed: {', '.join(PRESETS)}")
-    if model is None and preset not in (None, "compact"):
-        how = "train it" if preset == "paper" else "convert a published checkpoint (echousd convert)"
-        raise ValueError(f"no weights ship for the preset {preset!r}: {how} and name the file (--weights FILE)")

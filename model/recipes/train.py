@@ -35,13 +35,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recipe", type=Path)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    parser.add_argument("--out", "-o", type=Path, required=True, help="the run's folder")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="the run's folder")
     parser.add_argument("--minutes", type=float, default=9.0, help="of this call, data and start included")
     parser.add_argument("--total", type=float, help="minutes of all calls; default: the recipe's steps")
     parser.add_argument("--parts", type=Path, help="folder of small files that travel")
     options = parser.parse_args()
     began = time.monotonic()
-    checkpoint, recipe = options.out / "checkpoint.safetensors", read_recipe(options.recipe, options.set)
+    checkpoint, recipe = options.output / "checkpoint.safetensors", read_recipe(options.recipe, options.set)
     if not checkpoint.exists() and options.parts and any(options.parts.glob("checkpoint-*.safetensors")):
         joined(options.parts, checkpoint)
     resume = checkpoint.exists()
@@ -52,7 +52,7 @@ def main() -> None:
         told = (f"{name} {value:.4g}" for name, value in values.items())
         print(f"{time.monotonic() - began:5.0f} s  step {step}", *told, flush=True)
 
-    trainer = open_run(recipe, options.out, resume=resume, report=report)
+    trainer = open_run(recipe, options.output, resume=resume, report=report)
     print(f"{time.monotonic() - began:5.0f} s  {trainer.device}, step {trainer.step} of {recipe.steps}", flush=True)
     if options.total and not resume:
         measured(trainer, recipe, options.total * 60 - (time.monotonic() - began))
@@ -62,7 +62,7 @@ def main() -> None:
         options.parts.mkdir(parents=True, exist_ok=True)
         split(checkpoint, options.parts)
         for name in ("weights.safetensors", "log.csv"):
-            shutil.copyfile(options.out / name, options.parts / name)
+            shutil.copyfile(options.output / name, options.parts / name)
 
 
 def measured(trainer: Trainer, recipe: Recipe, seconds: float) -> None:

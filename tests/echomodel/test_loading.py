@@ -34,15 +34,6 @@ def test_a_file_is_read_once_until_it_changes(tmp_path, monkeypatch):
     assert load_model(path) is not first
     assert load_model(path, device="cuda") is not load_model(path)
     assert read == [(path, "cpu"), (path, "cpu"), (path, "cuda")]
-    assert load_model(first) is first
-
-
-def test_another_preset_is_refused():
-    class Model:
-        preset = "paper"
-
-    with pytest.raises(ValueError, match="holds a model of the preset 'paper', asked for: 'released'"):
-        load_model(Model(), "released")
 
 
 def test_formats_are_those_that_are_written():

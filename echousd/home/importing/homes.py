@@ -321,7 +321,7 @@ def _furnished(plan: Plan, pieces: Sequence[Piece]) -> tuple[dict[str, list[Node
             Node(
                 name, category, size=tuple(size.round(4).tolist()), position=where,
                 yaw=round(float(np.arctan2(front[0], front[1])), 6), locked=True, attributes=told,
-                source="boxes" if told else None,
+                shapes="boxes" if told else None,
             )
         )  # fmt: skip
     return found, ignored

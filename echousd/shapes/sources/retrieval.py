@@ -56,8 +56,8 @@ class Retrieved:
 
 def source_of(node: Node, shapes: str) -> str:
     """The source of one object: its own word, what its asset asks for, else the room's."""
-    if node.source:
-        return node.source
+    if node.shapes:
+        return node.shapes
     return shapes if node.asset is None else "own" if is_file(node.asset) else "library"
 
 

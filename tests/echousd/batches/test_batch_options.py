@@ -45,11 +45,11 @@ def made(source, folder, **options):
 def test_a_batch_asks_a_library_as_generate_does(library, source, tmp_path, monkeypatch):
     shelf = {"shapes": "library", "assets": str(library)}
     (room,) = made(source, tmp_path / "all", collect=True, **shelf)
-    assert {one["source"] for one in room["meshes"].values()} == {"library"}
+    assert {one["shapes"] for one in room["meshes"].values()} == {"library"}
     layers = [path.read_text() for path in (tmp_path / "all").rglob("*.usda")]
     assert not [text for text in layers if str(library.parent / "models") in text]  # nothing refers to the library
     (room,) = made(source, tmp_path / "none", licenses="MIT", **shelf)
-    assert "library" not in {one["source"] for one in room["meshes"].values()}
+    assert "library" not in {one["shapes"] for one in room["meshes"].values()}
     options = {"assets": str(library), "stretch": 1.5}
     wishes = request_of({"sample": {"bedroom": 1}, "options": options}, "test").options.wishes()
     assert (wishes.stretch, wishes.licences, wishes.collect) == (1.5, (), False)

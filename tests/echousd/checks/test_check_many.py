@@ -104,6 +104,6 @@ def test_a_piece_of_ones_own(tmp_path):
     file = tmp_path / "bed.obj"
     trimesh.creation.box((1.6, 0.6, 2.0)).export(file)
     room = echousd.generate(small_graph(), model=StandIn(), shapes="boxes", meshes={"bed": file}, **BARE)
-    assert room.geometry["bed"].origin.source == "own"
+    assert room.geometry["bed"].origin.shapes == "own"
     with pytest.raises(ValueError, match=r"meshes: object 'bed': .*gone.glb: no such file"):
         echousd.generate(small_graph(), model=StandIn(), meshes={"bed": tmp_path / "gone.glb"}, **BARE)

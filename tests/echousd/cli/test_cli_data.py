@@ -108,7 +108,7 @@ def test_sgfront_files_and_back(rooms_file, tmp_path):
 def test_plot_and_report(rooms_file, tmp_path, capsys):
     assert run(["data", "plot", str(rooms_file), "-o", str(tmp_path / "rooms.png"), "--columns", "4"]) == 0
     assert (tmp_path / "rooms.png").read_bytes()[:4] == b"\x89PNG"
-    assert run(["data", "report", str(rooms_file), "--real", str(rooms_file), "--json"]) == 0
+    assert run(["data", "report", str(rooms_file), "--against", str(rooms_file), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["mean_distance"]["all"] == 0.0
     assert all(line.endswith(" real, compared from 25 of each") for line in found["left_out"])

@@ -1,6 +1,5 @@
 """`echousd data meshes`, `data sheet` end to end on a few small shapes."""
 
-
 import pytest
 import trimesh
 from PIL import Image
@@ -66,7 +65,7 @@ def test_wrong_sources_are_named(arguments, text, tmp_path, monkeypatch, capsys)
 
 def test_a_sheet_of_parametric_pieces_is_drawn(tmp_path):
     picture = tmp_path / "sheet.png"
-    assert run(["data", "sheet", "plant", "vanity", "--count", "2", "--pixels", "60", "-o", str(picture)]) == 0
+    assert run(["data", "sheet", "plant", "vanity", "--count", "2", "--size", "60", "-o", str(picture)]) == 0
     image = Image.open(picture).convert("L")
     assert image.size == (130 + 120, 120)
     for row in range(2):

@@ -200,7 +200,7 @@ def test_graph_of_several_rooms(echousd_command, tmp_path):
     Sdf.PrimSpec(layer, "House", Sdf.SpecifierDef, "Xform")
     layer.defaultPrim = "House"
     for name in ("bedroom", "study"):
-        write_graph(load_graph(SAMPLES / f"{name}.yaml"), layer, root=f"/House/{name.title()}")
+        write_graph(load_graph(SAMPLES / f"{name}.yaml"), layer, room=f"/House/{name.title()}")
     layer.Save()
     house = tmp_path / "house.usda"
     out = echousd_command("graph", house).out

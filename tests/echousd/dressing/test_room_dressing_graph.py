@@ -139,7 +139,7 @@ def test_furniture_that_calls_itself_dressing_is_a_fault(root, tmp_path):
     layer = Sdf.Layer.CreateNew(str(tmp_path / "over.usda"))
     layer.subLayerPaths.append(str(root))
     sofa = Sdf.CreatePrimInLayer(layer, "/Room/Objects/sofa")
-    Sdf.AttributeSpec(sofa, "echo:source", Sdf.ValueTypeNames.Token).default = "dressing"
+    Sdf.AttributeSpec(sofa, "echo:shapes", Sdf.ValueTypeNames.Token).default = "dressing"
     layer.Save()
     told = [f"{found}" for found in check(tmp_path / "over.usda").errors]
     assert any(

@@ -136,7 +136,7 @@ def test_they_stand_in_the_tables_with_what_was_left_out(rooms, tmp_path, monkey
     raw[1]["floor_polygon"] = []
     (tmp_path / "theirs.json").write_text(json.dumps({"convention": "", "rooms": raw}))
     name = str(tmp_path / "theirs.json")
-    found, run = evaluate(SuiteSettings((name,), samples=4, only=("faults", "realism")))
+    found, run = evaluate(SuiteSettings((name,), count=4, only=("faults", "realism")))
     assert len(run.made[name]) == 3
     told = " ".join(found["missing"])
     assert "objects that the vocabulary does not hold are left out: sculpture" in told

@@ -44,7 +44,7 @@ def folder(tmp_path):
 
 
 def test_graphs_are_those_of_the_files(folder):
-    rooms, others = rooms_against(SuiteSettings(against=str(folder), samples=3))
+    rooms, others = rooms_against(SuiteSettings(against=str(folder), count=3))
     told = {scan.name: scan.room().relations for scan in SGFront(folder, split="test").scans}
     for task in tasks_of([*rooms, *others], 0, rules="sgfront"):
         assert np.array_equal(task.told, told[task.room.id])
@@ -72,7 +72,7 @@ def test_one_command_trains_and_fills_our_column(folder, tmp_path, monkeypatch):
     small = [f"paper.{name}={json.dumps(value).replace(' ', '')}" for name, value in SIZES.items()]
     settings = " ".join(f"--set {shlex.quote(word)}" for word in [*RUN, *small])
     given = [f"SGFRONT={folder}", f"PAPER={tmp_path / 'paper'}", f"SETTINGS={settings}", "BIN=bin"]
-    given.append("ASKED=--only relations,shapes --samples 3 --workers 1")
+    given.append("ASKED=--only relations,shapes --count 3 --workers 1")
     lines = subprocess.run(
         ["make", "-n", "-o", ".venv/.installed", "paper", *given], capture_output=True, text=True, check=True
     ).stdout

@@ -33,7 +33,7 @@ def quick(monkeypatch):
 
 def test_every_table_holds_the_honest_rows_and_two_runs_are_equal(rooms, tmp_path, quick, capsys):
     write_rooms(tmp_path / "rooms.json", rooms)
-    command = ["eval", "suite", "generator", "--against", str(tmp_path / "rooms.json"), "--samples", "4"]
+    command = ["eval", "suite", "generator", "--against", str(tmp_path / "rooms.json"), "--count", "4"]
     for name in ("one", "two"):
         assert run([*command, "--workers", "1", "-o", str(tmp_path / name)]) == 0
     assert [line.rpartition(".")[2] for line in capsys.readouterr().out.split()[:4]] == ["md", "json", "html", "json"]

@@ -79,7 +79,7 @@ def test_a_piece_of_ones_own_beside_generated_ones(tmp_path):
     text.write_text(graph.to_yaml())
     room = echousd.generate(text, model=StandIn(), shapes="boxes", **BARE)
     assert room.boxes.size[room.names.index("wardrobe")].tolist() == pytest.approx([1.0, 2.0, 0.5], abs=1e-3)
-    assert {geometry.origin.source for geometry in room.geometry.values()} == {"own", "boxes"}
+    assert {geometry.origin.shapes for geometry in room.geometry.values()} == {"own", "boxes"}
     root = room.save(tmp_path / "out/bedroom", preview=False)
     assert open_stage(root).GetPrimAtPath("/Room/SceneGraph")
     assert read_room(root).graph.node("wardrobe").asset == "../../mine/dresser.usda"
@@ -110,12 +110,12 @@ def test_faults_name_the_object_and_the_file(library, tmp_path):
         made(small_graph().update_node("lamp", asset="nowhere.glb"), shapes="boxes")
     with pytest.raises(ValueError, match=r"object 'lamp': .*lib.parquet: asset 'moon' is not in it"):
         made(small_graph().update_node("lamp", asset="moon"), shapes="boxes", assets=library)
-    with pytest.raises(ValueError, match="object 'lamp': source is 'own' without an asset"):
-        small_graph().update_node("lamp", source="own")
-    with pytest.raises(ValueError, match="object 'lamp': asset is given, but source is 'sdf', allowed: own or library"):
-        small_graph().update_node("lamp", source="sdf", asset="a.usd")
+    with pytest.raises(ValueError, match="object 'lamp': shapes is 'own' without an asset"):
+        small_graph().update_node("lamp", shapes="own")
+    with pytest.raises(ValueError, match="object 'lamp': asset is given, but shapes is 'sdf', allowed: own or library"):
+        small_graph().update_node("lamp", shapes="sdf", asset="a.usd")
     with pytest.raises(ValueError, match="found 'lego', allowed: parts, sdf, boxes, library"):
-        small_graph().update_node("lamp", source="lego")
+        small_graph().update_node("lamp", shapes="lego")
 
 
 def test_a_model_that_vanished_or_changed_since_it_was_indexed_is_told(tmp_path):

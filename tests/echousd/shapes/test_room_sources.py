@@ -76,7 +76,7 @@ def test_a_new_source_is_one_module_and_one_line(slabs, tmp_path):
     assert asset.customLayerData["asset_license"] == "CC-BY-4.0"
     assert asset.customLayerData["asset_credit"] == "A. Joiner"
     manifest = read_room(root).manifest
-    told = {"faces": 24, "watertight": True, "source": "slabs", "licence": "CC-BY-4.0", "credit": "A. Joiner"}
+    told = {"faces": 24, "watertight": True, "shapes": "slabs", "licence": "CC-BY-4.0", "credit": "A. Joiner"}
     assert manifest["shapes"] == "slabs"
     assert manifest["meshes"]["bed"] == told
     assert len(room.meshes["bed"].faces) == 24

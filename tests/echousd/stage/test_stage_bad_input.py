@@ -301,7 +301,7 @@ def test_a_size_of_another_type():
 def test_a_root_that_is_no_prim_path(root):
     layer = Sdf.Layer.CreateAnonymous()
     with pytest.raises(StageError, match=r"is no prim path, allowed: an absolute path of identifiers such as /Room$"):
-        write_graph(GRAPH, layer, root=root)
+        write_graph(GRAPH, layer, room=root)
     assert layer.empty
 
 

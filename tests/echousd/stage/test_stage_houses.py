@@ -157,7 +157,7 @@ def test_an_obstacle_is_a_fixed_box_under_its_own_word(tmp_path):
         UsdSemantics.LabelsAPI.Apply(cube.GetPrim(), "class").CreateLabelsAttr([word])
     with pytest.warns(SkippedPrims, match="fixed obstacles: 'concert harp'"):
         graph = foreign_graph(stage)
-    assert (graph.node("harp").source, graph.node("stool").source) == ("boxes", None)
+    assert (graph.node("harp").shapes, graph.node("stool").shapes) == ("boxes", None)
     options = RoomOptions(walls=False, dress="none")
     room = echousd.generate(graph, shapes="boxes", drafts=1, options=options)
     root = room.save(tmp_path / "room", preview=False)

@@ -159,7 +159,7 @@ def test_several_rooms_on_one_stage(graphs):
     stage = Usd.Stage.CreateInMemory()
     stage.DefinePrim("/House", "Xform")
     for number, graph in enumerate(graphs):
-        write_graph(graph, stage, root=f"/House/Room{number}")
+        write_graph(graph, stage, room=f"/House/Room{number}")
     assert read_rooms(stage) == {f"/House/Room{number}": graph for number, graph in enumerate(graphs)}
     assert read_graph(stage, room="/House/Room1") == graphs[1]
     with pytest.raises(ValueError, match=r"rooms, say which one of /House/Room0, /House/Room1"):
@@ -172,7 +172,7 @@ def test_a_room_within_a_room_keeps_its_own_objects():
     stage = Usd.Stage.CreateInMemory()
     alcove = SceneGraph("study", (Node("desk", "desk"),))
     write_graph(BEDROOM, stage)
-    write_graph(alcove, stage, root="/Room/Alcove")
+    write_graph(alcove, stage, room="/Room/Alcove")
     assert read_rooms(stage) == {"/Room": BEDROOM, "/Room/Alcove": alcove}
 
 
@@ -255,7 +255,7 @@ def test_the_graph_may_lie_beside_its_room():
     found = read_rooms(stage)
     assert found == {"/World": SceneGraph("bedroom", (Node("bed", "double_bed"),))}
     wanted = found["/World"].add_node("stand", "nightstand").relate("stand", "left", "bed")
-    write_graph(wanted, stage, root="/World")
+    write_graph(wanted, stage, room="/World")
     assert read_rooms(stage) == {"/World": wanted}
     assert stage.GetPrimAtPath("/World/Furniture/stand")
     assert stage.GetPrimAtPath("/Graphs/bedroom/stand__left__bed")
@@ -284,6 +284,6 @@ def test_an_edit_target_behind_a_reference():
     prim.GetReferences().AddReference(source.identifier)
     node = prim.GetPrimIndex().rootNode.children[0]
     stage.SetEditTarget(Usd.EditTarget(source, node))
-    write_graph(BEDROOM, stage, root="/House/Bedroom")
+    write_graph(BEDROOM, stage, room="/House/Bedroom")
     assert read_rooms(stage) == {"/House/Bedroom": BEDROOM}
     assert read_rooms(Usd.Stage.Open(source)) == {"/Asset": BEDROOM}

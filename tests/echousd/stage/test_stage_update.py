@@ -58,7 +58,7 @@ def test_over_a_reference(first, second):
     before = source.ExportToString()
     stage = Usd.Stage.CreateInMemory()
     stage.DefinePrim("/House/Bedroom").GetReferences().AddReference(source.identifier)
-    write_graph(second, stage, root="/House/Bedroom")
+    write_graph(second, stage, room="/House/Bedroom")
     assert read_graph(stage) == second
     assert source.ExportToString() == before
 
