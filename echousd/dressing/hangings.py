@@ -100,8 +100,10 @@ def hung_up(setting: Setting) -> None:
         size = usual_size(kind, rng)
         w, h, d = (float(side) for side in host.size)
         if kind == "coats":
-            heights = host.geometry.mesh.vertices[:, 1]
-            hooks, seat = min(1.7, 0.9 * h), heights[heights < h / 2].max()  # of a bench or a board for shoes
+            corners = host.geometry.mesh.vertices
+            pegs = (corners[:, 1] > 0.6 * h) & (corners[:, 2] > 0.05 - d / 2) & (abs(corners[:, 0]) < w / 2 - 0.06)
+            hooks = min([1.7, 0.9 * h, *corners[pegs, 1] - 0.005])
+            seat = corners[corners[:, 1] < h / 2, 1].max()  # of a bench or a board for shoes
             size[1] = min(size[1], hooks - seat - 0.02)
             count, high = max(1, int((w - 0.04) / size[0])), hooks - float(size[1])
             z = 0.0 if d > 2 * size[2] and _posts(host) else -d / 2 + 0.03 + float(size[2]) / 2
