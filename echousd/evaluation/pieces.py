@@ -85,7 +85,7 @@ def shapes(run: Run) -> list[Table]:
     for key in ("mmd", "cov", "acc"):
         for distance in DISTANCES:
             by = {n: {w: Figure(s[key]) for w, s in scored[n, distance].items() if w != "mean"} for n in made}
-            tables.append(Table("shapes", f"{FIGURES[key]} by class, {distance}", "", by, plain=True))
+            tables.append(Table("shapes", f"{FIGURES[key]} by class, {distance}", "As above.", by, plain=True))
     tables.append(_consistency(models, sizes, seed))
     if run.settings.shapes:
         return [*tables, _reconstruction(held, run.settings.shapes, seed)]

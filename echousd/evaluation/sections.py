@@ -203,7 +203,7 @@ def pictures(run: Run) -> list[Table]:
         "Rooms from above, 256 x 256, by the paper's camera, palette and shader (no floor, walls or lamps), with "
         "furniture of the programs, the same pieces for every system; `real` stands against other rooms of the source. "
         "Small CNN: share of pictures that a network of three convolutions, trained here on the other half, tells "
-        "rightly as made or real (0.5: it cannot); it is no published classifier."
+        "rightly as made or real (0.5: it cannot); it is no published classifier, and weak with some dozens of rooms."
     )
     return [Table("pictures", "Pictures from above", note, rows)]
 
