@@ -113,7 +113,8 @@ def plot(table: Table) -> str:
 
     Bars have their intervals, every panel a scale of its own.
     """
-    columns = list(dict.fromkeys(column for row in table.rows.values() for column in row))
+    told = [c for row in table.rows.values() for c, found in row.items() if found.value is not None]
+    columns = list(dict.fromkeys(told))
     if table.plain or not (table.curves or 0 < len(columns) <= PANELS):
         return ""
     if table.curves:
