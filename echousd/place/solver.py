@@ -238,5 +238,9 @@ def _least(
     scaled = rows * stiffness[:, None]
     hessian = rows.T @ scaled
     hessian[np.diag_indices_from(hessian)] += diagonal
-    solved: np.ndarray = cho_solve(cho_factor(hessian, check_finite=False), -scaled.T @ value - pull)
+    wanted = -scaled.T @ value - pull
+    try:
+        solved: np.ndarray = cho_solve(cho_factor(hessian, check_finite=False), wanted)
+    except np.linalg.LinAlgError:  # indefinite by rounding: stiff rows span more digits than a float has
+        solved = np.linalg.lstsq(hessian, wanted, rcond=None)[0]
     return solved

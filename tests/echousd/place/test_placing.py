@@ -365,3 +365,14 @@ def test_what_cannot_be_met_never_leaves_the_room(word):
     done = place_boxes(["double_bed", word], size, position, np.zeros(2), told, floor_polygon=floor, height=2.6)
     assert (done.position[:, 1] >= 0).all()
     assert (done.position[:, 1] + done.size[:, 1] <= 2.6 + 1e-6).all()
+
+
+def test_stiffness_beyond_the_digits_of_a_float_is_solved():
+    from echousd.place.solver import _least
+
+    rng = np.random.default_rng(0)
+    rows, value, diagonal = rng.normal(size=(6, 12)), rng.normal(size=6), np.full(12, 1e-3)
+    for stiff in (1e3, 1e17):  # the second is indefinite by rounding
+        found = _least(rows, np.full(6, stiff), diagonal, value, np.zeros(12))
+        assert np.allclose(rows @ found, -value, atol=1e-4)
+        assert np.abs(found).max() < 10
