@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdSemantics, UsdShade
 
 import echousd
 from echomodel.openings import numbered
@@ -26,11 +26,13 @@ from echousd.home.given import next_plan
 from echousd.home.graph import HomeGraph, home_of_plain
 from echousd.home.plan import Plan, doorways
 from echousd.home.stages import HOME, home_layer, room_path
+from echousd.layers.assets import write_mesh
 from echousd.naming import HOME as ROOT_FILE
 from echousd.naming import HOUSE as MARK
 from echousd.options import MAX_SEED, RoomOptions
 from echousd.shapes.looks import palette_of_room
 from echousd.shapes.shell import THICKNESS
+from echousd.shapes.surface import surface
 from echousd.stage.files import layer_bytes, open_stage, write_all
 from echousd.stage.turning import rescale, turn_up
 
@@ -230,33 +232,24 @@ def home_files(
 def _thresholds(layer: Sdf.Layer, plan: Plan) -> None:
     """Author floors in the doorways, where those of the rooms end: /House/Plan, one for each way through."""
     stage = Usd.Stage.Open(layer)
-    UsdGeom.Scope.Define(stage, f"{HOME}/Plan")
+    group = UsdGeom.Xform.Define(stage, f"{HOME}/Plan")
+    Usd.ModelAPI(group).SetKind("group")
+    UsdGeom.Scope.Define(stage, f"{HOME}/Plan/Looks")
     look = UsdShade.Material.Define(stage, f"{HOME}/Plan/Looks/threshold")
     shader = UsdShade.Shader.Define(stage, f"{HOME}/Plan/Looks/threshold/surface")
     shader.CreateIdAttr("UsdPreviewSurface")
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(THRESHOLD)
     look.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
     taken: list[str] = []
-    for (one, other), _, corners in doorways(plan):
+    for (one, other), _, ((low_x, low_z), (high_x, high_z)) in doorways(plan):
         name = numbered(f"threshold_{one}_{other}", taken)
         taken.append(name)
-        path = f"{HOME}/Plan/{name}"
-        part = UsdGeom.Xform.Define(stage, path)
+        part = UsdGeom.Xform.Define(stage, f"{HOME}/Plan/{name}")
         Usd.ModelAPI(part).SetKind("component")
         UsdSemantics.LabelsAPI.Apply(part.GetPrim(), "category").CreateLabelsAttr(["floor"])
-        mesh = UsdGeom.Mesh.Define(stage, f"{path}/{name}_mesh")
-        low, high = corners
-        box = trimesh.creation.box(bounds=[(low[0], -THICKNESS, low[1]), (high[0], 0.0, high[1])])
-        points = [Gf.Vec3f(*map(float, point)) for point in np.round(box.vertices, 5)]
-        mesh.CreatePointsAttr(points)
-        mesh.CreateFaceVertexCountsAttr([3] * len(box.faces))
-        mesh.CreateFaceVertexIndicesAttr(box.faces.ravel().tolist())
-        mesh.CreateNormalsAttr([Gf.Vec3f(*map(float, n)) for n in np.repeat(box.face_normals, 3, 0)])
-        mesh.SetNormalsInterpolation("faceVarying")
-        mesh.CreateSubdivisionSchemeAttr("none")
-        mesh.CreateExtentAttr([points[0].__class__(*map(float, c)) for c in box.bounds])
-        flat = [Gf.Vec2f(float(x), float(-z)) for x, _, z in box.vertices[box.faces].reshape(-1, 3)]
-        st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "faceVarying")
-        st.Set(flat)
+        box = trimesh.creation.box(bounds=[(low_x, -THICKNESS, low_z), (high_x, 0.0, high_z)])
+        mesh = write_mesh(
+            stage, f"{HOME}/Plan/{name}/{name}_mesh", surface(box, {"threshold": np.arange(len(box.faces))})
+        )
         UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(look)

@@ -28,6 +28,15 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.fixture(scope="session")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The root layer of a home of three rooms."""
+    from echousd import HomeGraph, generate_home
+
+    graph = HomeGraph.from_words("hall open_to living, hall door bathroom", area=40)
+    return generate_home(graph, tmp_path_factory.mktemp("home") / "flat", seed=7, walls=True, dress="some").root
+
+
+@pytest.fixture(scope="session")
 def z_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A room with Z up, its layers as usdc."""
     from echousd import RoomOptions, generate

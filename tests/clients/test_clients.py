@@ -85,6 +85,19 @@ def test_nvidia_validator_reports_no_issues(rooms: list[Path], tmp_path: Path) -
             assert "No issues found" in run(command, "--no-variants", file, accepted=(0, 1)), file
 
 
+def test_nvidia_validator_reports_no_issues_of_a_home(home: Path) -> None:
+    command = python_of("nvidia").with_name("nvidia_usd_validate")
+    assert "No issues found" in run(command, "--no-variants", home, accepted=(0, 1))
+
+
+def test_three_loads_a_home(home: Path, tmp_path: Path) -> None:
+    there = json.loads(run("node", HERE / "three_load.mjs", three(), export(home, tmp_path / "home.usdz")))
+    stage = Usd.Stage.Open(str(home))
+    wanted = visible_meshes(stage)
+    assert there["triangles"] == sum(len(mesh.GetFaceVertexCountsAttr().Get()) for mesh in wanted.values())
+    assert {path.rpartition("/")[2] for path in wanted} <= set(there["objects"])
+
+
 def test_materialx_makes_shaders_of_every_material(tmp_path: Path) -> None:
     options = echousd.RoomOptions(walls=True, ceiling=True, dress="full", materialx=True)
     made = echousd.generate("samples/study.usda", seed=5, shapes="boxes", options=options)
