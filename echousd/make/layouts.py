@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 DRAFTS = 8  # of which the best is kept
 ROUNDS = (2, 5)  # further drafts that are drawn at once: most rooms need one or two
-CROWD = 240  # objects of all drafts together, unless somebody says how many drafts
+CROWD = 160  # objects of all drafts together, unless somebody says how many drafts
 MAX_OBJECTS = 200  # of one room: up to here time grows no faster than their number, 400 take six times that of 200
 TALL, GLARE = 2.0, 0.03  # metres a screen counts as high before a window, and square metres of it that are too much
 OF_OPENINGS = ("door_free", "window_free")  # living rules

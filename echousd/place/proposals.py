@@ -19,7 +19,7 @@ from echousd.place.slots import INNER, STANDS
 
 HALF_PI = math.pi / 2
 STEP = 0.2  # metres between two places at a wall
-GRID = 0.35  # metres between two places in the open
+GRID, PLACES = 0.35, 300  # metres between two places in the open; in a hall so many, farther apart
 SLIDES = (0.08, 0.2, 0.45, 0.8)  # metres by which a piece is moved along its width and its depth
 AMID = 0.7  # share of the farthest watching distance at which a sofa stands in the room
 Row = tuple[float, float, float, float]  # x, z, yaw, and how much others are preferred
@@ -268,9 +268,8 @@ def along_walls(setting: Setting, i: int, more: float) -> list[Row]:
         steps = [] if fills else [free / 2, drawn, *np.arange(low, high, STEP)]
         offsets = np.unique(np.clip([low, high, *steps], low, high).round(3))
         normal = np.array([math.sin(yaw), math.cos(yaw)])
-        for offset in offsets.tolist():
-            x, z = start + along * (offset + width / 2) + normal * (depth / 2 + gap)
-            rows.append((float(x), float(z), yaw, more))
+        places = start + along * (offsets[:, None] + width / 2) + normal * (depth / 2 + gap)
+        rows += [(x, z, yaw, more) for x, z in places.tolist()]
     return rows
 
 
@@ -317,7 +316,8 @@ def _nooks(setting: Setting, i: int, more: float) -> list[Row]:
 def _in_the_open(setting: Setting, i: int, more: float) -> list[Row]:
     """On a grid over the floor and at the draft, parallel to the walls."""
     low, high = setting.floor.polygon.min(0), setting.floor.polygon.max(0)
-    xs, zs = (np.arange(a + 0.3, b - 0.2, GRID) for a, b in zip(low, high, strict=True))
+    step = max(GRID, math.sqrt(float(np.prod(high - low)) / PLACES))
+    xs, zs = (np.arange(a + 0.3, b - 0.2, step) for a, b in zip(low, high, strict=True))
     points = np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2)
     points = points[depth_inside(setting.floor, points) > 0.25 * float(setting.size[i, [0, 2]].min())]
     quarters = range(4 if setting.kinds[i].role in ("seat", "sofa") else 2)
