@@ -12,6 +12,7 @@ from echousd.dressing.setting import Setting, Standing, Thing
 GREEN = 2  # plants that a room has at most, those of the graph counted
 FOOT = 0.1  # metres from a lamp's middle to where its cable leaves the foot
 AROUND = 0.06  # metres of air around what stands in a corner
+SLIPPERS = 0.4  # share of beds that have some
 
 
 def corner_plants(setting: Setting) -> None:
@@ -48,13 +49,15 @@ def poufs(setting: Setting) -> None:
 
 
 def slippers(setting: Setting) -> None:
-    """Slippers beside every bed, toes away from it."""
+    """Slippers beside a bed, toes away from it."""
     if not setting.full:
         return
     for host in setting.of("bed"):
         rng = setting.rng(host.name, "slippers")
         size, variant = usual_size("slippers", rng), int(rng.integers(1 << 30))
         w, _, d = host.size
+        if rng.random() > SLIPPERS:
+            continue
         for side in (1, -1):
             x, yaw = side * (w / 2 + 0.22), host.yaw + side * np.pi / 2
             wanted = (

@@ -12,6 +12,7 @@ from echousd.dressing.setting import Setting, Standing, Thing, rectangle
 
 PILE = 0.008  # metres; furniture stands on the floor below, through the rug
 FROM_WALL = 0.12
+SHOES = 0.25  # share of rooms with a door that somebody leaves shoes at
 LARGEST = (4.0, 3.0)
 AROUND = 1.2  # metres from a table: a seat that belongs to it
 SHARES = (1.0, 0.9, 0.8, 0.7, 0.6)  # of its wished width and depth that a rug may have, the largest area first
@@ -84,11 +85,13 @@ def _lies(setting: Setting, plan: shapely.Polygon, group: set[str]) -> bool:
 
 
 def by_doors(setting: Setting) -> None:
-    """A pair of shoes beside a door, toes to the wall."""
+    """A pair of shoes beside a door, toes to the wall, now and then."""
     for _, door in setting.ways:
         if door.kind != "door" or not setting.walls or setting.use:
             continue
         rng = setting.rng(door.name, "shoes")
+        if rng.random() > SHOES:
+            return
         size = usual_size("shoes", rng)
         hinge, closed = hinge_point(setting.floor, door)
         inside = inward_normal(setting.floor, door.edge)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from echomodel.dressing.household import PICTURES
+from echomodel.dressing.textiles import RUGS
 from echomodel.furniture.assembly import Piece
 from echomodel.triangles import cross
 from echousd.shapes.geometry import Mass
@@ -42,8 +44,10 @@ MATTER: Mapping[str, Matter] = {
     "wicker": Matter(400.0, 0.006), "leaf": Matter(120.0), "petal": Matter(120.0), "stem": Matter(500.0),
     "soil": Matter(900.0), "fruit": Matter(800.0), "wax": Matter(900.0), "paper": Matter(700.0),
     "book": Matter(650.0), "book_a": Matter(650.0), "book_b": Matter(650.0), "book_c": Matter(650.0),
-    "book_d": Matter(650.0), "rug": Matter(250.0), "rug_striped": Matter(250.0), "rug_lattice": Matter(250.0),
-    "curtain": Matter(120.0), "picture_0": Matter(300.0), "picture_1": Matter(300.0), "picture_2": Matter(300.0),
+    "book_d": Matter(650.0),
+    "curtain": Matter(120.0),
+    **{f"rug_{design}_{variant}": Matter(250.0) for design in RUGS for variant in range(2)},
+    **{f"picture_{n}": Matter(300.0) for n in range(PICTURES)},
 }  # fmt: skip
 # Role and material of a solid -> what it stands for, where the material alone tells how it looks.
 PARTS: Mapping[tuple[str, str], Matter] = {

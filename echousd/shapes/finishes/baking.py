@@ -4,23 +4,41 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import TypeVar, cast
 
 import numpy as np
 import PIL
 
+from echomodel.dressing.textiles import RUGS
 from echomodel.files import cache_folder, digest
+from echousd.shapes.finishes import patterns
 from echousd.shapes.finishes.harmonies import HARMONIES, Color, linear
-from echousd.shapes.finishes.patterns import SIZE, noise, relief
+from echousd.shapes.finishes.patterns import SIZE, Relief, noise
+from echousd.shapes.finishes.pictures import picture
+from echousd.shapes.finishes.rugs import woven
 from echousd.srgb import from_linear
 
 Bake = TypeVar("Bake", bound=Callable[..., "bytes | None"])
 
+PATTERNS: Mapping[str, Callable[[], Relief]] = {
+    made.__name__: made
+    for made in (
+        patterns.wood, patterns.veneer, patterns.planks, patterns.woven, patterns.knitted, patterns.linen,
+        patterns.leather, patterns.plaster, patterns.wicker, patterns.leaf, patterns.stone, patterns.papered,
+        patterns.carpet, patterns.tiles, patterns.brushed, patterns.bound,
+    )
+} | {f"rug_{design}_{variant}": partial(woven, design, variant) for design in RUGS for variant in range(2)}  # fmt: skip
 QUALITY = 86  # of JPEG; without subsampling, because normals live in the colours
+
+
+@cache
+def relief(name: str) -> Relief:
+    """The pattern of that name; raises KeyError for unknown ones."""
+    return PATTERNS[name]()
 
 
 def kept(bake: Bake) -> Bake:
@@ -69,7 +87,7 @@ def color_image(pattern: str, color: Color, harmony: str) -> bytes:
     if pattern.startswith("painting_"):
         tones = HARMONIES[harmony]
         named = ("f4efe6", tones.accent, tones.cloth, tones.wood, "2d3136")
-        return _jpeg(painting([linear(c) for c in named], int(pattern.rsplit("_", 1)[1])))
+        return _jpeg(picture([linear(c) for c in named], int(pattern.rsplit("_", 1)[1])))
     tone = relief(pattern).tone
     tone = tone[..., None] if tone.ndim == 2 else tone
     return _jpeg(np.clip(tone * np.asarray(color), 0, 1))
@@ -113,40 +131,6 @@ def _encoded(value: np.ndarray, quality: int) -> bytes:
     pixels = (np.clip(value, 0, 1) * 255 + 0.5).astype(np.uint8)
     Image.fromarray(pixels).save(out, "JPEG", quality=quality, subsampling=0)
     return out.getvalue()
-
-
-def painting(colors: Sequence[Sequence[float]], number: int) -> np.ndarray:
-    """(SIZE, SIZE, 3) linear RGB: hills, shapes or fields of colour, by turns.
-
-    Arguments:
-        colors: five linear RGB colours: paper, three of the harmony, a dark one.
-        number: which picture.
-    """
-    rng = np.random.default_rng([number, 7])
-    paper, *rest = (np.asarray(color, float) for color in colors)
-    u, v = np.meshgrid(np.arange(SIZE) / SIZE, np.arange(SIZE) / SIZE)
-    out = np.broadcast_to(paper, (SIZE, SIZE, 3)).copy()
-    grain = 1 + 0.03 * noise(101 + number, 90.0, 90.0)[..., None]
-    if number % 3 == 0:  # hills under a sun
-        sun = (u - rng.uniform(0.3, 0.7)) ** 2 + (v - 0.3) ** 2 < rng.uniform(0.09, 0.14) ** 2
-        out[sun] = rest[0]
-        for layer in range(4):
-            line = 0.45 + 0.14 * layer + 0.06 * np.sin(2 * np.pi * (u * rng.uniform(0.6, 1.6) + rng.random()))
-            shade = rest[1] * (1 - layer / 3) + rest[2] * (layer / 3)
-            out[v > line] = shade
-    elif number % 3 == 1:  # round shapes beside and over one another
-        for color in (rest[1], rest[0], rest[2], rest[0], rest[3]):
-            x, y, r = rng.uniform(0.25, 0.75), rng.uniform(0.25, 0.75), rng.uniform(0.08, 0.24)
-            inside = ((u - x) / r) ** 2 + ((v - y) / (r * rng.uniform(0.7, 1.6))) ** 2 < 1
-            if rng.random() < 0.5:
-                inside &= v < y
-            out[inside] = color
-    else:  # fields with soft borders
-        cuts = [0.0, *np.sort(rng.uniform(0.2, 0.8, 2)).tolist(), 1.0]
-        soft = v + 0.012 * noise(131 + number, 8.0, 8.0)
-        for color, top, bottom in zip((rest[0], rest[1], rest[2]), cuts, cuts[1:], strict=False):
-            out[(soft > top + 0.015) & (soft < bottom - 0.015) & (u > 0.06) & (u < 0.94)] = color
-    return np.clip(out * grain, 0, 1)
 
 
 SKY_SIZE = (512, 1024)  # pixels: a window some metres away shows about a hundred of them

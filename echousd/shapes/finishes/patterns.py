@@ -5,9 +5,7 @@ Every pattern is the same in every run and on every machine; colour comes later,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -177,34 +175,6 @@ def pile() -> Relief:
     return Relief(1 + 0.05 * fine + 0.03 * noise(82, 8.0, 8.0), 0.003 * fine)
 
 
-def bordered() -> Relief:
-    """A rug with a border, whole."""
-    u, v = _grid()
-    edge = np.minimum(np.minimum(u, 1 - u), np.minimum(v, 1 - v))
-    line = ((edge > 0.045) & (edge < 0.06)) | ((edge > 0.075) & (edge < 0.12))
-    return _rug(np.where(line, 0.72, 1.0))
-
-
-def striped() -> Relief:
-    """A rug with broad and narrow stripes, whole."""
-    _, v = _grid()
-    wave = np.sin(2 * np.pi * 5 * v)
-    return _rug(np.where(wave > 0.75, 0.7, np.where(wave < -0.9, 0.85, 1.0)) * np.ones((SIZE, SIZE)))
-
-
-def latticed() -> Relief:
-    """A rug with a lattice of lozenges, whole."""
-    u, v = _grid()
-    a, b = np.abs((4 * u + 4 * v) % 1.0 - 0.5), np.abs((4 * u - 4 * v) % 1.0 - 0.5)
-    return _rug(np.where((a < 0.035) | (b < 0.035), 0.62, 1.0))
-
-
-def _rug(drawn: np.ndarray) -> Relief:
-    relief = pile()
-    tone = drawn * relief.tone
-    return Relief(tone / np.median(tone))
-
-
 def wicker(strands: int = 24) -> Relief:
     """Basketwork."""
     u, v = _grid()
@@ -224,18 +194,3 @@ def stone() -> Relief:
     """Glazed clay with specks."""
     specks = np.clip(noise(97, 90.0, 90.0, 4.0) - 1.9, 0, 1)
     return Relief(1 + 0.02 * noise(98, 6.0, 6.0) - 0.5 * specks)
-
-
-PATTERNS: Mapping[str, Callable[[], Relief]] = {
-    made.__name__: made
-    for made in (
-        wood, veneer, planks, woven, knitted, linen, leather, plaster, pile, bordered, striped, latticed, wicker, leaf,
-        stone, papered, carpet, tiles, brushed, bound,
-    )
-}  # fmt: skip
-
-
-@cache
-def relief(name: str) -> Relief:
-    """The pattern of that name; raises KeyError for unknown ones."""
-    return PATTERNS[name]()

@@ -8,6 +8,8 @@ from echomodel.dressing.solids import Lathe
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Block, Solid, ball, rotation, tube, turned
 
+PICTURES = 60  # that there are
+
 
 def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A framed picture behind a mount; its back is at the wall."""
@@ -23,7 +25,7 @@ def picture(size: Size, rng: np.random.Generator) -> list[Solid]:
 
 
 def _painting(rng: np.random.Generator) -> str:
-    return f"picture_{int(rng.integers(3))}"
+    return f"picture_{int(rng.integers(PICTURES))}"
 
 
 def _frame(w: float, h: float, d: float, bar: float) -> list[Solid]:

@@ -8,20 +8,29 @@ from echomodel.dressing.solids import Sheet
 from echomodel.furniture.carpentry import Size, box
 from echomodel.furniture.solids import Solid, ball, turned
 
-RUGS = ("rug", "rug_striped", "rug_lattice")  # what is woven into them
+RUGS = (
+    "bordered", "striped", "latticed", "medallion", "checked", "chevrons", "dotted", "scalloped", "broken", "ringed",
+    "berber", "shaded", "carved",
+)  # fmt: skip
+ROUND = ("dotted", "scalloped", "broken", "ringed", "berber", "carved")  # designs that a round one has, too
 FOLD = 0.14  # metres of curtain from one fold to the next
 
 
 def rug(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A rectangle of pile."""
     w, h, d = size
-    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), str(rng.choice(RUGS)), h * 0.45)]
+    return [box((-w / 2, 0, -d / 2), (w / 2, h, d / 2), _woven(RUGS, rng), h * 0.45)]
 
 
 def round_rug(size: Size, rng: np.random.Generator) -> list[Solid]:
     """A round of pile."""
     w, h, d = size
-    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material="rug")]
+    return [turned((0, 0, 0), (w / 2, d / 2), h, rounding=h * 0.45, material=_woven(ROUND, rng))]
+
+
+def _woven(designs: tuple[str, ...], rng: np.random.Generator) -> str:
+    """What is woven into a rug: one of some designs, in one of two variants."""
+    return f"rug_{rng.choice(designs)}_{int(rng.integers(2))}"
 
 
 def curtain(size: Size, rng: np.random.Generator) -> list[Solid]:

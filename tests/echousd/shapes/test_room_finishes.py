@@ -11,13 +11,18 @@ from pxr import Usd, UsdShade
 from small_room import BARE, StandIn, small_graph
 
 import echousd
+from echomodel.dressing.household import PICTURES
+from echomodel.dressing.textiles import ROUND, RUGS
 from echomodel.furniture.solids import Block
 from echousd.checks.validity import find_faults
 from echousd.exporting import export
 from echousd.options import RoomOptions
 from echousd.shapes.finishes import baking
+from echousd.shapes.finishes.baking import PATTERNS, relief
 from echousd.shapes.finishes.harmonies import HARMONIES, linear
-from echousd.shapes.finishes.patterns import PATTERNS, SIZE, relief
+from echousd.shapes.finishes.patterns import SIZE
+from echousd.shapes.finishes.pictures import picture
+from echousd.shapes.finishes.rugs import DESIGNS
 from echousd.shapes.finishes.slots import SHELL, SLOTS, material_of
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -140,7 +145,7 @@ def _tint_of(stage, harmony):
 
 
 def test_labels_say_what_things_are_made_of():
-    told = {"a_b_book_b": "paper", "room_rug_lattice": "wool", "picture_0": "print", "style_accent_plain": "fabric"}
+    told = {"a_b_book_b": "paper", "room_rug_latticed_1": "wool", "picture_0": "print", "style_accent_plain": "fabric"}
     told |= {"door_leaf": "wood", "plant_leaf": "foliage", "wallpaper": "paper", "wall": "plaster", "glass": "glass"}
     assert {name: material_of(name) for name in told} == told
     words = {material_of(f"suite_{slot}") for slot in (*SLOTS, *SHELL)}
@@ -177,3 +182,22 @@ def test_a_baked_image_is_kept_for_later_processes(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     assert later("oak", 3) == b"oakoakoak"
     assert len(baked) == 5
+
+
+def test_pictures_are_sixty_unlike_ones_and_rugs_twenty_six():
+    """What hangs or lies in fifty rooms is not met all the time: no two are nearly the same."""
+    paper = [linear(color) for color in ("f4efe6", "c47f4f", "7d8b91", "b98f5f", "2d3136")]
+    drawn = [picture(paper, number)[::16, ::16] for number in range(PICTURES)]
+    rugs = [relief(f"rug_{design}_{variant}").tone[::16, ::16] for design in RUGS for variant in range(2)]
+    assert (len(drawn), len(rugs)) == (60, 26)
+    for which, least in ((drawn, 0.02), (rugs, 0.01)):
+        apart = [float(np.abs(one - other).mean()) for k, one in enumerate(which) for other in which[:k]]
+        assert min(apart) > least
+    for image in drawn:
+        assert 0 <= image.min() <= image.max() <= 1
+        assert image.std() > 0.02
+
+
+def test_what_is_woven_into_rugs_has_a_program_each():
+    assert set(RUGS) == DESIGNS.keys()
+    assert set(ROUND) < set(RUGS)
