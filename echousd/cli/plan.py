@@ -106,7 +106,7 @@ def export(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", help="Picture (.png, .svg, .pdf), drawing (.dxf) or stage (.usda).", show_default=False
+            "-o", "--output", help=".png, .svg, .pdf, .dxf, .json (ProcTHOR 1.0.0) or .usda.", show_default=False
         ),
     ],
     several: Annotated[int, typer.Option("--plans", help="Plans side by side in a picture.", min=1, max=12)] = 1,
@@ -122,10 +122,11 @@ def export(
     from echousd.home.files import load_home
     from echousd.home.given import plan_of, plan_there
     from echousd.home.plan import plans
+    from echousd.home.procthor import write_procthor
     from echousd.home.stages import furniture, write_home
 
     started, form = time.perf_counter(), output.suffix.lower()
-    _writable(output, (*PICTURES, ".dxf", *STAGE_FORMS[:-1]), force)
+    _writable(output, (*PICTURES, ".dxf", ".json", *STAGE_FORMS[:-1]), force)
     if several > 1 and form not in PICTURES:
         raise GraphError(f"--plans is {several}, allowed with a picture; name one by its --seed")
     source = room_at(source) if source.is_dir() else source
@@ -141,6 +142,8 @@ def export(
         draw_plans(found, output, things=things)
     elif form == ".dxf":
         write_dxf(found[0], output, things)
+    elif form == ".json":
+        write_procthor(found[0], output)
     else:
         write_home(found[0].home, output, found[0])
     lines = [f"wrote {output}", *(f"plan     {len(one.floors)} rooms, {one.area:.1f} m²" for one in found)]

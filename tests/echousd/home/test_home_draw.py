@@ -53,7 +53,7 @@ def test_plans_side_by_side(file, tmp_path, echousd_command):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("flat.yaml", "-o", "plan.txt"), "plan.txt: extension '.txt', allowed: .png, .svg, .pdf, .dxf, .usda"),
+        (("flat.yaml", "-o", "plan.txt"), "plan.txt: extension '.txt', allowed: .png, .svg, .pdf, .dxf, .json, .usda"),
         (("flat.yaml", "-o", "plan.dxf", "--plans", "2"), "--plans is 2, allowed with a picture"),
         (("flat.yaml", "-o", "flat.yaml.png", "--plans", "99"), "less than or equal to 12"),
         (("room.yaml", "-o", "plan.png"), "room.yaml: no home, allowed: a file with rooms"),

@@ -6,8 +6,10 @@ import zipfile
 import ezdxf
 import numpy as np
 import pytest
+import shapely
 import svgelements
 
+from echomodel.openings import segment
 from echousd.graph import GraphError
 from echousd.home.files import load_home
 from echousd.home.given import plan_there
@@ -484,3 +486,29 @@ def test_a_plan_comes_in_and_goes_on(tmp_path, echousd_command):
     roomplan(tmp_path / "scan.json")
     done = echousd_command("plan", "import", tmp_path / "scan.json", "-o", tmp_path / "s.usda", "--unit", "mm")
     assert "roomplan is always in one unit" in done.err
+
+
+def test_a_house_of_procthor_goes_out_and_comes_back(tmp_path, echousd_command):
+    words = "hall door bedroom, hall open_to living, living door bathroom"
+    assert echousd_command("new", tmp_path / "flat.yaml", "--rooms", words, "--area", 50).code == 0
+    for name in ("flat.usda", "flat.json"):
+        done = echousd_command("plan", tmp_path / "flat.yaml", "-o", tmp_path / name)
+        assert done.code == 0, done.err
+    plan = plan_there(tmp_path / "flat.usda")
+    form, found = read_plan(tmp_path / "flat.json")
+    back = imported(found).plan
+    assert form == "procthor"
+    assert json.loads((tmp_path / "flat.json").read_text())["metadata"]["schema"] == "1.0.0"
+    names = dict(zip(back.floors, plan.floors, strict=True))
+    for name, cell in back.cells.items():  # their walls have no thickness, and outer ones stand outside
+        assert shapely.Polygon(cell).buffer(1e-3).covers(shapely.Polygon(plan.floors[names[name]]))
+    assert {(frozenset(map(names.get, pair)), one.kind) for pair, one in ways(back)} == {
+        (frozenset(pair), one.kind) for pair, one in ways(plan)
+    }
+
+    def where(of, name):
+        return sorted((one.kind, *segment(of.floors[name], one).mean(0).round(1)) for one in of.openings[name])
+
+    for name, ours in names.items():
+        assert [one[0] for one in where(back, name)] == [one[0] for one in where(plan, ours)]
+        assert np.allclose([o[1:] for o in where(back, name)], [o[1:] for o in where(plan, ours)], atol=0.35)
