@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from echousd.shapes.finishes.patterns import SIZE, noise
 
 FINE = 2  # times that what is drawn with a pen is larger first
-LETTERS = "&aRgQs?"
 
 
 class Canvas:
@@ -111,15 +110,12 @@ def botanical(canvas: Canvas) -> None:
             canvas.fill(leaf, color)
 
 
-def letter(canvas: Canvas) -> None:
-    """A letter as large as the sheet."""
-    canvas.lay(np.ones_like(canvas.u), canvas.tone() if canvas.rng.random() < 0.5 else canvas.paper)
-    text = LETTERS[canvas.number // len(KINDS) % len(LETTERS)]
-
-    def draw(pen: ImageDraw.ImageDraw, side: float) -> None:
-        pen.text((side / 2, side / 2), text, 255, ImageFont.load_default(0.85 * side), anchor="mm")
-
-    canvas.pen(draw, canvas.dark)
+def contours(canvas: Canvas) -> None:
+    """The lines of a map of hills, one height filled in."""
+    height = 4 * noise(161 + canvas.number, 2.0, 2.0, 5.0)
+    slope = np.hypot(*np.gradient(height))
+    canvas.lay(height > np.quantile(height, canvas.rng.uniform(0.72, 0.88)), canvas.tone())
+    canvas.lay(np.clip(1.6 - np.abs((height + 0.5) % 1.0 - 0.5) / np.maximum(slope, 1e-4), 0, 1), canvas.dark)
 
 
 def horizon(canvas: Canvas) -> None:
@@ -168,7 +164,7 @@ def cuttings(canvas: Canvas) -> None:
         canvas.lay((shape > 0.95 + 0.12 * layer) & margin, color)
 
 
-KINDS = (hills, line, rounds, botanical, fields, letter, horizon, textile, arches, cuttings)
+KINDS = (hills, line, rounds, botanical, fields, contours, horizon, textile, arches, cuttings)
 
 
 def picture(colors: Sequence[Sequence[float]], number: int) -> np.ndarray:
