@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,10 @@ def export(
         typer.Option("-o", "--output", help="A .usdz, .glb, .usda or .usdc; a folder with --for.", show_default=False),
     ],
     for_: Annotated[
-        str | None, typer.Option("--for", help="sceneeval: its sceneState, and a glb of every object, in its folders.")
+        str | None,
+        typer.Option(
+            "--for", help="sceneeval: its sceneState, a glb for every object; habitat: a data set of the room or home."
+        ),
     ] = None,
     arkit: Annotated[
         bool, typer.Option("--arkit", help="usdz for Apple's viewers: a usdc inside, Y up, without lights and graph.")
@@ -52,15 +56,20 @@ def export(
     Those that ignore purposes draw its colliders: --no-physics.
     """
     from echousd.exporting import export as write
+    from echousd.exporting.habitat import export_habitat
     from echousd.exporting.sceneeval import export_sceneeval
     from echousd.folder.found import room_at
 
     started = time.perf_counter()
     room = room_at(room)
     if for_ is not None:
-        if for_ != "sceneeval":
-            raise ValueError(f"--for is {for_!r}, allowed: sceneeval")
-        written = export_sceneeval(room, output)
+        others: dict[str, Callable[[Path, Path], list[Path]]] = {
+            "sceneeval": export_sceneeval,
+            "habitat": export_habitat,
+        }
+        if for_ not in others:
+            raise ValueError(f"--for is {for_!r}, allowed: {', '.join(others)}")
+        written = others[for_](room, output)
         say_done(json, written, started, [str(written[0])])
         return
     path = write(

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdLux
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
 from echousd.draw.drawables import Drawable, Paint, Texture, own_category, paint_image, read_drawables, world_frame
 from echousd.exporting.packing import Reach
@@ -27,6 +27,14 @@ ENCODED = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}  # what glTF 
 COMPONENT = {"f": 5126, "H": 5123, "I": 5125}
 VERTICES, INDICES = 34962, 34963
 Shown = tuple[Paint, bool]  # a material, and whether both sides show it
+
+
+def object_glb(stage: Usd.Stage, room: Sdf.Path, path: Sdf.Path) -> bytes:
+    """One object of a room, which lies at `room`, in its own frame."""
+    alone = Usd.Stage.OpenMasked(stage.GetRootLayer(), Usd.StagePopulationMask([path, room.AppendChild("Looks")]))
+    with Usd.EditContext(alone, alone.GetSessionLayer()):
+        UsdGeom.Xformable(alone.GetPrimAtPath(path)).SetXformOpOrder([], True)
+    return glb(alone, Reach.of(alone, ()))
 
 
 def glb(stage: Usd.Stage, reach: Reach) -> bytes:

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom
 
-from echousd.exporting.glb import glb
-from echousd.exporting.packing import Reach
+from echousd.exporting.glb import object_glb
 from echousd.graph import SceneGraph
 from echousd.stage.files import open_stage, write_all
 from echousd.stage.foreign import boxed_graph
-from echousd.stage.read import RoomPrims, node_names, the_room
+from echousd.stage.read import node_names, the_room
 
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # our (x, y, z) is (x, -z, y) there
 ASSETS, PREFIX = Path("_data/layoutvlm-objathor"), "layoutvlm-objaverse"
@@ -34,11 +31,11 @@ def export_sceneeval(room: str | Path, out: Path, *, method: str = "EchoUSD", sc
     files: dict[Path, bytes] = {
         out / "input" / method / f"scene_{scene}.json": (json.dumps(state, indent=1) + "\n").encode()
     }
-    for name, content in models(stage, prims).items():
+    for path, name in node_names(prims).items():
         node, number = graph.node(name), model_name(name)
         told = {"category": node.category.replace("_", " "), "description": f"a {node.category.replace('_', ' ')}"}
         folder = out / ASSETS / number
-        files[folder / f"{number}.glb"] = content
+        files[folder / f"{number}.glb"] = object_glb(stage, prims.room.GetPath(), path)
         files[folder / "data.json"] = json.dumps({"annotations": {**told, "materials": []}}).encode()
     write_all(files)
     return list(files)
@@ -85,15 +82,3 @@ def scene_state(graph: SceneGraph) -> dict[str, Any]:
             "regions": [{"id": kind, "type": "Other", "walls": [e["id"] for e in elements[1:]]}]}  # fmt: skip
     scene = {"version": "scene@1.0.2", "id": "room", "unit": 1.0, **up, "assetSource": ["objaverse"], "arch": arch}
     return {"format": "sceneState", "scene": {**scene, "object": objects, "modifications": []}, "selected": []}
-
-
-def models(stage: Usd.Stage, prims: RoomPrims) -> Mapping[str, bytes]:
-    """A glb of every object, in its own frame."""
-    out = {}
-    for path, name in node_names(prims).items():
-        mask = Usd.StagePopulationMask([path, prims.room.GetPath().AppendChild("Looks")])
-        alone = Usd.Stage.OpenMasked(stage.GetRootLayer(), mask)
-        with Usd.EditContext(alone, alone.GetSessionLayer()):
-            UsdGeom.Xformable(alone.GetPrimAtPath(path)).SetXformOpOrder([])
-        out[name] = glb(alone, Reach.of(alone, ()))
-    return out

@@ -1,0 +1,111 @@
+"""A room or a home for Habitat: a data set of one scene, its shell as the stage and a glb for every object."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Usd, UsdGeom, UsdPhysics
+
+from echousd.exporting.glb import glb, object_glb
+from echousd.exporting.packing import Reach
+from echousd.naming import free_name
+from echousd.stage.files import open_stage, source, write_all
+from echousd.stage.read import RoomPrims, find_rooms, node_names, room_graph
+from echousd.stage.turning import TURN
+from echousd.stage.units import metres_per_unit, up_axis
+
+UP = {"up": [0, 1, 0], "front": [0, 0, -1]}  # Habitat's own, and of every glb
+HEIGHT = 2.8  # metres, of a room that states none
+FOLDERS = {"stages": "stages", "objects": "objects", "scene_instances": "scenes"}
+
+
+def export_habitat(room: str | Path, out: Path) -> list[Path]:
+    """Write `NAME.scene_dataset_config.json` and beside it stages, objects, the scene, and regions of its rooms.
+
+    What dresses a room is part of the stage; furniture is objects, those that stand free to be moved.
+
+    Raises ValueError for a stage without rooms, and as `export`.
+    """
+    path = Path(room)
+    stage = open_stage(path)
+    rooms = find_rooms(stage)
+    if not rooms:
+        raise ValueError(f"{source(stage)}: no scene graph, Habitat needs one: a room or a home of EchoUSD")
+    name, top = path.stem, f"{path.stem}.scene_dataset_config.json"
+    files: dict[str, bytes | dict[str, Any]] = {}
+    objects: list[dict[str, Any]] = []
+    names: dict[str, str] = {}
+    cache = UsdGeom.XformCache()
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        for prims, prim, called in _objects(rooms):
+            word = names[str(prim.GetPath())] = free_name(called, set(names.values()))
+            files[f"objects/{word}.glb"] = object_glb(stage, prims.room.GetPath(), prim.GetPath())
+            mass = UsdPhysics.MassAPI(prim).GetMassAttr().Get()
+            config = {"render_asset": f"{word}.glb", **UP, **({"mass": round(float(mass), 3)} if mass else {})}
+            files[f"objects/{word}.object_config.json"] = config
+            pose = _metric(stage, cache.GetLocalToWorldTransform(prim))
+            turn = pose.ExtractRotationQuat()
+            objects.append(
+                {
+                    "template_name": f"objects/{word}",
+                    "translation": [round(v, 6) for v in pose.ExtractTranslation()],
+                    "rotation": [round(v, 6) for v in (turn.GetReal(), *turn.GetImaginary())],
+                    "translation_origin": "ASSET_LOCAL",
+                    "motion_type": "DYNAMIC" if prim.HasAPI(UsdPhysics.RigidBodyAPI) else "STATIC",
+                }
+            )
+        for prim_path in names:
+            stage.GetPrimAtPath(prim_path).SetActive(False)
+        files[f"stages/{name}.glb"] = glb(stage, Reach.of(stage, ()))
+    files[f"stages/{name}.stage_config.json"] = {"render_asset": f"{name}.glb", **UP}
+    files[f"scenes/{name}.scene_instance.json"] = {
+        "stage_instance": {"template_name": f"stages/{name}"},
+        "object_instances": objects,
+        "semantic_scene_instance": name,
+    }
+    files[f"{name}.semantic_config.json"] = {"region_annotations": [_region(stage, prims) for prims in rooms]}
+    files[top] = {
+        **{kind: {"paths": {".json": [folder]}} for kind, folder in FOLDERS.items()},
+        "semantic_scene_descriptor_instances": {"paths": {".json": [f"{name}.semantic_config.json"]}},
+    }
+    written = {
+        out / where: content if isinstance(content, bytes) else (json.dumps(content, indent=1) + "\n").encode()
+        for where, content in files.items()
+    }
+    write_all(written)
+    return sorted(written, key=lambda file: file.name != top)
+
+
+def _objects(rooms: list[RoomPrims]) -> Iterator[tuple[RoomPrims, Usd.Prim, str]]:
+    """Every object with its room and what it is called; of several rooms, after its own."""
+    for prims in rooms:
+        before = f"{prims.room.GetName()}_" if len(rooms) > 1 else ""
+        for path, name in node_names(prims).items():
+            yield prims, prims.room.GetStage().GetPrimAtPath(path), before + name
+
+
+def _metric(stage: Usd.Stage, matrix: Gf.Matrix4d) -> Gf.Matrix4d:
+    """A pose of a stage in metres with +Y up, of row vectors."""
+    out = TURN * matrix * TURN.GetInverse() if up_axis(stage) == "Z" else Gf.Matrix4d(matrix)
+    out.SetTranslateOnly(out.ExtractTranslation() * metres_per_unit(stage))
+    return out.RemoveScaleShear()
+
+
+def _region(stage: Usd.Stage, prims: RoomPrims) -> dict[str, Any]:
+    """The floor of a room as a region."""
+    graph = room_graph(prims)
+    pose = _metric(stage, UsdGeom.XformCache().GetLocalToWorldTransform(prims.room))
+    corners = graph.room.corners if graph.room.corners is not None else np.zeros((0, 2))
+    points = [pose.Transform(Gf.Vec3d(float(x), 0.0, float(z))) for x, z in corners]
+    floor = round(pose.ExtractTranslation()[1], 4)
+    return {
+        "name": prims.room.GetName(),
+        "label": graph.room.type,
+        "poly_loop": [[round(v, 4) for v in point] for point in points],
+        "floor_height": floor,
+        "extrusion_height": graph.room.height or HEIGHT,
+    }
