@@ -82,19 +82,26 @@ def with_wider_floor(graph: SceneGraph, corners: np.ndarray) -> SceneGraph:
 def with_placed_openings(graph: SceneGraph, boxes: Arrays, seed: int) -> SceneGraph:
     """The graph with a door where it states no opening, and windows where it states none, placed where nothing stands.
 
+    Windows are above worktops in every room that has fitted units.
+
     Arguments:
         graph: with a floor; without one it comes back as it is.
         boxes: size (n, 3), position (n, 3) of the bottom centre, metres, and yaw (n,), of all that stands already.
         seed: decides between places that are equally good.
     """
-    from echomodel.rooms.openings import place_openings
+    from echomodel.rooms.openings import WINDOWS, place_openings
+    from echomodel.vocabulary import vocabulary
 
     corners = graph.room.corners
     if corners is None or graph.room.walls or any(opening.kind == "window" for opening in graph.room.openings):
         return graph
+    words = vocabulary()
+    fitted = any(words.category(node.category).stands == "row" for node in graph.nodes)
+    use = "wet" if fitted else words.room_type(graph.room.type).use
     placed = place_openings(
-        corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings
-    )
+        corners, graph.room.height or HEIGHT, _generator(seed, "openings"), boxes=boxes, stated=graph.room.openings,
+        use=use if use in WINDOWS else "",
+    )  # fmt: skip
     return graph.replaced(room=graph.room.replaced(openings=placed))
 
 

@@ -18,6 +18,7 @@ from echomodel.openings import (
     overlap,
     signed_area,
 )
+from echomodel.rooms.openings import WINDOWS
 from echomodel.vocabulary import vocabulary
 from echousd.home.graph import HomeGraph
 
@@ -26,7 +27,6 @@ PASSAGE = (3.0, 2.3)  # at most
 PASSAGE_SHARE = 0.6  # of the wall that two rooms share: furniture needs the rest
 JAMB = 0.12  # metres from a corner to a hole
 PIER = 0.3  # metres from a corner, or a door, to a window
-WINDOWS = {"": (0.9, 1.3, 2.0), "wet": (1.2, 1.0, 1.2), "outdoor": ()}  # by use: sill, height, width at most
 UNEVEN = 0.15  # metres that a wall may be thicker in one place than in another
 STEP = 0.1  # metres between the places that are tried
 
@@ -208,9 +208,9 @@ def outer_spans(floor: Floor, floors: Sequence[Floor]) -> Iterator[tuple[int, fl
 def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequence[Opening]) -> Iterator[Opening]:
     """A window, two in a large room, in the middle of the longest outer walls."""
     row = vocabulary().room_type(home.room(floor.name).type)
-    how = WINDOWS[row.use]
-    if not how or not (row.daylight or row.use == "wet"):
+    if row.use == "outdoor" or not (row.daylight or row.use == "wet"):
         return
+    sill, tall, wide = WINDOWS[row.use]
     spans = []
     for edge, low, high in outer_spans(floor, floors):
         for opening in there:
@@ -220,9 +220,9 @@ def _windows(home: HomeGraph, floor: Floor, floors: Sequence[Floor], there: Sequ
         spans.append((high - low, edge, low, high))
     names = [opening.name for opening in there]
     for count, (span, edge, low, high) in enumerate(sorted(spans, reverse=True)[:2]):
-        width = round(min(0.5 * span, how[2]), 1)
+        width = round(min(0.5 * span, wide), 1)
         if width < 0.5 or span - width < 2 * PIER or (count and abs(signed_area(floor.corners)) < 14.0):
             return
         name = numbered("window", names)
         names.append(name)
-        yield Opening(name, "window", edge, round((low + high - width) / 2, 3), width, how[1], how[0])
+        yield Opening(name, "window", edge, round((low + high - width) / 2, 3), width, tall, sill)

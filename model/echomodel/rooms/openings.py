@@ -25,6 +25,10 @@ CORNER = 0.1  # metres from a corner to a door
 OUTWARDS = 0.7  # what a door that swings out of the room must save; rooms' doors open inwards
 PIER = 0.3  # metres of wall between a window and a corner or another opening
 SECOND_WINDOW, SECOND_DOOR = 16.0, 30.0  # square metres of floor
+WINDOWS = {  # by use of a room: sill, height, width at most, metres; above worktops and basins where there are such
+    "": (USUAL["window"]["sill"], USUAL["window"]["height"], 2.0),
+    "wet": (1.2, 1.0, 1.2),
+}
 
 
 def place_openings(
@@ -34,6 +38,7 @@ def place_openings(
     *,
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
     stated: Sequence[Opening] = (),
+    use: str = "",
 ) -> tuple[Opening, ...]:
     """A door and one or two windows (two doors in halls), each where least stands in its way.
 
@@ -46,12 +51,13 @@ def place_openings(
         boxes: size (n, 3), position (n, 3) of the bottom centre and yaw (n,) of what stands in the room.
         stated: openings that are there, which come first in what is returned; doors among them are all that there are,
             windows likewise.
+        use: of the room, one of `WINDOWS`.
     """
     area = abs(signed_area(polygon))
     made = list(stated)
     for kind, count in (("door", 1 + (area > SECOND_DOOR)), ("window", 1 + (area > SECOND_WINDOW))):
         for _ in range(count if not stated or (kind == "window" and kind not in {o.kind for o in stated}) else 0):
-            best = _best(kind, polygon, height, rng, made, boxes)
+            best = _best(kind, polygon, height, rng, made, boxes, use)
             if best is not None:
                 made.append(best)
     return tuple(made)
@@ -64,20 +70,21 @@ def _best(
     rng: np.random.Generator,
     made: Sequence[Opening],
     boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None,
+    use: str,
 ) -> Opening | None:
     """The place of least cost among a grid of places on all walls, None where no wall is long enough."""
     import shapely
 
     lengths = edge_lengths(polygon)
     name = numbered(kind, [opening.name for opening in made])
-    usual = USUAL[kind]
-    tall = min(usual["height"], height - usual["sill"] - 0.05)
+    sill, tall, wide = WINDOWS[use] if kind == "window" else (0.0, USUAL[kind]["height"], USUAL[kind]["width"])
+    tall = min(tall, height - sill - 0.05)
     doors = [opening for opening in made if opening.kind == "door"]
     places: list[Opening] = []
     tastes: list[float] = []
     for edge, length in enumerate(lengths):
         margin = CORNER if kind == "door" else PIER
-        width = usual["width"] if kind == "door" else float(np.clip(0.4 * length, 0.9, 2.0))
+        width = wide if kind == "door" else float(np.clip(0.4 * length, 0.9, wide))
         if length < width + 2 * margin:
             continue
         shared = [opening for opening in made if opening.edge == edge]
@@ -93,7 +100,7 @@ def _best(
             near, far = float(offset), float(length - width - offset)
             hinge = "left" if (near <= far) == (signed_area(polygon) > 0) else "right"
             hinge = hinge if kind == "door" else "left"
-            one = Opening(name, kind, edge, near, width, tall, usual["sill"], hinge, swing)
+            one = Opening(name, kind, edge, near, width, tall, sill, hinge, swing)
             if any(overlap(one, other) > -PIER for other in shared):
                 continue
             places.append(one)
@@ -106,7 +113,7 @@ def _best(
     # into the next wall of a niche
     cost += 3.0 * shapely.area(shapely.difference(free, shapely.Polygon(polygon).buffer(1e-6)))
     for block, top in _blocks(boxes):
-        if kind != "window" or top > usual["sill"]:
+        if kind != "window" or top > sill:
             cost += 12.0 * shapely.area(shapely.intersection(free, block))
     for other in made:
         cost += 2.0 * shapely.area(shapely.intersection(free, shapely.Polygon(free_area(polygon, other))))

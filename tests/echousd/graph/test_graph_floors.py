@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from echomodel.openings import swing_area
+from echomodel.openings import USUAL, swing_area
+from echomodel.rooms.runs import WORKTOP
 from echousd.graph import GraphError, Node, Relation, RoomSpec, SceneGraph
 from echousd.graph.floors import (
     check_space,
@@ -16,6 +17,7 @@ from echousd.graph.floors import (
     with_plan_of,
     with_wider_floor,
 )
+from echousd.shapes.fittings import window_sill
 
 GRAPH = SceneGraph(
     "bedroom",
@@ -41,6 +43,18 @@ def test_openings_are_placed_where_none_is_stated() -> None:
     assert {opening.kind for opening in graph.room.openings} == {"door", "window"}
     assert with_placed_openings(graph, NOTHING, 2) is graph
     assert with_placed_openings(GRAPH, NOTHING, 1) is GRAPH
+
+
+@pytest.mark.parametrize("kind", ["kitchen", "utility_room", "bathroom", "living_room"])
+def test_proposed_windows_and_their_boards_are_above_worktops(kind: str) -> None:
+    nodes = (Node("sink", "sink_unit"), Node("base", "base_unit"))  # fitted units, in a living room as well
+    for seed in range(4):
+        graph = with_plan(SceneGraph(kind, nodes), seed)
+        boards = [window_sill(o).bounds[0, 1] for o in graph.room.openings if o.kind == "window"]
+        assert boards
+        assert min(boards) >= WORKTOP
+    dry = with_plan(GRAPH, 0).room.openings
+    assert {opening.sill for opening in dry} == {0.0, USUAL["window"]["sill"]}
 
 
 def test_a_plan_is_a_floor_and_openings_out_of_the_way_of_what_is_fixed() -> None:
