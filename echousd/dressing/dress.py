@@ -26,6 +26,7 @@ ORIGIN = Origin("dressing")
 TALL = 0.7  # metres: what reaches or hangs higher may stand in a camera's way
 RULES = (
     floors.rugs,
+    hangings.hung_up,
     walls.curtains,
     walls.pictures,
     upholstery.throws,
@@ -36,7 +37,6 @@ RULES = (
     floors.by_doors,
     floors.baskets,
     hangings.coats,
-    hangings.hung_up,
     floors.toys,
     hangings.tall_mirror,
     hangings.shelves,

@@ -1,5 +1,7 @@
 """What hangs, stands and lies in the rooms of a home: dishes on worktops, coats on racks, towels, toys, blinds."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from echomodel.dressing import KINDS
 from echomodel.furniture import Choices, Style, solids
 from echomodel.openings import Opening
 from echousd.dressing import bareness, floors, hangings, tabletops, walls
+from echousd.dressing.dress import RULES
 from echousd.dressing.setting import Setting, standing
 from echousd.shapes.geometry import Origin
 from echousd.shapes.joinery import assembled
@@ -58,6 +61,22 @@ def test_coats_hang_on_racks_and_towels_on_rungs(word, kind, least):
                 assert not (inside & (abs(corners[:, 1] - thing.position[1] - half[1]) < half[1] - 1e-3)).any()
             assert thing.position[1] + thing.size[1] < host.top
             assert abs(thing.position[0]) + thing.size[0] / 2 < host.size[0] / 2 + 0.01
+
+
+def test_curtains_keep_clear_of_the_coats_on_a_rack():
+    met = 0
+    for seed, offset in itertools.product(range(6), np.linspace(0.3, 2.6, 12)):
+        room = setting("coat_rack", seed=seed, openings=[Opening("window", "window", 0, offset, 1.0, 1.3, 0.9)])
+        for rule in (rule for rule in RULES if rule in (walls.curtains, hangings.hung_up)):
+            rule(room)
+        curtains = [thing for thing in room.placed if thing.kind == "curtain"]
+        coats = [thing for thing in room.placed if thing.kind == "coats"]
+        assert coats
+        met += bool(curtains)
+        for one, other in itertools.product(curtains, coats):
+            beside = one.footprint.intersection(other.footprint).area < 1e-9
+            assert beside or one.position[1] >= other.position[1] + other.size[1], (seed, offset)
+    assert met > 20
 
 
 def test_toys_lie_before_their_chest():
