@@ -25,6 +25,7 @@ GROUPS = {
 CREASE = np.radians(50.0)  # a rounding of two steps still shades as one
 COARSE = 0.7  # share of the faces below which a second level of detail is worth its file
 COLLIDERS = 64  # convex pieces of one body at most
+SLACK = 0.003  # metres that a mesh may reach beyond its convex pieces
 SMALL = 0.002  # share of its box below which a solid alone is no obstacle
 
 
@@ -56,7 +57,8 @@ def assembled(
         prefix = f"{body}_" if body != fixed else ""
         parts += _parts(prefix, members, body)
         own = _bodies(plain, fixed)[body]
-        hulls = convex_pieces([piece.vertices for piece in own], float(np.prod(size)))
+        corners = [covering(each.vertices, shown.vertices) for each, shown in zip(own, members, strict=True)]
+        hulls = convex_pieces(corners, float(np.prod(size)))
         words = [f"{prefix}collider", *(f"{prefix}collider_{n}" for n in range(2, len(hulls) + 1))]
         colliders += [Collider(word, hull, "convexHull", body) for word, hull in zip(words, hulls, strict=True)]
         masses[body] = weighed(own)
@@ -113,6 +115,22 @@ def part_of(name: str, pieces: Sequence[Piece], body: str = "") -> Part:
     words = [SLOTS.get(piece.solid.material, piece.solid.material) for piece in pieces]
     slot = np.repeat(words, [len(piece.faces) for piece in pieces])
     return Part(name, mesh, {word: np.flatnonzero(slot == word) for word in sorted(set(words))}, CREASE, body)
+
+
+def covering(plain: np.ndarray, shown: np.ndarray) -> np.ndarray:
+    """Corners of a coarse solid (n, 3), and those of its finer mesh (m, 3) without which that reaches out of their hull
+    by more than `SLACK`: a round top of twelve corners lacks a centimetre of what is seen.
+    """
+    corners = plain
+    while True:
+        try:
+            planes = ConvexHull(corners).equations
+        except QhullError:  # flat
+            return corners
+        beyond = (shown @ planes[:, :3].T + planes[:, 3]).max(1)
+        if beyond.max() <= SLACK:
+            return corners
+        corners = np.concatenate([corners, shown[[beyond.argmax()]]])
 
 
 def convex_pieces(points: Sequence[np.ndarray], box: float, most: int = COLLIDERS) -> list[trimesh.Trimesh]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import ConvexHull
 from shapely.geometry import MultiPoint, Point
 
 from echomodel.data.shapeset import piece as styled
@@ -13,7 +14,7 @@ from echomodel.furniture import solids
 from echomodel.furniture.description import WIDTH, piece_of
 from echomodel.vocabulary import vocabulary
 from echousd.shapes.geometry import FRAME, Origin
-from echousd.shapes.joinery import COLLIDERS, assembled, convex_pieces, within_budget
+from echousd.shapes.joinery import COLLIDERS, SLACK, assembled, convex_pieces, within_budget
 
 SIZE = np.array([0.9, 1.0, 0.45])
 STANDING = 6  # styles of each category: lounging bags on a point and shelves that lean on nothing are among them
@@ -68,6 +69,18 @@ def test_colliders_are_convex_and_hold_the_geometry():
         np.testing.assert_allclose(high - low, SIZE, atol=0.03)
     table = piece("dining_table", np.array([1.6, 0.75, 0.9]))
     assert len(table.colliders) > 2  # a chair fits below
+
+
+@pytest.mark.parametrize(
+    "category", ["coffee_table", "round_end_table", "dining_chair", "sofa", "bathtub", "lazy_sofa"]
+)
+def test_no_mesh_reaches_out_of_its_colliders(category):
+    for style in range(4):  # round tops are among them
+        _, size, parts = styled(5, style, category)
+        made = assembled(parts, size, faces=2500, origin=Origin("parts"), round=vocabulary().category(category).round)
+        planes = [ConvexHull(collider.mesh.vertices).equations for collider in made.colliders]
+        beyond = [(made.mesh.vertices @ each[:, :3].T + each[:, 3]).max(1) for each in planes]
+        assert np.min(beyond, axis=0).max() <= SLACK + 1e-9, (category, style)
 
 
 @pytest.mark.parametrize("seed", [7, 9])
