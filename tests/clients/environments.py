@@ -41,14 +41,14 @@ def python_of(client: str) -> Path:
     wanted = " ".join(PYTHON_CLIENTS[client])
     if not ready.is_file() or ready.read_text("utf-8") != wanted:
         subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
-        if client in WITH_OURS:
-            (site,) = (folder / "lib").glob("python*/site-packages")
-            # an editable install finds our packages by a hook, which another environment does not have
-            ours = {str(Path(package.__path__[0]).parent) for package in (echousd, echomodel)}
-            (site / "ours.pth").write_text("\n".join([*sorted(ours), *filter(None, sys.path)]) + "\n", "utf-8")
         install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         subprocess.run([*install, *PYTHON_CLIENTS[client]], check=True)
         ready.write_text(wanted, "utf-8")
+    if client in WITH_OURS:  # written anew each time: another checkout may have made the environment
+        (site,) = (folder / "lib").glob("python*/site-packages")
+        # an editable install finds our packages by a hook, which another environment does not have
+        ours = {str(Path(package.__path__[0]).parent) for package in (echousd, echomodel)}
+        (site / "ours.pth").write_text("\n".join([*sorted(ours), *filter(None, sys.path)]) + "\n", "utf-8")
     return python
 
 
