@@ -74,13 +74,13 @@ def sampled_graph(room_type: str, seed: int, number: int, relations: float) -> S
     import torch
 
     from echomodel.boxes import Boxes
-    from echomodel.rooms.generator import drawn_shares, generate_room
+    from echomodel.rooms.generator import generate_room
     from echomodel.rules import label_relations
     from echomodel.rules.telling import told_relations
     from echomodel.vocabulary import vocabulary
     from echousd.graph import Node, Relation, RoomSpec
 
-    types = list(drawn_shares())
+    types = [row.name for row in sorted(vocabulary().room_types, key=lambda row: -row.share)]
     if room_type not in types:
         raise ValueError(f"sample: no rooms of type {room_type!r} are drawn, allowed: {', '.join(types)}")
     kind = types.index(room_type)

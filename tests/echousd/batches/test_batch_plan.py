@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from echomodel.vocabulary import vocabulary
 from echousd.batches.journal import Journal, read_journals, room_digest, shard_folder
 from echousd.batches.options import parse_sample, read_toml, request_of
 from echousd.batches.plan import difference, load_plan, make_plan, save_plan
@@ -111,6 +112,11 @@ def test_a_sampled_graph_is_a_function_of_its_numbers():
     assert all(node.position is None for node in one.nodes)
     with pytest.raises(ValueError, match="allowed: bedroom"):
         sampled_graph("cellar", 0, 0, 1)
+
+
+@pytest.mark.parametrize("kind", [row.name for row in vocabulary().room_types])
+def test_rooms_of_every_type_are_sampled(kind):
+    assert sampled_graph(kind, 3, 0, 1.0).room.type == kind
 
 
 def test_a_torn_line_is_no_room(tmp_path):
