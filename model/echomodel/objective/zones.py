@@ -15,7 +15,7 @@ from echomodel.objective.plan import CLEAR_HEIGHT, FAR, Plan
 BARE = 1.05  # radius of an empty circle, of the side of a square that is each piece's share of the floor
 AHEAD = 1.0  # metres before a sofa to other groups: 97 % of real ones have them
 COVERED = 0.25  # share of its width from which on something is before it
-CELL = 0.25  # metres between two points of the floor that are looked at
+CELL, POINTS = 0.25, 1000  # metres between two points of the floor that are looked at; in a hall so many, farther apart
 NEARBY = 0.5  # metres: a point nearer to a piece is neither bare nor far from everything
 
 
@@ -48,7 +48,8 @@ def floor_points(plan: Plan) -> list[tuple[Tensor, float, Tensor, Tensor]]:
             x, z = polygon.T
             area = float(abs(x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2)
             low, high = polygon.min(0), polygon.max(0)
-            xs, zs = (np.arange(a + CELL / 2, b, CELL) for a, b in zip(low, high, strict=True))
+            cell = max(CELL, math.sqrt(float(np.prod(high - low)) / POINTS))
+            xs, zs = (np.arange(a + cell / 2, b, cell) for a, b in zip(low, high, strict=True))
             points = plan.numbers(np.stack(np.meshgrid(xs, zs), -1).reshape(-1, 2).tolist())
             walls = signed_distance(points[None], plan.numbers(polygon.tolist())[None])[0]
             kept.append((scenes, area, points[walls > 0], walls[walls > 0]))
